@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import pickle
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from katana450.arm.control.following import Following
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
+from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.arm.runtime.wire import MAX_NAMED_PLANS, PlanNames, PlanStore
 from katana450.maths.planning.plan import Plan
 
@@ -37,6 +41,37 @@ def test_plan_returns_as_the_same_object(plan: Plan) -> None:
 def test_unknown_plan_is_sent_completely(plan: Plan) -> None:
     back = PlanStore().loaded(PlanNames().dumped(plan))
     assert np.array_equal(back.end, plan.end)
+
+
+class _InterruptedPickler(pickle.Pickler):
+    """Pickles a value as if another thread read its properties meanwhile."""
+
+    def __init__(self, read: Callable[[], object]) -> None:
+        super().__init__(io.BytesIO())
+        self._read, self._values = read, 0
+
+    def persistent_id(self, _value: object) -> None:
+        self._values += 1
+        if self._values == 10:
+            self._read()
+
+
+def test_property_may_be_read_first_while_its_object_is_pickled(arm: ArmModel, plan: Plan) -> None:
+    session = Session(arm, np.array((0.0, -1.2, 1.5, 0.1, 0.0)))
+    state = session.begin(session.ready, 0.0, 0.0)
+    _InterruptedPickler(lambda: (state.moving, state.under_way)).dump(state)
+    assert {"moving", "under_way"} <= vars(state).keys()
+    whole = replace(plan)
+    _InterruptedPickler(lambda: (whole.begins, whole.start, whole.end)).dump(whole)
+    segment = replace(plan.segments[0])
+    _InterruptedPickler(lambda: (segment.length, segment.sweep)).dump(segment)
+    assert {"length", "sweep"} <= vars(segment).keys()
+
+
+def test_published_state_is_complete(arm: ArmModel) -> None:
+    session = Session(arm, np.array((0.0, -1.2, 1.5, 0.1, 0.0)))
+    snapshot = Snapshot(session.begin(session.ready, 0.0, 0.0), 0)
+    assert {"moving", "under_way"} <= vars(snapshot.state).keys()
 
 
 def test_old_plans_are_forgotten(plan: Plan) -> None:

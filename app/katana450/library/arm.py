@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy.typing as npt
@@ -13,6 +12,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.caching import cached_property
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.library.motion_plan import MotionPlan

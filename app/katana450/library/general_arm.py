@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.assembly.robot_session import find_robot
+from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.described_arm import DescribedArm, described_arm
 from katana450.extensions.general_arms.nearest import BestPosture, nearest_posture

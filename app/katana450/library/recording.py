@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.commands import Command
+from katana450.caching import cached_property
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.recording.datasets.tool_orientation import orientations
 from katana450.extensions.recording.episodes.episode import Episode

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.tool_kinematics import ToolKinematics
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
 from katana450.arm.control.grip_model import FixedJawModel, GripModel
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.solid import PLAIN, ObjectAppearance, Solid
+from katana450.caching import cached_property
 from katana450.errors import InputError, digits_beyond
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.shape import CollisionShape, box, cylinder, hull, sphere

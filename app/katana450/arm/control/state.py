@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from katana450.arm.control.modes import (
 from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.stop_cause import WATCHDOG, StopCause
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.priority import Priority

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from katana450.arm.robot.surfaces import VisualMesh, main_colour, shapes_of
 from katana450.arm.robot.visual import Visual
+from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -9,13 +9,13 @@ import threading
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from katana450.arm.control.solid import Solid
 from katana450.arm.robot import creases
 from katana450.arm.robot.creases import Colours
 from katana450.atomic import write_files, writer_of
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
@@ -144,7 +144,8 @@ class Meshes:
         """Write the files of the ``new`` meshes to ``folder``, and remove those of ``removed``."""
         with self._storing:
             for key in removed:
-                (folder / f"{key}{SUFFIX}").unlink(missing_ok=True)
+                with suppress(OSError):
+                    (folder / f"{key}{SUFFIX}").unlink()
             for mesh in new:
                 try:
                     content = writer_of(pickle.dumps(mesh))

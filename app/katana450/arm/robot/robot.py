@@ -6,7 +6,6 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from katana450.arm.control.joints import JointSet
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.visual import Visual
+from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 

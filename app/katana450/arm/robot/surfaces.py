@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.robot.visual import Visual, unreadable_mesh
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.srgb import to_srgb
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.disk_cache import kept
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, frozen

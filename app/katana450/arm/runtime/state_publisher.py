@@ -23,6 +23,10 @@ class Snapshot:
     state: State
     ticket: int
 
+    def __post_init__(self) -> None:
+        """Complete the state before another thread sees it."""
+        _ = self.state.moving, self.state.under_way
+
 
 class StatePublisher:
     """The newest snapshot, the event log and outcomes. One thread publishes, any thread reads."""
@@ -45,7 +49,8 @@ class StatePublisher:
     @property
     def event_log(self) -> tuple[LogEntry, ...]:
         """The last entries of the event log, oldest first."""
-        return tuple(self._event_log)
+        with self._published:
+            return tuple(self._event_log)
 
     def publish(self, snapshot: Snapshot, entries: Sequence[LogEntry] = ()) -> None:
         """Publish ``snapshot``, and add ``entries`` to the event log."""

@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +18,7 @@ import numpy as np
 
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
+from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array

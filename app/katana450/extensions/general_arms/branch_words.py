@@ -28,12 +28,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 from typing import Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain

@@ -7,12 +7,13 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding

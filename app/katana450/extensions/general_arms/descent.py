@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.regularity import NEAR, WALL, Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from katana450.arm.robot.arm_reader import described_chain
@@ -13,6 +12,7 @@ from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.structure import structure_of
 from katana450.arm.robot.urdf import urdf_of
 from katana450.assembly.robot_files import read_urdf
+from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.maths.geometry import se3

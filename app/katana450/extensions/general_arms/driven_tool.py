@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import ClassVar, Final
 
 import numpy as np
@@ -15,6 +14,7 @@ from katana450 import tolerances
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
 from katana450.arm.control.tool_commands import OrientTool, StepTool, TurnCommand
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.descent import Descent

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.straight_line import Code

@@ -16,11 +16,11 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain

@@ -21,13 +21,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.links import DHLinks
 from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jacobian
 from katana450.extensions.general_arms.tool_motion import Motion, tool_and_jacobian

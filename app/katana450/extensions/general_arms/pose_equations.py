@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.descent import Descent, Look
 from katana450.extensions.general_arms.regularity import Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose

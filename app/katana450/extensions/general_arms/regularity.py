@@ -12,11 +12,11 @@ norm of the change of the matrix. A step that changes it by less never passes a 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
 
 WALL: Final = 0.02

@@ -18,13 +18,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns, inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
+from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 

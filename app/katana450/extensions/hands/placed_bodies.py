@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.maths.collision.contact import Witness
 from katana450.maths.collision.shape import half_space, sphere
 from katana450.maths.collision.world import CollisionWorld, Part

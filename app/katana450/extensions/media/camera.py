@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.media.scene import Floats, unit
 from katana450.maths.geometry.arrays import finite_array

@@ -10,7 +10,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.media import figures
 from katana450.extensions.media.measured_figure import measured_figure

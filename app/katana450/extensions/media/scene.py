@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.robot.surfaces import Material, VisualMesh
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
 
 Floats = npt.NDArray[np.float32]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
+from katana450.caching import cached_property
 from katana450.extensions.conduit.rings import PITCH, poses, ring
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent

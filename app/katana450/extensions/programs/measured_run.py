@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.state import State
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.planning.path import CurvePath, point_derivatives

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from typing import Final, Protocol
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.extensions.general_arms.tool_pose import ToolPose

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 from katana450.arm.control.state import State
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task, Wait
 from katana450.extensions.programs.compiler import Compiler, Report

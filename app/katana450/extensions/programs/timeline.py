@@ -5,7 +5,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import accumulate
 from typing import NamedTuple
 
@@ -14,6 +13,7 @@ import numpy as np
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.caching import cached_property
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.simulation import follow_exactly, simulated

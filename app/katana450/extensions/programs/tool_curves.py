@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.curve import Linear, ToolArc, ToolCoordinates, ToolLine
 from katana450.extensions.programs.jet_posture import facing

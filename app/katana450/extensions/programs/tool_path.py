@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.errors import PathError
 from katana450.extensions.programs.curve import Curve, ToolCoordinates
 from katana450.extensions.programs.jet_posture import posture

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.reachability.cloud import tool_cloud
 from katana450.extensions.reachability.grid import IntArray, VoxelGrid

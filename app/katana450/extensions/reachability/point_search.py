@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.descent import Descent
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical

@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final, cast
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import DHLinks, links_of

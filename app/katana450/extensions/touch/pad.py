@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 ROWS, COLUMNS = 16, 8

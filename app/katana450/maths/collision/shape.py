@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.maths.collision.engine import Engine, engine
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen

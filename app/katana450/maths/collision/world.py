@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.engine import Engine, engine
 from katana450.maths.collision.linkage import GROUND, Linkage

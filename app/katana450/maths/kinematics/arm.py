@@ -23,12 +23,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -5,11 +5,11 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import BlockedError, InputError
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.contact import Contact

@@ -20,11 +20,11 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
 
+from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.motion.limiter import Limits
