@@ -153,3 +153,40 @@ def test_status_names_the_newest_drivers(arm: ArmModel, session: Session) -> Non
         pipe.close()
 
     asyncio.run(act())
+
+
+@pytest.mark.parametrize("failing", ["arm", "process of STOP"])
+def test_error_in_a_thread_closes_the_pipe_of_stop(
+    arm: ArmModel, session: Session, failing: str
+) -> None:
+    stumbling: list[str] = []
+
+    def drivers() -> tuple[str, ...]:
+        if stumbling == ["arm"]:
+            raise RuntimeError(stumbling.pop())
+        return tuple(stumbling)
+
+    async def act() -> None:
+        with arm_end(arm, session, drivers) as first, arm_end(arm, session) as second:
+            pipes = iter((first, second))
+            stop_pipe = StopPipe(lambda: _next(pipes))
+            call = stop_pipe._call
+
+            def stumble(act: Callable[..., None], *values: object) -> None:
+                if stumbling == ["process of STOP"] == list(getattr(values[-1], "drivers", ())):
+                    raise RuntimeError(stumbling.pop())
+                call(act, *values)
+
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(stop_pipe, "_call", stumble)
+                async with asyncio.timeout(TIMEOUT):
+                    while not connected(stop_pipe):
+                        await asyncio.sleep(0.01)
+                    stumbling.append(failing)
+                    while stop_pipe._pipe is not second:
+                        await asyncio.sleep(0.01)
+            stop_pipe.press(press("one"))
+            assert await stop_pipe.executed("one", TIMEOUT) is not None
+        await ended(stop_pipe)
+
+    asyncio.run(act())

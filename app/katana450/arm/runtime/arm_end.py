@@ -12,6 +12,7 @@ import logging
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
@@ -21,6 +22,7 @@ from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.outcome import refused
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Finding, Reason
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.mailbox import Mailbox
@@ -31,9 +33,6 @@ from katana450.arm.runtime.wire import PlanNames
 from katana450.errors import InputError
 
 log = logging.getLogger(__name__)
-
-PIPE_ERRORS = (EOFError, OSError)
-"""Errors that a pipe raises when its other end is closed."""
 
 PULSE_INTERVAL = 0.1
 """[s] Maximum time between two messages of the arm's process, as long as its control loop ticks."""
@@ -137,8 +136,8 @@ class ArmEnd:
         self.cut = threading.Event()
         """Set once the other end is closed."""
         self._threads = [
-            threading.Thread(target=target, name=f"pipe {name}", daemon=True)
-            for name, target in (("in", self._listen), ("out", self._show), ("watch", self._watch))
+            threading.Thread(target=self._serve, args=(work,), name=f"pipe {name}", daemon=True)
+            for name, work in (("in", self._listen), ("out", self._show), ("watch", self._watch))
         ]
 
     def start(self) -> None:
@@ -155,17 +154,18 @@ class ArmEnd:
         for thread in self._threads:
             thread.join(JOIN_TIMEOUT)
 
+    def _serve(self, work: Callable[[], None]) -> None:
+        with GuardedPipe(self._pipe, "The pipe to the page's server", self._lose):
+            work()
+
     def _listen(self) -> None:
-        try:
-            while not self.cut.is_set():
-                message = self._pipe.recv()
-                self._heard = time.monotonic()
-                if isinstance(message, Heartbeat):
-                    self.drivers = message.drivers
-                elif isinstance(message, CommandMessage) and not self.cut.is_set():
-                    self._put(message)
-        except PIPE_ERRORS:
-            self._lose()
+        while not self.cut.is_set():
+            message = self._pipe.recv()
+            self._heard = time.monotonic()
+            if isinstance(message, Heartbeat):
+                self.drivers = message.drivers
+            elif isinstance(message, CommandMessage) and not self.cut.is_set():
+                self._put(message)
 
     def _lose(self) -> None:
         """Stop the arm, unless the pipe is cut already: no command can come any more."""
@@ -194,43 +194,40 @@ class ArmEnd:
     def _show(self) -> None:
         state_publisher = self._loop.state_publisher
         seen, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
-        try:
-            event_log = state_publisher.event_log
-            timing, profile = state_publisher.loop_timing, self._loop.profile
-            self._send(StateMessage(self._named(seen), event_log, timing, profile=profile))
-            last = event_log[-1] if event_log else None
-            while not self.cut.is_set():
-                snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
-                if self.cut.is_set():
-                    # The stop of this end is no news for a front end that disconnects.
-                    break
-                now = time.monotonic()
-                if snapshot is seen and self._loop.ticks == ticks:
-                    # A loop that does not tick must give no pulse.
-                    continue
-                ticks = self._loop.ticks
-                if snapshot is seen and now - reported < REPORT_INTERVAL:
-                    self._pipe.send_bytes(PULSE)
-                    continue
-                if now - reported >= REPORT_INTERVAL:
-                    reported, state_publisher.loop_timing = now, self._loop.loop_timing
-                fresh = _newer(state_publisher.event_log, last)
-                last = fresh[-1] if fresh else last
-                self._send(
-                    StateMessage(
-                        self._named(snapshot),
-                        fresh,
-                        state_publisher.loop_timing,
-                        self._outcomes(snapshot.ticket),
-                        profile,
-                    )
+        event_log = state_publisher.event_log
+        timing, profile = state_publisher.loop_timing, self._loop.profile
+        self._send(StateMessage(self._named(seen), event_log, timing, profile=profile))
+        last = event_log[-1] if event_log else None
+        while not self.cut.is_set():
+            snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
+            if self.cut.is_set():
+                # The stop of this end is no news for a front end that disconnects.
+                break
+            now = time.monotonic()
+            if snapshot is seen and self._loop.ticks == ticks:
+                # A loop that does not tick must give no pulse.
+                continue
+            ticks = self._loop.ticks
+            if snapshot is seen and now - reported < REPORT_INTERVAL:
+                self._pipe.send_bytes(PULSE)
+                continue
+            if now - reported >= REPORT_INTERVAL:
+                reported, state_publisher.loop_timing = now, self._loop.loop_timing
+            fresh = _newer(state_publisher.event_log, last)
+            last = fresh[-1] if fresh else last
+            self._send(
+                StateMessage(
+                    self._named(snapshot),
+                    fresh,
+                    state_publisher.loop_timing,
+                    self._outcomes(snapshot.ticket),
+                    profile,
                 )
-                seen = snapshot
-            # A front end that hangs reads nothing, and its pipe may be full.
-            if writable(self._pipe.fileno()):
-                self._pipe.send(None)
-        except PIPE_ERRORS:
-            self._lose()
+            )
+            seen = snapshot
+        # A front end that hangs reads nothing, and its pipe may be full.
+        if writable(self._pipe.fileno()):
+            self._pipe.send(None)
 
     def _send(self, message: StateMessage) -> None:
         self._pipe.send_bytes(self._names.dumped(message))

@@ -18,6 +18,8 @@ from multiprocessing.connection import (
 from pathlib import Path
 from typing import Any
 
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
+
 log = logging.getLogger(__name__)
 
 FRONT = "front"
@@ -149,15 +151,16 @@ class ArmListener:
                 connection.close()
 
     def _greet(self, connection: Any) -> None:
-        try:
-            deliver_challenge(connection, self._key)
-            answer_challenge(connection, self._key)
-            greeting = connection.recv()
-        except (EOFError, OSError, AuthenticationError):
-            connection.close()
-            return
-        attach = self._roles.get(greeting.role)
-        if attach is None:
-            connection.close()
-        else:
-            attach(connection, greeting)
+        with GuardedPipe(connection, "A connection to the arm's process"):
+            try:
+                deliver_challenge(connection, self._key)
+                answer_challenge(connection, self._key)
+                greeting = connection.recv()
+            except AuthenticationError:
+                connection.close()
+                return
+            attach = self._roles.get(greeting.role)
+            if attach is None:
+                connection.close()
+            else:
+                attach(connection, greeting)

@@ -16,14 +16,9 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.scene_objects import same
 from katana450.arm.control.stopping import joined
-from katana450.arm.runtime.arm_end import (
-    PIPE_ERRORS,
-    PULSE,
-    CommandMessage,
-    Heartbeat,
-    StateMessage,
-)
+from katana450.arm.runtime.arm_end import PULSE, CommandMessage, Heartbeat, StateMessage
 from katana450.arm.runtime.clock import MonotonicClock
+from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.arm.runtime.readiness import readable, writable
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.wire import PlanStore
@@ -37,6 +32,8 @@ REST_HEARTBEAT = 0.08
 
 RECONNECT_INTERVAL = 0.05
 """[s] Interval of the attempts to connect to a new process of the arm."""
+
+PIPE = "The pipe to the arm's process"
 
 
 class FrontEnd:
@@ -183,12 +180,11 @@ class FrontEnd:
 
     def _listen(self) -> None:
         while not self.cut.is_set():
-            with suppress(*PIPE_ERRORS):
+            with GuardedPipe(self._pipe, PIPE):
                 while self._take(self._pipe.recv_bytes()):
                     pass
                 # Another front end has taken the place of this one.
                 self.cut.set()
-                return
             self._connected = False
             if self._reconnect is None or not self._connect(self._reconnect):
                 self.cut.set()
@@ -203,17 +199,19 @@ class FrontEnd:
                 number = self._number
             with suppress(*PIPE_ERRORS):
                 pipe, plans = reconnect(number), PlanStore()
-                first = _loaded(pipe.recv_bytes(), plans)
-                if first is None:
-                    continue
-                known = self.state_publisher.event_log
-                entries = [each for each in first.event_log if not known or each.t > known[-1].t]
-                self.state_publisher.publish(first.snapshot, entries)
-                with self._sending:
-                    self._pipe, self._plans, self._heard = pipe, plans, time.monotonic()
-                    self._connected = True
-                    self._flush()
-                return True
+                with GuardedPipe(pipe, PIPE):
+                    first = _loaded(pipe.recv_bytes(), plans)
+                    if first is None:
+                        continue
+                    known = self.state_publisher.event_log
+                    newest = known[-1].t if known else -math.inf
+                    entries = [entry for entry in first.event_log if entry.t > newest]
+                    self.state_publisher.publish(first.snapshot, entries)
+                    with self._sending:
+                        self._pipe, self._plans, self._heard = pipe, plans, time.monotonic()
+                        self._connected = True
+                        self._flush()
+                    return True
         return False
 
     def _take(self, data: bytes) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from collections.abc import Callable
@@ -10,13 +9,14 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.runtime.arm_end import JOIN_TIMEOUT, PIPE_ERRORS
+from katana450.arm.runtime.arm_end import JOIN_TIMEOUT
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.stop_messages import STATUS_INTERVAL, StopPress, StopStatus
 from katana450.platform_support import prefer_thread
 
-log = logging.getLogger(__name__)
+PIPE = "The pipe to the process of STOP"
 
 
 class StopEnd:
@@ -68,7 +68,7 @@ class StopEnd:
 
     def _listen(self) -> None:
         prefer_thread()
-        with suppress(*PIPE_ERRORS):
+        with GuardedPipe(self._pipe, PIPE):
             while not self._cut.is_set():
                 # A press wakes this thread at once; the end of the arm's process does later.
                 if not self._pipe.poll(STATUS_INTERVAL):
@@ -81,7 +81,7 @@ class StopEnd:
     def _report(self) -> None:
         publisher = self._loop.state_publisher
         seen, reported, ticks, sent = None, 0.0, -1, None
-        with suppress(*PIPE_ERRORS):
+        with GuardedPipe(self._pipe, PIPE):
             while not self._cut.is_set():
                 if seen is not None:
                     publisher.wait_for_change(seen, STATUS_INTERVAL)

@@ -11,6 +11,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
 from katana450.arm.runtime.stop_messages import StopPress, StopStatus
 
@@ -85,7 +86,7 @@ class StopPipe:
             while True:
                 pipe = self._connect()
                 self._call(self._attach, pipe)
-                with suppress(EOFError, OSError):
+                with GuardedPipe(pipe, "The pipe of STOP to the arm's process"):
                     while True:
                         status = pipe.recv()
                         self._heard = time.monotonic()

@@ -16,6 +16,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
 from katana450.extensions.event_log.folder import MAX_FILE_BYTES, MAX_FILES, LogFolder, LogHead
 from katana450.extensions.event_log.records import Record, record
@@ -103,7 +104,7 @@ class LogWriter:
     def _listen(self, pipe: Connection) -> None:
         # A new front end reports the findings again that the arm still remembers.
         known = self._finding_t
-        with suppress(EOFError, OSError):
+        with GuardedPipe(pipe, "The pipe of the event log"):
             while True:
                 for content in pipe.recv():
                     if content["kind"] == "finding":

@@ -22,6 +22,7 @@ from multiprocessing.connection import (
 from pathlib import Path
 from typing import Any
 
+from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeGiver
@@ -120,7 +121,7 @@ class EpisodeListener:
                 log.exception("The clock of the episodes met an error.")
 
     def _serve(self, connection: Any) -> None:
-        with suppress(EOFError, OSError, AuthenticationError):
+        with GuardedPipe(connection, "A connection about episodes"), suppress(AuthenticationError):
             deliver_challenge(connection, self._key)
             answer_challenge(connection, self._key)
             asked = json.loads(connection.recv_bytes(MAX_MESSAGE_BYTES))

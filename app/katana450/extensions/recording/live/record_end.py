@@ -11,6 +11,7 @@ from collections import deque
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
+from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.live.record_wire import RecordSerializer
 
@@ -86,7 +87,7 @@ class RecordEnd:
 
     def _send(self, pipe: Connection) -> None:
         serializer = RecordSerializer()
-        with suppress(EOFError, OSError):
+        with GuardedPipe(pipe, "The pipe to the process that records"):
             while pipe is self._pipe and not (self._closed.is_set() and not self._waiting):
                 self._full.wait(COLLECTING)
                 self._full.clear()
@@ -95,14 +96,26 @@ class RecordEnd:
                 while self._waiting:
                     count = min(len(self._waiting), BATCH)
                     records = [self._waiting[place] for place in range(count)]
-                    pipe.send_bytes(serializer.dumped(records))
-                    # Only now, so that records whose pipe breaks go by the next one.
-                    for _ in records:
-                        self._waiting.popleft()
+                    try:
+                        pipe.send_bytes(serializer.dumped(records))
+                    except PIPE_ERRORS:
+                        # The records go by the next pipe.
+                        raise
+                    except Exception:
+                        # By the next pipe they would meet the same error.
+                        with self._losing:
+                            self._lost, self._lost_until = self._lost + count, records[-1].t
+                        self._remove(count)
+                        raise
+                    self._remove(count)
                 if self._lost:
                     self._report_lost(pipe)
         with suppress(OSError):
             pipe.close()
+
+    def _remove(self, count: int) -> None:
+        for _ in range(count):
+            self._waiting.popleft()
 
     def _wait_for_any(self, pipe: Connection) -> None:
         """Wait until the arm moves, or until there is no more to wait for."""
