@@ -41,6 +41,22 @@ if __name__ == "__main__":
     sys.exit(main(["serve", "--port", sys.argv[1]]))
 """
 
+# Lets the thread that sends the states wait for ever as soon as the arm moves.
+MUTE = """
+import sys
+import threading
+from katana450.cli.main import main
+from katana450.arm.runtime.arm_end import ArmEnd
+send = ArmEnd._send
+def mute(end, message):
+    if message.snapshot.state.moving:
+        threading.Event().wait()
+    send(end, message)
+ArmEnd._send = mute
+if __name__ == "__main__":
+    sys.exit(main(["serve", "--port", sys.argv[1]]))
+"""
+
 
 def state_of(server: AppServer) -> dict[str, object]:
     state: dict[str, object] = json.loads(ask(f"{server.url}/api/v1/state")[2])
@@ -130,3 +146,19 @@ def test_control_loop_that_ended_is_started_again_stopped(tmp_path: Path) -> Non
             reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
             assert "restarted" in reasons
         assert "The arm's process ended with status 1" in server.output
+
+
+def test_arm_whose_states_reach_no_page_is_started_again_stopped(tmp_path: Path) -> None:
+    app = tmp_path / "mute.py"
+    app.write_text(MUTE, encoding="utf-8")
+    with AppServer((sys.executable, str(app), "{port}")) as server:
+        killed = server.arm
+        with connect(server.url, "Driver") as arm:
+            arm.ask(requests.Joints(q=FAR.tolist()))
+            end = time.monotonic() + 20.0
+            while (state := arm.query(answers.State)).stop != "confirmed" or state.age > REPORTED:
+                assert time.monotonic() < end
+                time.sleep(0.05)
+            assert server.arm != killed
+            assert not state.moving
+        assert "no longer reaches the page's server" in server.output

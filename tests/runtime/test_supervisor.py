@@ -65,6 +65,28 @@ def failing(_folder: Path, _supervisor: SupervisorPipe) -> None:
     raise SystemExit(3)
 
 
+def deaf(folder: Path, supervisor: SupervisorPipe) -> None:
+    """Report once that the worker is not heard, some time after that is ready."""
+    supervisor.report(READY)
+    until((folder / "pid0").exists)
+    time.sleep(0.3)
+    supervisor.report_unheard("worker")
+    supervisor.ended.wait()
+
+
+def careless(folder: Path, supervisor: SupervisorPipe) -> None:
+    """Meet an error in a thread."""
+
+    def work() -> None:
+        with (folder / "started").open("a") as file:
+            file.write("x")
+        raise LookupError("no such thing")
+
+    supervisor.report(READY)
+    threading.Thread(target=work).start()
+    supervisor.ended.wait()
+
+
 class Running:
     """A supervisor that runs in a thread."""
 
@@ -117,6 +139,31 @@ def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
         until(lambda: len((tmp_path / "started").read_text()) >= 2)
     finally:
         running.stop()
+
+
+def test_process_that_another_one_no_longer_hears_starts_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor_module, "MAX_UNHEARD_TIME", 0.1)
+    running = Running(
+        child_spec("worker", "The worker", worker, tmp_path, 5.0, keeps=True),
+        child_spec("deaf", "The deaf one", deaf, tmp_path, 5.0),
+    )
+    try:
+        until((tmp_path / "pid1").exists)
+    finally:
+        running.stop()
+
+
+def test_error_in_any_thread_ends_the_process(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    running = Running(child_spec("careless", "It", careless, tmp_path, 5.0))
+    try:
+        until(lambda: len((tmp_path / "started").read_text()) >= 2)
+    finally:
+        running.stop()
+    assert "LookupError: no such thing" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from katana450.assembly.robot_session import DescribedRobot
     from katana450.maths.geometry.arrays import FloatArray
 
+ARM = "katana450 arm"
+"""Name of the process."""
+
 WAKE_INTERVAL = 0.2
 """[s] Interval at which the end of the control loop is checked."""
 

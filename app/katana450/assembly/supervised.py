@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 
 from katana450.arm.runtime.readiness import writable
@@ -18,9 +19,10 @@ from katana450.assembly.log_lines import start_log
 from katana450.errors import KatanaError
 from katana450.platform_support import name_process, stop_signals
 
-HEARTBEAT, REPORT, KEPT, SCENE = b".", b"r", b"k", b"s"
-"""First bytes of the messages to the supervisor: a heartbeat; a status word or an error; and the
-last known state of the arm, without and with its scene, which only the arm's process reads."""
+HEARTBEAT, REPORT, KEPT, SCENE, UNHEARD = b".", b"r", b"k", b"s", b"u"
+"""First bytes of the messages to the supervisor: a heartbeat; a status word or an error; the last
+known state of the arm, without and with its scene, which only the arm's process reads; and the name
+of a process from which this one hears nothing."""
 
 END, NOTICE = b"e", b"n"
 """First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
@@ -85,6 +87,10 @@ class SupervisorPipe:
             gc.freeze()
             gc.enable()
         self._send(REPORT + pickle.dumps(status))
+
+    def report_unheard(self, name: str) -> None:
+        """Report that the process ``name``, if it runs at all, no longer reaches this one."""
+        self._send(UNHEARD + name.encode())
 
     def keep(self, kind: bytes, content: bytes) -> bool:
         """Let the supervisor keep ``content`` for the next process, in place of the last ``kind``.
@@ -167,9 +173,23 @@ def run_supervised(
     name_process(name)
     start_log()
     supervisor = SupervisorPipe(pipe, interval)
+    threading.excepthook = partial(_end_after, supervisor)
     supervisor.start()
     try:
         work(supervisor)
     except KatanaError as error:
         supervisor.report(error)
         raise SystemExit(1) from None
+
+
+def _end_after(supervisor: SupervisorPipe, failure: threading.ExceptHookArgs) -> None:
+    """End this process after an error that ended one of its threads, so that it is started again.
+
+    Without that thread the process would only seem to work.
+    """
+    if failure.exc_type is SystemExit or failure.exc_value is None:
+        return
+    name = "" if failure.thread is None else f' "{failure.thread.name}"'
+    log.critical("The thread%s met an error.", name, exc_info=failure.exc_value)
+    if not supervisor.ended.is_set():
+        os._exit(1)

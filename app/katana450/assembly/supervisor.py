@@ -30,6 +30,7 @@ from katana450.assembly.supervised import (
     READY,
     REPORT,
     SCENE,
+    UNHEARD,
     SupervisorPipe,
     run_supervised,
 )
@@ -52,6 +53,9 @@ START_SILENCE = 10.0
 
 GOODBYE_SECONDS = 5.0
 """[s] Timeout for a process to end by itself."""
+
+MAX_UNHEARD_TIME = 3.0
+"""[s] Time for which a process that is ready may not reach another one."""
 
 RESTART_DELAYS = (0.0, 0.0, 0.0, 1.0, 5.0, 15.0)
 """[s] Delay before a process is started again, by the number of its early ends in a row, from 0."""
@@ -110,6 +114,8 @@ class Child:
         self.spec = spec
         self.statuses: set[str] = set()
         self.error: KatanaError | None = None
+        self.unheard = ""
+        """Name of a process that the newest message says is not heard there; "" for none."""
         self.kept: Kept = {}
         self.due: float | None = 0.0
         """Time of the next start [s]; None while a process runs."""
@@ -157,6 +163,8 @@ class Child:
                 kind, content = message[:1], message[1:]
                 if kind in (KEPT, SCENE):
                     self.kept[kind] = content
+                elif kind == UNHEARD:
+                    self.unheard = content.decode()
                 elif kind == REPORT:
                     self._note(pickle.loads(content))
 
@@ -191,6 +199,10 @@ class Child:
             return f"has not answered for {silent:.1f} s"
         return None
 
+    def has_been_ready(self, seconds: float) -> bool:
+        """Return whether the process became ready more than ``seconds`` [s] ago."""
+        return self._ready_at is not None and time.monotonic() - self._ready_at > seconds
+
     def beat(self) -> None:
         """Send a heartbeat to the process, unless one was sent in this turn already."""
         now = time.monotonic()
@@ -209,8 +221,7 @@ class Child:
         self.process.join()
         self.collect()
         self._pipe.close()
-        stable = self._ready_at is not None and time.monotonic() - self._ready_at > STABLE_SECONDS
-        self._early_ends = 0 if stable else self._early_ends + 1
+        self._early_ends = 0 if self.has_been_ready(STABLE_SECONDS) else self._early_ends + 1
         delay = RESTART_DELAYS[min(self._early_ends, len(RESTART_DELAYS) - 1)]
         self.due = time.monotonic() + delay
         return delay
@@ -303,7 +314,7 @@ class Supervisor:
                 self._start(child)
             return
         alive = child.running
-        if alive and (why := child.hangs) is not None:
+        if alive and (why := child.hangs or self._unheard(child)) is not None:
             log.error("%s %s and is ended.", child.spec.title, why)
             child.process.kill()
             alive = False
@@ -318,6 +329,15 @@ class Supervisor:
             self._announce(child, text)
             if not delay:
                 self._start(child)
+
+    def _unheard(self, child: Child) -> str | None:
+        """Return why ``child`` counts as lost although it answers; None if it does not."""
+        for other in self._children.values():
+            if other.unheard == child.spec.name:
+                other.unheard = ""
+                if child.has_been_ready(MAX_UNHEARD_TIME):
+                    return f"no longer reaches {other.spec.title[0].lower()}{other.spec.title[1:]}"
+        return None
 
     @staticmethod
     def _start(child: Child) -> None:

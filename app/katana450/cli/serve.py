@@ -17,7 +17,7 @@ from types import FrameType
 from typing import Any
 
 from katana450.arm.runtime.arm_listener import ArmAddress
-from katana450.assembly.arm_process import ArmConfig, run_arm
+from katana450.assembly.arm_process import ARM, ArmConfig, run_arm
 from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.frontend_process import OPEN, run_frontend
 from katana450.assembly.log_lines import start_log
@@ -33,8 +33,8 @@ from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
 from katana450.settings import Settings
 
-ARM, FRONT_END, STOP = "katana450 arm", "katana450 front", "katana450 stop"
-"""Names of the processes."""
+FRONT_END, STOP = "katana450 front", "katana450 stop"
+"""Names of the processes beside that of the arm."""
 
 ARM_DEADLINE = 1.0
 """[s] Time without a tick of the control loop after which the arm's process is ended."""

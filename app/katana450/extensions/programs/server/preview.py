@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from bisect import bisect_right
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,6 +26,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.scene import Colour, GhostNodes, surface
 from katana450.server.viser_bridge.posing import arrange
+
+log = logging.getLogger(__name__)
 
 TIME_STEP = 0.1
 """[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
@@ -138,12 +140,16 @@ class Preview:
         shown.simulated = True
 
         def simulate() -> None:
-            with suppress(KatanaError):
+            try:
                 steps = moments(shown.program, shown.timeline, self._session(), shown.start)
                 for moment in steps:
                     if self._shown is not shown:
                         return
                     shown.moments.append(moment)
+            except KatanaError as error:
+                log.debug("The preview ends before the program: %s", error)
+            except Exception:
+                log.exception("The preview met an error.")
             with self._lock:
                 if self._shown is shown:
                     self._objects().prepare(shown.held)
