@@ -83,3 +83,14 @@ def test_posture_nearest_to_the_hint_is_chosen() -> None:
             q = middle + half * rng.uniform(-1.0, 1.0, chain.n)
             best = nearest_posture(kinematics_of(chain), forward(chain, q), q_hint=q)
             assert np.abs(best.q - q).max() < 0.15
+
+
+@pytest.mark.parametrize("name", SIX)
+def test_point_that_the_tool_can_take_is_not_out_of_reach(name: str) -> None:
+    chain = SIX[name]
+    rng = np.random.default_rng(5)
+    for q in rng.uniform(chain.lower, chain.upper, (20, chain.n)):
+        T = forward(chain, q)
+        T[:3, :3] = T[:3, :3] @ so3.exp(rng.normal(size=3))
+        best = nearest_posture(kinematics_of(chain), T)
+        assert "out of reach" not in best.reason

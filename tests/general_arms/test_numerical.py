@@ -1,4 +1,4 @@
-"""The numerical fallback: reach, residual, limits, and following without jumps."""
+"""The numerical fallback: reach, residual and limits."""
 
 from __future__ import annotations
 
@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.general_arms.links import links_of
-from katana450.extensions.general_arms.numerical import (
-    JUMP,
-    FollowStatus,
-    Numerical,
-)
+from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.tool_motion import tool_and_jacobian
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
@@ -112,49 +108,3 @@ def test_limits_are_kept_where_they_forbid_the_pose() -> None:
     assert found.within_limits
     assert not found.exact
     assert found.q[0] == pytest.approx(0.3)
-
-
-def wrist_path(start: float, end: float) -> list[np.ndarray]:
-    """Return poses of the KR 6 while axis 5 turns from ``start`` to ``end`` [rad]."""
-    return [
-        forward(KR_6, np.array([0.2, -1.0, 0.9, 0.3, five, -0.4]))
-        for five in np.linspace(start, end, 60)
-    ]
-
-
-def test_target_is_followed_on_the_branch() -> None:
-    solver = numerical(KR_6)
-    q = np.array([0.2, -1.0, 0.9, 0.3, 0.9, -0.4])
-    for T in wrist_path(0.9, 0.4):
-        q, status = solver.follow(q, T)
-        assert status is FollowStatus.REACHED
-    np.testing.assert_allclose(q, [0.2, -1.0, 0.9, 0.3, 0.4, -0.4], atol=1e-8)
-
-
-def test_singularity_is_never_crossed() -> None:
-    solver = numerical(KR_6)
-    q = np.array([0.2, -1.0, 0.9, 0.3, 0.5, -0.4])
-    seen = set()
-    for T in wrist_path(0.5, -0.5):
-        before = q
-        q, status = solver.follow(q, T)
-        seen.add(status)
-        assert np.abs(q - before).max() <= JUMP
-        assert q[4] > 0.0
-    assert FollowStatus.SINGULAR in seen
-
-
-def test_following_never_jumps() -> None:
-    solver = numerical(SKEWED_6)
-    rng = np.random.default_rng(4)
-    statuses = set()
-    for _ in range(60):
-        q = rng.uniform(-2.0, 2.0, 6)
-        T = forward(SKEWED_6, q + rng.choice((1e-2, 0.3, 1.0)) * rng.normal(size=6))
-        sign = np.sign(np.linalg.det(jacobian_space(SKEWED_6, q)))
-        then, status = solver.follow(q, T)
-        statuses.add(status)
-        assert np.abs(then - q).max() <= JUMP
-        assert np.sign(np.linalg.det(jacobian_space(SKEWED_6, then))) == sign
-        assert SKEWED_6.within_limits(then)
-    assert {FollowStatus.REACHED, FollowStatus.JUMP} <= statuses

@@ -26,7 +26,7 @@ from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.extensions.general_arms.projected import projected
 from katana450.extensions.general_arms.ready_posture import ready_posture
-from katana450.extensions.general_arms.regularity import Regularity
+from katana450.extensions.general_arms.regularity import WALL, Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.general_arms.twist_task import twist_task
 from katana450.maths.geometry import so3
@@ -36,7 +36,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import SolvedPosture
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projection
 from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame, Task
@@ -50,6 +50,9 @@ SETTLED: Final = 1e-9
 
 SETTLINGS: Final = 4
 """Maximum number of searches in which axis 1 and the pose of fewer than six axes settle."""
+
+AT_EDGE: Final = 1.5 * WALL
+"""[1] Smallest singular value up to which a posture counts as at the edge of its branch."""
 
 SIX_PRIORITIES: Final[Mapping[Priority, tuple[str, str]]] = {
     Priority.POSE: (PRIORITIES[Priority.POSE], PRIORITY_HINTS[Priority.POSE]),
@@ -225,12 +228,22 @@ class DrivenTool:
         yaw_was_given: bool,  # noqa: ARG002
     ) -> tuple[Finding, ...]:
         """Return the findings on what ``best`` loses of its target."""
-        return losses_of(self.chain, best, state.priority)
+        return self._losses(best, state.priority)
 
     def tracking_losses(self, state: State, tracked: Tracked) -> tuple[Finding, ...]:
         """Return the findings on what following a drag loses, a gap first."""
         gap = None if tracked.beyond_gap is None else tracked.leap_ahead()
-        return losses_of(self.chain, tracked.best, state.priority, gap)
+        return self._losses(tracked.best, state.priority, gap)
+
+    def _losses(
+        self, best: Projection, priority: Priority, gap: tuple[int, float] | None = None
+    ) -> tuple[Finding, ...]:
+        at_edge = False
+        if max(best.position_error, best.rotation_error) > POSITION_WORTH_TELLING:
+            descent = self._tracker.descent
+            look = descent.look(descent.goal(ToolPose.of(best.T)), tuple(best.q.tolist()))
+            at_edge = look.least <= AT_EDGE
+        return tuple(losses_of(self.chain, best, priority, at_edge=at_edge, gap=gap))
 
     def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
         """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``."""

@@ -1,14 +1,19 @@
 """The dimensions of a chain by Denavit and Hartenberg, which every closed form here reads.
 
     T_S_tool(q) = T_S_1 Rz(alpha1) L1 Rz(alpha2) L2 ... Rz(alphan) T_n_tool
-    L_i = Tz(d_i) Tx(a_i) Rx(t_i),   alpha_i = q_i + shift_i
+    L_i = Tz(d_i) Tx(a_i) Rx(t_i) Ry(b_i),   alpha_i = q_i + shift_i
 
 z_i lies along axis i with its sign. x_i lies along the common normal of axes i and i + 1, at which
 a_i >= 0 is their distance and t_i the angle from one to the other. d_i is the distance along axis i
 between its two normals. Parallel axes have many normals: the one with d_i = 0 is taken. d_1 and
 shift_1 are 0.
 
-Source: Denavit & Hartenberg (1955); Craig, Introduction to Robotics, ch. 3, for the order of terms.
+The common normal of almost parallel axes may be kilometres away. If the axes are not to be exact,
+x_i then leads from axis i, across it, to axis i + 1, and b_i is the tilt that remains. Else b_i is
+0.
+
+Sources: Denavit & Hartenberg (1955); Craig, Introduction to Robotics, ch. 3, for the order of
+terms; Hayati & Mirmirani (1985) for the tilt.
 """
 
 from __future__ import annotations
@@ -16,6 +21,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -28,6 +34,9 @@ from katana450.maths.kinematics.turns import wrapped
 
 Numbers = tuple[float, ...]
 
+ALMOST_PARALLEL: Final = 0.1
+"""[1] Sine of the angle between two axes below which their common normal is not used."""
+
 
 @dataclass(frozen=True, eq=False)
 class DHLinks:
@@ -35,7 +44,7 @@ class DHLinks:
 
     Attributes:
         a, d: (n - 1,) lengths [m].
-        t: (n - 1,) twists [rad].
+        t, b: (n - 1,) twists and tilts [rad].
         shift: (n,) angles [rad].
         T_S_1, T_n_tool: poses (4, 4) of the first frame in {S} and of the tool in the last.
         rounding: the largest deviation [rad], [m] of a twist or length that was replaced by a
@@ -45,6 +54,7 @@ class DHLinks:
     a: Numbers
     d: Numbers
     t: Numbers
+    b: Numbers
     shift: Numbers
     T_S_1: FloatArray
     T_n_tool: FloatArray
@@ -85,13 +95,15 @@ class DHLinks:
 
     def from_axis(self, first: int) -> DHLinks:
         """Return the links of the chain that begins with axis ``first``, counted from 0."""
-        return dataclasses.replace(
-            self, a=self.a[first:], d=self.d[first:], t=self.t[first:], shift=self.shift[first:]
-        )
+        a, d, t, b = (numbers[first:] for numbers in (self.a, self.d, self.t, self.b))
+        return dataclasses.replace(self, a=a, d=d, t=t, b=b, shift=self.shift[first:])
 
     def link(self, i: int) -> FloatArray:
         """Return L_i (4, 4), i from 0."""
-        return _link(self.a[i], self.d[i], self.t[i])
+        L = _link(self.a[i], self.d[i], self.t[i])
+        if self.b[i]:
+            L[:3, :3] = L[:3, :3] @ so3.rotation_y(self.b[i])
+        return L
 
 
 def sine_and_cosine(t: float) -> tuple[float, float]:
@@ -114,21 +126,22 @@ def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
     With ``exact``, rounding in its file is removed: twists within FAMILY_ANGLE of a quarter turn
     and lengths within FAMILY_LENGTH of 0 are exactly that. The tool's home pose stays.
     """
-    angle, gap = tolerances.FAMILY_ANGLE, tolerances.FAMILY_LENGTH
+    angle, gap, almost = tolerances.FAMILY_ANGLE, tolerances.FAMILY_LENGTH, 0.0
     if not exact:
-        angle, gap = tolerances.PARALLEL, tolerances.ROUNDING
+        angle, gap, almost = tolerances.PARALLEL, tolerances.ROUNDING, ALMOST_PARALLEL
     n = chain.n
     z = [chain.S[:3, i] for i in range(n)]
     points = [screws.point_on(chain.S[:, i]) for i in range(n)]
-    a, d, t, shift = [], [], [], [0.0]
+    a, d, t, b, shift = [], [], [], [], [0.0]
     first = T = _start(z[0], points[0])
     off_angle = off_length = 0.0
     for i in range(n - 1):
         here, x_before = T[:3, 3], T[:3, 0]
-        along, length, twist, x = _normal(
-            z[i], here, z[i + 1], points[i + 1], x_before, (angle, gap)
+        along, length, twist, tilt, x = _normal(
+            z[i], here, z[i + 1], points[i + 1], x_before, (angle, gap), almost
         )
-        exact_twist, exact_length = _snapped(twist, angle), _zeroed(length, gap)
+        exact_twist = twist if tilt else _snapped(twist, angle)
+        exact_length = _zeroed(length, gap)
         exact_along = _zeroed(along, gap)
         if i == 0:
             first = T = _frame(z[0], x, here + along * z[0])
@@ -142,14 +155,16 @@ def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
         a.append(exact_length)
         d.append(exact_along)
         t.append(exact_twist)
-        T = _frame(z[i], x, T[:3, 3] + (0.0 if i == 0 else along) * z[i])
-        T = _frame(z[i + 1], x, T[:3, 3] + length * x)
+        b.append(tilt)
+        origin = T[:3, 3] + (0.0 if i == 0 else along) * z[i] + length * x
+        T = _frame(z[i + 1], (x - math.sin(tilt) * z[i + 1]) / math.cos(tilt), origin)
     shift.append(0.0)
     shift = shift[:n]
     links = DHLinks(
         a=tuple(a),
         d=tuple(d),
         t=tuple(t),
+        b=tuple(b),
         shift=tuple(shift),
         T_S_1=frozen(first),
         T_n_tool=frozen(np.eye(4)),
@@ -219,12 +234,14 @@ def _normal(
     p2: FloatArray,
     x: FloatArray,
     within: tuple[float, float],
-) -> tuple[float, float, float, FloatArray]:
+    almost: float,
+) -> tuple[float, float, float, float, FloatArray]:
     """Return the common normal of an axis through `here` and the next one.
 
-    The values are its distance along the axis from `here` [m], its length [m], the twist [rad] and
-    its direction (3,). `x` is used where the axes are one line. ``within`` is the angle [rad] and
-    the length [m] that count as 0.
+    The values are its distance along the axis from `here` [m], its length [m], the twist and the
+    tilt [rad], and its direction (3,). `x` is used where the axes are one line. ``within`` is the
+    angle [rad] and the length [m] that count as 0. Up to the sine ``almost`` of their angle, the
+    line across the first axis from `here` is in place of the normal.
     """
     across = np.cross(z, z2)
     sine, cosine = float(np.linalg.norm(across)), float(z @ z2)
@@ -233,14 +250,19 @@ def _normal(
         between = gap - (gap @ z) * z
         length = float(np.linalg.norm(between))
         direction = between / length if length > within[1] else x
-        twist = 0.0 if cosine > 0.0 else math.pi
-        return 0.0, length, twist, direction
+        return 0.0, length, math.atan2(sine, cosine), 0.0, direction
+    if sine <= almost:
+        between = gap - z2 * float(gap @ z) / cosine
+        length = float(np.linalg.norm(between))
+        direction = between / length if length > within[1] else x
+        twist = math.atan2(-float(np.cross(z, direction) @ z2), cosine)
+        return 0.0, length, twist, math.asin(float(direction @ z2)), direction
     direction = across / sine
     along = float(np.cross(gap, z2) @ across) / sine**2
     length = float(gap @ direction)
     if length < -within[1]:
-        return along, -length, -math.atan2(sine, cosine), -direction
-    return along, length, math.atan2(sine, cosine), direction
+        return along, -length, -math.atan2(sine, cosine), 0.0, -direction
+    return along, length, math.atan2(sine, cosine), 0.0, direction
 
 
 def _snapped(twist: float, within: float) -> float:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450 import tolerances
 from katana450.arm.control.messages import REASONS
 from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.general_arms.links import links_of
@@ -16,15 +18,27 @@ from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jac
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.forward import forward, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 
 POSITION_FIRST = 100.0
 """Weight of the position relative to the orientation if a pose cannot be reached."""
 
+POSITION_ALONE = 1e4
+"""The same where a posture gives up some of the position for the orientation."""
+
 AT_LIMIT = 1e-6
 """[rad] Distance from a limit within which a joint counts as held by it."""
+
+APPROACH = 0.1
+"""[rad] Largest turn of a joint in the motion that shows whether a target is out of reach."""
+
+DAMPING = 1e-2
+"""[1] Damping of that motion, relative to the longest arm of a joint."""
+
+CLEARLY = 0.1
+"""[1] Part of the distance by which that motion brings a tool nearer that can come nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +87,17 @@ def nearest_posture(
         best = min(exact, key=lambda each: _cost(chain, each.q, hint))
         return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
     if within_limits:
-        search = Numerical(chain, links_of(chain, exact=False))
+        search = _search(chain)
         starts = [chain.clamp(each.q) for each in found]
         if q_hint is not None:
             starts.insert(0, chain.clamp(q_hint))
-        q = search.nearest(target, starts, POSITION_FIRST)
-        usable = [*usable, GeneralPosture(chain, target, tuple(q), "numerical")]
+        for weight in (POSITION_FIRST, POSITION_ALONE):
+            q = search.nearest(target, starts, weight)
+            posture = GeneralPosture(chain, target, tuple(q), "numerical")
+            usable = [*usable, posture]
+            if posture.position_error <= POSITION_WORTH_TELLING:
+                break
+            starts = [q, *starts]
     best = min(usable, key=_errors)
     return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
 
@@ -128,3 +147,30 @@ def held_by(
     pull = J[:3].T @ twist / POSITION_FIRST + J[3:].T @ gap
     high, low = q >= chain.upper - AT_LIMIT, q <= chain.lower + AT_LIMIT
     return tuple(np.flatnonzero((high & (pull > 0.0)) | (low & (pull < 0.0))).tolist())
+
+
+def is_out_of_reach(chain: Chain, q: FloatArray, reached: FloatArray, target: FloatArray) -> bool:
+    """Return whether it is shown that the links keep the tool point from the target (4, 4).
+
+    The target is farther away than their lengths, or no small motion from `q` (n,) [rad] inside the
+    limits brings the tool point clearly nearer.
+    """
+    links = _search(chain).links
+    if math.dist(links.T_S_1[:3, 3], target[:3, 3]) > links.reach:
+        return True
+    J = jacobian_space(chain, q)
+    v = J[3:] + np.cross(J[:3], reached[:3, 3], axis=0)
+    gap = target[:3, 3] - reached[:3, 3]
+    pull = v.T @ gap
+    v[:, ((q >= chain.upper) & (pull > 0.0)) | ((q <= chain.lower) & (pull < 0.0))] = 0.0
+    length = max(float(np.linalg.norm(v, axis=0).max()), tolerances.ON_AXIS)
+    dq = v.T @ np.linalg.solve(v @ v.T + (DAMPING * length) ** 2 * np.eye(3), gap)
+    dq *= min(1.0, APPROACH / max(float(np.abs(dq).max()), APPROACH))
+    before = float(np.linalg.norm(gap))
+    after = math.dist(forward(chain, chain.clamp(q + dq))[:3, 3], target[:3, 3])
+    return before - after <= CLEARLY * min(before, APPROACH * length)
+
+
+@lru_cache(maxsize=64)
+def _search(chain: Chain) -> Numerical:
+    return Numerical(chain, links_of(chain, exact=False))

@@ -8,10 +8,6 @@ joint that the step pushes beyond its limit stays there, and the others take the
 Seeds: the given posture; then those of a fixed table of postures inside the limits whose poses are
 nearest to the target. A target that no seed reaches gets the posture with the least error.
 
-`follow` moves a posture along with its target. It stays on its branch: it stops before a posture in
-which the arm loses a degree of freedom, where the determinant of the Jacobian changes its sign, and
-before a joint that would have to jump.
-
 Speed: one target at a time is computed on plain floats; numpy solves the 6 equations.
 """
 
@@ -20,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -29,7 +24,7 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.links import DHLinks
-from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jacobian
+from katana450.extensions.general_arms.posture import GeneralPosture
 from katana450.extensions.general_arms.tool_motion import Motion, tool_and_jacobian
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -63,12 +58,6 @@ FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e3
 STALLED: Final = 1e-3
 """[1] Relative gain of a step below which the search ends, away from the target."""
 
-JUMP: Final = 0.3
-"""[rad] Maximum turn of a joint while a target is followed; see `Numerical.follow`."""
-
-LOST_FREEDOM: Final = 0.02
-"""[1] Smallest singular value of the scaled Jacobian at which following stops."""
-
 
 class SearchState(NamedTuple):
     """The state of an arm: error, its squared size, and Jacobian as the six rows of a list."""
@@ -76,22 +65,6 @@ class SearchState(NamedTuple):
     error: tuple[float, ...]
     square: float
     J: list[list[float]]
-
-
-class FollowStatus(Enum):
-    """Outcome of `Numerical.follow`, with its description."""
-
-    REACHED = "the target is reached"
-    NEAREST = "the arm cannot come nearer, because of a limit or its reach"
-    SINGULAR = "the arm is stopped before a posture in which it loses a degree of freedom"
-    JUMP = "the arm is stopped because a joint would have to jump"
-
-
-class Followed(NamedTuple):
-    """The posture (n,) [rad] that `Numerical.follow` arrives at, and why it ends there."""
-
-    q: FloatArray
-    status: FollowStatus
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,56 +248,6 @@ class Numerical:
         if largest > LARGEST_STEP:
             dq = [d * LARGEST_STEP / largest for d in dq]
         return dq
-
-    def follow(self, q: FloatArray, T: FloatArray) -> Followed:
-        """Return the posture to which the tool follows its target from `q` (n,) to `T` (4, 4).
-
-        It never passes a singular posture and never turns a joint by more than JUMP.
-        """
-        goal = self.goal(T)
-        lower, upper = self._limits
-        here = q.tolist()
-        now = self.step(goal, here)
-        regular = _regularity(self.chain, q)
-        for _ in range(STEPS):
-            if now.square <= SOLVED * SOLVED:
-                return Followed(np.array(here), FollowStatus.REACHED)
-            dq = self._turned(now, here, 0.0)
-            size = max(map(abs, dq))
-            fraction = 1.0
-            tried = here
-            while fraction > 1e-3:
-                tried = [
-                    min(max(x + fraction * d, a), b)
-                    for x, d, a, b in zip(here, dq, lower, upper, strict=True)
-                ]
-                then = self.step(goal, tried)
-                if then.square < now.square:
-                    break
-                fraction *= 0.5
-            else:
-                return Followed(np.array(here), FollowStatus.NEAREST)
-            at = _regularity(self.chain, np.array(tried))
-            if at * regular <= 0.0 or (abs(at) < LOST_FREEDOM and abs(at) < abs(regular)):
-                return Followed(np.array(here), FollowStatus.SINGULAR)
-            if max(abs(x - x0) for x, x0 in zip(tried, q.tolist(), strict=True)) > JUMP:
-                return Followed(np.array(here), FollowStatus.JUMP)
-            slow = then.square > (1.0 - STALLED) * now.square
-            here, now = tried, then
-            if slow or size < SOLVED:
-                break
-        status = FollowStatus.REACHED if now.square <= 1e-18 else FollowStatus.NEAREST
-        return Followed(np.array(here), status)
-
-
-def _regularity(chain: Chain, q: FloatArray) -> float:
-    """Return the smallest singular value [1] of the scaled Jacobian.
-
-    With six axes it has the sign of the determinant, which changes where the branch does.
-    """
-    J = scaled_jacobian(chain, q)
-    least = float(np.linalg.svd(J, compute_uv=False).min())
-    return math.copysign(least, float(np.linalg.det(J))) if chain.n == 6 else least
 
 
 def _turn(here: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, float, float]:

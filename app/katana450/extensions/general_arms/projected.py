@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from katana450.extensions.general_arms.nearest import held_by
+from katana450.extensions.general_arms.nearest import held_by, is_out_of_reach
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
@@ -40,5 +40,7 @@ def projected(
         roll_error=0.0,
         limits=limits,
         axis1=False,
-        reach=position > POSITION_WORTH_TELLING and not limits,
+        reach=position > POSITION_WORTH_TELLING
+        and not limits
+        and is_out_of_reach(chain, np.asarray(q), reached, T),
     )

@@ -60,6 +60,7 @@ def _six_of(links: DHLinks) -> DHLinks:
         a=(links.a[0], 0.0, *links.a[3:]),
         d=(links.d[0], 0.0, *links.d[3:]),
         t=(links.t[0], 0.0, *links.t[3:]),
+        b=(links.b[0], 0.0, *links.b[3:]),
         shift=(*links.shift[:2], *links.shift[3:]),
         T_S_1=links.T_S_1,
         T_n_tool=links.T_n_tool,

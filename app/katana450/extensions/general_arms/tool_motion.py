@@ -25,9 +25,9 @@ def tool_and_jacobian(
         (
             links.shift[i],
             *(
-                (links.a[i], links.d[i], *sine_and_cosine(links.t[i]))
+                (links.a[i], links.d[i], *sine_and_cosine(links.t[i]), links.b[i])
                 if i < n - 1
-                else (0.0, 0.0, 0.0, 1.0)
+                else (0.0, 0.0, 0.0, 1.0, 0.0)
             ),
         )
         for i in range(n)
@@ -40,7 +40,7 @@ def tool_and_jacobian(
         xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
         px = py = pz = 0.0
         axes = []
-        for theta, (shift, a, d, st, ct) in zip(q, steps, strict=True):
+        for theta, (shift, a, d, st, ct, tilt) in zip(q, steps, strict=True):
             axes.append((zx, zy, zz, px, py, pz))
             c, s = cos(theta + shift), sin(theta + shift)
             xx, yx = c * xx + s * yx, c * yx - s * xx
@@ -56,6 +56,11 @@ def tool_and_jacobian(
                 yz, zz = ct * yz + st * zz, ct * zz - st * yz
             elif ct < 0.0:
                 yx, yy, yz, zx, zy, zz = -yx, -yy, -yz, -zx, -zy, -zz
+            if tilt:
+                c, s = cos(tilt), sin(tilt)
+                xx, zx = c * xx - s * zx, c * zx + s * xx
+                xy, zy = c * xy - s * zy, c * zy + s * xy
+                xz, zz = c * xz - s * zz, c * zz + s * xz
         px, py, pz = (
             px + tx * xx + ty * yx + tz * zx,
             py + tx * xy + ty * yy + tz * zy,
