@@ -22,7 +22,6 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extension import serve_extensions
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_panel import MachinePanel, page
 from katana450.extensions.joint_view.machine_view import MachineView
 from katana450.extensions.programs.server.program_runner import ProgramRunner
@@ -35,6 +34,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.panel_tabs import PanelTabs
+from katana450.server.view.scene import ArmNodes
 from katana450.server.view.tint import Tint
 from katana450.server.view.view import ViewOptions
 from katana450.server.viser_bridge.labels import PERSONAL
@@ -70,7 +70,7 @@ def shown(server: viser.ViserServer, path: str) -> FloatArray:
 
 
 def test_every_link_is_shown_in_its_pose(server: viser.ViserServer, robot: Robot) -> None:
-    nodes = MachineNodes(server, robot)
+    nodes = ArmNodes(server, robot)
     joints, random = robot.joint_group, np.random.default_rng(1)
     for _ in range(3):
         values = robot.joint_values(random.uniform(joints.lower, joints.upper), 0.0)
@@ -81,7 +81,7 @@ def test_every_link_is_shown_in_its_pose(server: viser.ViserServer, robot: Robot
 
 def test_link_is_painted(server: viser.ViserServer) -> None:
     robot = load(GANTRY)
-    nodes = MachineNodes(server, robot)
+    nodes = ArmNodes(server, robot)
     blue = Appearance().having("cart", AppearanceTrait.COLOUR, (0.0, 0.0, 1.0))
     PaintNodes(server, nodes).follow(replace(standing(robot), appearance=blue))
     assert not nodes.shapes["cart"][0].visible
@@ -185,7 +185,7 @@ def test_recorded_joints_are_drawn(server: viser.ViserServer, tmp_path: Path, te
     path.write_text(text)
     robot = load(path)
     _, session = machine_view(server, robot, Hub(lambda: 0.0), Namespace())
-    drawing, names = RunDrawing(server, robot, 0), MachineNodes(server, robot).path
+    drawing, names = RunDrawing(server, robot, 0), ArmNodes(server, robot).path
     joints, random = robot.joint_group, np.random.default_rng(2)
     for _ in range(3):
         q = random.uniform(joints.lower, joints.upper)
@@ -206,7 +206,7 @@ def test_links_before_a_contact_are_coated_with_what_is_checked(
     path = tmp_path / "rail.urdf"
     path.write_text(rail())
     robot = load(path)
-    scene = MachineNodes(server, robot)
+    scene = ArmNodes(server, robot)
     tint, state = Tint(server, robot, scene.path), standing(robot)
     tint.follow(state)
     coats = [name for name in internals.nodes(server) if "/contact" in name]

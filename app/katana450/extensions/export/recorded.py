@@ -13,13 +13,13 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.conduit.rings import ConduitLayer
-from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_view import FLOOR_GAP
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.water.nodes import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.room import set_up_room
+from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset
@@ -56,7 +56,7 @@ def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callabl
     """Build the scene of ``robot``; return what shows a state in it."""
     if robot.arm is None:
         set_up_room(server, session.environment.table_height - FLOOR_GAP)
-        nodes = MachineNodes(server, robot)
+        nodes = ArmNodes(server, robot)
         objects = SceneObjectNodes(server, load_props(), session.environment, Meshes())
 
         def show(state: State) -> None:

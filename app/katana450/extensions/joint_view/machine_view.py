@@ -13,13 +13,13 @@ from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.extensions.joint_view.machine_nodes import MachineNodes
 from katana450.extensions.joint_view.machine_panel import MachinePanel
 from katana450.extensions.objects.handles import ObjectHandles
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel_folder import AddFolders
 from katana450.server.view.room import set_up_room
+from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.tint import Tint
 from katana450.server.view.view import ViewOptions
@@ -67,7 +67,7 @@ class MachineView(ViewUpdater):
         look = camera(robot)
         server.initial_camera.position = look.eye
         server.initial_camera.look_at = look.target
-        self._nodes = MachineNodes(server, robot)
+        self._nodes = ArmNodes(server, robot)
         self._paint = PaintNodes(server, self._nodes)
         self._tint = Tint(server, robot, self._nodes.path)
         self._objects = SceneObjectNodes(server, load_props(), environment, view_options.meshes)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
+import numpy as np
 import viser
 
 from katana450.arm.control.appearance import Appearance, DisplayMode, LinkAppearance
 from katana450.arm.control.state import State
-from katana450.arm.robot.surfaces import VisualMesh, main_colour
-from katana450.server.view.scene import add_shape, of_255
+from katana450.arm.robot.surfaces import main_colour
+from katana450.server.view.scene import ArmNodes, Colour
 
 
 @dataclass
@@ -30,29 +30,14 @@ class _PaintCoat:
         for shape in self.shapes:
             shape.visible = look.choice is DisplayMode.PAINTED
             if shape.visible:
-                shape.color = of_255(look.colour or self.colour)
+                shape.color = _of_255(look.colour or self.colour)
                 shape.opacity = 1.0 - look.transparency if look.transparency > 0.0 else None
-
-
-class LinkPaint(Protocol):
-    """The nodes of a robot's links, such as `ArmNodes` or `MachineNodes`."""
-
-    @property
-    def shapes(self) -> Mapping[str, Sequence[Any]]:
-        """Nodes of each link's shapes in their original look, by link name."""
-
-    @property
-    def path(self) -> Mapping[str, str]:
-        """Path of each link's node, by link name."""
-
-    def surfaces(self, link: str) -> Sequence[VisualMesh]:
-        """Return the surfaces of ``link``, one per material."""
 
 
 class PaintNodes:
     """Shows the appearance of links. Painted shapes are made when a link is first painted."""
 
-    def __init__(self, server: viser.ViserServer, links: LinkPaint) -> None:
+    def __init__(self, server: viser.ViserServer, links: ArmNodes) -> None:
         self._server = server
         self._links = links
         self._coats: dict[str, _PaintCoat] = {}
@@ -72,12 +57,21 @@ class PaintNodes:
         for made in self._links.shapes[name]:
             made.visible = look.choice is DisplayMode.MADE
         if look.choice is DisplayMode.PAINTED and name not in self._coats:
-            surfaces = self._links.surfaces(name)
-            colour, path = main_colour(surfaces), self._links.path[name]
+            path, surfaces = self._links.path[name], self._links.links[name].shapes
             shapes = [
-                add_shape(self._server, f"{path}/paint{number}", surface, colour)
+                self._server.scene.add_mesh_simple(
+                    f"{path}/paint{number}",
+                    surface.vertices.astype(np.float32),
+                    surface.faces.astype(np.uint32),
+                )
                 for number, surface in enumerate(surfaces)
             ]
-            self._coats[name] = _PaintCoat(shapes, colour)
+            self._coats[name] = _PaintCoat(shapes, main_colour(surfaces))
         if name in self._coats:
             self._coats[name].show(look)
+
+
+def _of_255(colour: tuple[float, float, float]) -> Colour:
+    """Return ``colour`` (0 to 1) as numbers from 0 to 255, as viser expects."""
+    red, green, blue = (round(255.0 * part) for part in colour)
+    return red, green, blue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
@@ -13,11 +13,12 @@ import numpy.typing as npt
 import viser
 
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import VisualMesh
+from katana450.arm.robot.surfaces import shapes_of
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.viser_bridge.posing import Quaternion, place, turn
+from katana450.srgb import to_light
 
 Colour = tuple[int, int, int]
 """Red, green and blue, each from 0 to 255."""
@@ -135,10 +136,11 @@ class FrameTree:
 
 
 class ArmNodes(FrameTree):
-    """The arm itself, drawn from its GLB files, which keep normals and materials.
+    """A robot itself, drawn with the normals and the materials of its files.
 
     Attributes:
         shapes: nodes of each link's shapes in their original look, by link name.
+        links: the links by name.
     """
 
     def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
@@ -147,30 +149,41 @@ class ArmNodes(FrameTree):
             link.name: [
                 _as_made(server, f"{self.path[link.name]}/shape{number}", visual)
                 for number, visual in enumerate(link.visuals)
+                if visual.glb is not None or shapes_of(visual)
             ]
             for link in robot.links
         }
-        self._links = {link.name: link for link in robot.links}
-
-    def surfaces(self, link: str) -> Sequence[VisualMesh]:
-        """Return the surfaces of a link, one per material."""
-        return self._links[link].shapes
+        self.links = {link.name: link for link in robot.links}
 
 
-def _as_made(
-    server: viser.ViserServer, name: str, visual: Visual
-) -> viser.GlbHandle | viser.MeshHandle:
+def _as_made(server: Window, name: str, visual: Visual) -> viser.GlbHandle:
     if visual.glb is None:
-        mesh = visual.mesh
-        return server.scene.add_mesh_simple(
-            name, mesh.vertices, mesh.faces, color=visual.colour, flat_shading=True
-        )
+        return server.scene.add_glb(name, _glb(visual))
     return server.scene.add_glb(
         name,
         visual.glb.read_bytes(),
         wxyz=so3.to_quaternion(visual.T_body_visual[:3, :3]),
         position=visual.T_body_visual[:3, 3],
     )
+
+
+def _glb(visual: Visual) -> bytes:
+    """Return a binary glTF file of a shape with its normals and materials, in its link's frame."""
+    # Imported here, because the import takes longer than the rest of the start.
+    import trimesh
+
+    # It has no types for materials.
+    looks: Any = trimesh.visual
+    scene: Any = trimesh.Scene()
+    for shape in shapes_of(visual):
+        name, colour, metallic, rough = shape.material
+        material = looks.material.PBRMaterial(name, metallicFactor=metallic, roughnessFactor=rough)
+        material.baseColorFactor = [*to_light(colour), 1.0]
+        mesh: Any = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
+        mesh.vertex_normals = shape.normals
+        mesh.visual = looks.TextureVisuals(material=material)
+        scene.add_geometry(mesh)
+    return bytes(scene.export(file_type="glb", include_normals=True))
 
 
 COAT_THICKNESS = 2e-3
@@ -271,19 +284,3 @@ def coarse(
     left = left[(left != np.roll(left, 1, axis=1)).all(axis=1)]
     _, first = np.unique(np.sort(left, axis=1), axis=0, return_index=True)
     return merged, left[np.sort(first)]
-
-
-def add_shape(
-    server: viser.ViserServer, name: str, shape: VisualMesh, colour: tuple[float, float, float]
-) -> viser.MeshHandle:
-    """Add a shape in one ``colour`` (sRGB, 0 to 1) as the node ``name``."""
-    faces = shape.faces.astype(np.uint32)
-    return server.scene.add_mesh_simple(
-        name, shape.vertices.astype(np.float32), faces, color=of_255(colour)
-    )
-
-
-def of_255(colour: tuple[float, float, float]) -> Colour:
-    """Return ``colour`` (0 to 1) as numbers from 0 to 255, as viser expects."""
-    red, green, blue = (round(255.0 * part) for part in colour)
-    return red, green, blue
