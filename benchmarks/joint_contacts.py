@@ -29,7 +29,7 @@ def measure(path: Path) -> None:
     robot = replace(load(path), arm=None)
     joints = robot.joint_group
     begun = time.process_time()
-    world, _ = robot_world(robot)
+    world, _, _ = robot_world(robot)
     made = time.process_time() - begun
     if world is None:
         print(f"{robot.name}: no shapes")

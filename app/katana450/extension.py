@@ -21,7 +21,7 @@ from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -49,6 +49,9 @@ if TYPE_CHECKING:
     from katana450.server.view.view_updater import ViewUpdater
     from katana450.server.web.http_api import RouteContext
     from katana450.settings import Settings
+
+RobotWorld: TypeAlias = "tuple[CollisionWorld | None, tuple[str, ...], tuple[str, ...]]"
+"""The collision world of a robot, sentences on what it leaves out, and cautions for its driver."""
 
 PACKAGE = "katana450.extensions"
 """Package of the built-in extensions, and the name of the group of entry points."""
@@ -220,8 +223,8 @@ class Extension:
         serve: Its part of ``katana450 serve``, if it has one.
         prepare: Completes the options of a command before it runs, whichever extension it is of.
             Raises KatanaError.
-        world: Returns the collision world of a robot, None without shapes, and sentences on what
-            it leaves out. Of the first extension that has it.
+        world: Returns the collision world of a robot, None without shapes, sentences on what it
+            leaves out, and cautions for its driver. Of the first extension that has it.
         hand: Returns the hand of a robot with its collision world, completed by its sides, its
             closed end, or a model of the forces in it. Called for each session of an arm, in the
             order of the extensions.
@@ -241,7 +244,7 @@ class Extension:
     serve: ServeExtension | None = None
     hand: Callable[[CollisionWorld, Hand], Hand] | None = None
     prepare: Callable[[Namespace], None] | None = None
-    world: Callable[[Robot], tuple[CollisionWorld | None, tuple[str, ...]]] | None = None
+    world: Callable[[Robot], RobotWorld] | None = None
     expand: Callable[[Path], bytes] | None = None
     find_arm: FindArm | None = None
     gizmo: Callable[[int], type[Gizmo] | None] | None = None

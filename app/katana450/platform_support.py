@@ -115,8 +115,7 @@ def limit_resources(memory: int, seconds: int) -> None:
     limit the running time too.
     """
     if sys.platform != "win32":
-        limits = [("RLIMIT_AS", memory), ("RLIMIT_CPU", seconds), ("RLIMIT_CORE", 0)]
-        for name, maximum in limits:
+        for name, maximum in (("RLIMIT_AS", memory), ("RLIMIT_CPU", seconds), ("RLIMIT_CORE", 0)):
             kind = getattr(resource, name, None)
             if kind is not None:
                 _, hard = resource.getrlimit(kind)

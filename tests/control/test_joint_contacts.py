@@ -52,7 +52,7 @@ def make(tmp_path: Path) -> Make:
         path = tmp_path / "robot.urdf"
         path.write_text(text)
         robot = load(path)
-        world, _ = robot_world(robot)
+        world, _, _ = robot_world(robot)
         assert world is not None
         joints = robot.joint_group
         session = Session(joints, joints.ready, world, travel=robot.distance)

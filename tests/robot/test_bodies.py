@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_arm, find_robot
@@ -37,7 +38,7 @@ def own(world: CollisionWorld) -> list[Part]:
 
 def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
     robot = read(tmp_path, tree(3, 10))
-    world, _ = robot_world(robot)
+    world, _, _ = robot_world(robot)
     assert world is not None
     joints = robot.joint_group
     assert any(joints.slides)
@@ -55,7 +56,7 @@ def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
 
 
 def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Path) -> None:
-    world, notes = robot_world(read(tmp_path, rail("visual")))
+    world, notes, _ = robot_world(read(tmp_path, rail("visual")))
     assert world is not None
     assert [part.name for part in own(world)] == ["left", "right", "follower"]
     assert notes == ()
@@ -69,23 +70,23 @@ def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Pa
 
 def test_rods_that_stand_for_missing_shapes_are_no_bodies(tmp_path: Path) -> None:
     bare = rail().replace("<collision>", "<!--").replace("</collision>", "-->")
-    assert robot_world(read(tmp_path, bare)) == (None, ())
+    assert robot_world(read(tmp_path, bare)) == (None, (), (UNCHECKED,))
 
 
 def test_parts_that_move_together_or_touch_at_rest_are_not_checked(tmp_path: Path) -> None:
-    world, notes = robot_world(read(tmp_path, rail()))
+    world, notes, _ = robot_world(read(tmp_path, rail()))
     assert world is not None
     # The follower keeps its distance from the carriage that it follows.
     assert pairs(world) == {frozenset(("left", "right")), frozenset(("left", "follower"))}
     assert notes == ()
-    world, notes = robot_world(read(tmp_path, rail(gap=0.05)))
+    world, notes, _ = robot_world(read(tmp_path, rail(gap=0.05)))
     assert world is not None
     assert pairs(world) == {frozenset(("left", "follower"))}
     assert notes == ("Not checked, because they touch at rest: left and right.",)
 
 
 def test_neighbours_are_found_across_links_without_shapes(tmp_path: Path) -> None:
-    world, _ = robot_world(read(tmp_path, hand()))
+    world, _, _ = robot_world(read(tmp_path, hand()))
     assert world is not None
     found = pairs(world)
     for finger in ("finger1", "finger2", "finger3", "finger4", "thumb"):
@@ -139,7 +140,7 @@ def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Pa
     path = tmp_path / "folded.urdf"
     path.write_text(folded(0.16))
     robot = load(path, find=find_arm)
-    world, notes = robot_world(robot)
+    world, notes, _ = robot_world(robot)
     assert world is not None
     assert frozenset(("post", "forearm")) in pairs(world)
     assert frozenset(("upper", "cuff")) not in pairs(world)
@@ -150,7 +151,7 @@ def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Pa
         nearest = world.nearest(np.append(q, 0.0))
         assert (nearest is not None and nearest.distance < STOP) == meet
     # Driven joint by joint the robot has no Home, so what touches at zero is not checked.
-    world, notes = robot_world(load(path))
+    world, notes, _ = robot_world(load(path))
     assert world is not None
     assert frozenset(("post", "forearm")) not in pairs(world)
     assert "post and forearm" in notes[0]
@@ -159,7 +160,7 @@ def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Pa
 def test_parts_that_are_apart_at_zero_are_checked_as_before(tmp_path: Path) -> None:
     path = tmp_path / "folded.urdf"
     path.write_text(folded(0.05))
-    world, notes = robot_world(load(path, find=find_arm))
+    world, notes, _ = robot_world(load(path, find=find_arm))
     assert world is not None
     assert frozenset(("post", "forearm")) in pairs(world)
     assert notes == ("Not checked, because they touch at rest: upper and cuff.",)
@@ -172,13 +173,13 @@ def test_meshes_get_few_corners_and_are_read_once(
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.04)
     ball.export(tmp_path / f"ball.{form}")
     text = rail().replace('<box size="0.05 0.05 0.05"/>', f'<mesh filename="ball.{form}"/>')
-    world, _ = robot_world(read(tmp_path, text))
+    world, _, _ = robot_world(read(tmp_path, text))
     assert world is not None
     for part in own(world):
         (shape,) = part.shapes
         assert 0.04 <= shape.radius < 0.046
     monkeypatch.setattr(trimesh, "load_scene", lambda *_: pytest.fail("read again"))
-    again, _ = robot_world(read(tmp_path, text))
+    again, _, _ = robot_world(read(tmp_path, text))
     assert again is not None
     assert again.fingerprint.differs_by(world.fingerprint) == 0.0
 
@@ -191,7 +192,7 @@ def test_unreadable_collision_mesh_is_left_out_with_a_note(
 ) -> None:
     (tmp_path / file).write_bytes(b"no mesh")
     text = rail().replace('<box size="0.05 0.05 0.05"/>', f'<mesh filename="{file}"/>', 1)
-    world, (note,) = robot_world(read(tmp_path, text))
+    world, (note,), _ = robot_world(read(tmp_path, text))
     assert world is not None
     assert [part.name for part in own(world)] == ["right", "follower"]
     assert "link 'left' is left out" in note

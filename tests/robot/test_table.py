@@ -18,7 +18,7 @@ from tests.robot.hands import column, hand, rail
 def read(tmp_path: Path, text: str) -> tuple[CollisionWorld, tuple[str, ...]]:
     path = tmp_path / "robot.urdf"
     path.write_text(text)
-    world, notes = robot_world(load(path))
+    world, notes, _ = robot_world(load(path))
     assert world is not None
     return world, notes
 
@@ -86,10 +86,10 @@ def test_part_that_is_near_the_table_at_rest_keeps_half_of_its_distance(tmp_path
 def test_arm_has_its_table_in_its_session(tmp_path: Path) -> None:
     path = tmp_path / "ur5e.urdf"
     path.write_text(ur5e())
-    world, _ = robot_world(load(path, find=find_arm))
+    world, _, _ = robot_world(load(path, find=find_arm))
     assert world is not None
     assert "table" not in {part.name for part in world.parts}
     # Without its arm it is driven joint by joint, and has one.
-    world, _ = robot_world(load(path))
+    world, _, _ = robot_world(load(path))
     assert world is not None
     np.testing.assert_allclose(table_of(world), 0.0)

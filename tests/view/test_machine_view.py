@@ -119,7 +119,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
     path = tmp_path / "column.urdf"
     path.write_text(column(foot=-0.3))
     robot = load(path)
-    joints, (world, _) = robot.joint_group, robot_world(robot)
+    joints, (world, _, _) = robot.joint_group, robot_world(robot)
     session = Session(joints, joints.ready, world, travel=robot.distance)
     publisher = StatePublisher(
         Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)

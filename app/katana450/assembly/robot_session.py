@@ -6,13 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
+from katana450.arm.control.messages import UNCHECKED
 from katana450.arm.control.scene_objects import Hand, SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
-from katana450.arm.robot.cautions import cautions
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -20,7 +18,7 @@ from katana450.arm.robot.urdf import Urdf
 from katana450.arm.robot.water import water_environment
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
-from katana450.extension import extensions
+from katana450.extension import RobotWorld, extensions
 from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
 
@@ -64,10 +62,8 @@ def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRob
             raise
         robot = replace(robot, arm=None, why=str(error))
     joints = robot.joint_group
-    world, left_out = _world(robot)
+    robot, world, notes = _with_world(robot)
     session = Session(joints, joints.ready, world, travel=robot.distance)
-    robot = replace(robot, cautions=cautions(robot, world, np.append(session.ready, 0.0)))
-    notes = (*robot.notes, *robot.joint_notes, *left_out, *robot.cautions)
     return DescribedRobot(robot, session, (*notes, f"Joints only. {robot.why}"))
 
 
@@ -76,7 +72,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
     if settings.bare:
         robot = bare(robot)
     arm = robot.require_arm()
-    world, left_out = _world(robot)
+    robot, world, notes = _with_world(robot)
     props = load_props()
     hand: Hand | None = None
     objects: tuple[SceneObject, ...] = ()
@@ -87,24 +83,26 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
         if hand.gripper != arm.gripper:
             robot = replace(robot, arm=replace(arm, gripper=hand.gripper))
         world = world.with_obstacles((table(),))
-    ready = arm.ready(settings.ready)
-    x = np.append(ready, robot.require_arm().gripper.clamp(0.0))
-    robot = replace(robot, cautions=cautions(robot, world, x))
-    notes = (*arm.notes, *robot.notes, *robot.joint_notes, *left_out, *robot.cautions)
     session = Session(
         robot.require_arm(),
-        ready,
+        arm.ready(settings.ready),
         world,
         hand=hand,
         objects=objects,
         water_environment=water_environment(props) if objects else None,
     )
-    return DescribedRobot(robot, session, notes)
+    return DescribedRobot(robot, session, (*arm.notes, *notes))
 
 
-def _world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
-    """Return the world that an extension makes, and notes; without one, only arms are checked."""
-    make = next((each.world for each in extensions() if each.world is not None), None)
-    if make is not None:
-        return make(robot)
-    return (None, ()) if robot.arm is None else world_of(robot)
+def _with_world(robot: Robot) -> tuple[Robot, CollisionWorld | None, tuple[str, ...]]:
+    """Return ``robot`` with its cautions, the world that an extension makes, and notes."""
+    make = next((each.world for each in extensions() if each.world is not None), _world_of_arm)
+    world, notes, cautions = make(robot)
+    notes = (*robot.notes, *robot.joint_notes, *notes, *cautions)
+    return replace(robot, cautions=cautions), world, notes
+
+
+def _world_of_arm(robot: Robot) -> RobotWorld:
+    """Return the world of an arm; robots without one are not checked without an extension."""
+    world, notes = (None, ()) if robot.arm is None else world_of(robot)
+    return world, notes, () if world is not None else (UNCHECKED,)

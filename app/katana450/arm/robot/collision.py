@@ -11,7 +11,7 @@ from katana450.arm.control.scene_objects import Hand, SceneObject, Shape
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.visual import ROD_LENGTH, PrimitiveShape, Visual
+from katana450.arm.robot.visual import Visual
 from katana450.disk_cache import kept
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.collision.engine import library
@@ -21,11 +21,6 @@ from katana450.maths.collision.shape import CollisionShape, half_space, hull
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-
-STICK_RADIUS_RATIO, MAX_STICK_RADIUS = 0.1, 0.06
-"""Radius of the capsules that stand for unknown shapes, as a ratio [1] to the longest stick of the
-robot, and its maximum [m].
-"""
 
 Pieces = Callable[[Visual], Sequence[FloatArray]]
 """The points (n, 3) [m] of each convex body, in the frame of its link, that stand for a shape."""
@@ -70,11 +65,8 @@ def world_of(
         places[link.name] = group, T
         shapes, refused = _shapes(link, robot.bodies(link), pieces)
         notes += refused
-        lacking = bool(refused) or robot.lacks_shapes(link)
-        if lacking:
-            shapes = (*shapes, *_capsules(robot, link))
         if shapes:
-            parts.append(Part(link.name, group, (frozen(T),) * len(shapes), shapes, lacking))
+            parts.append(Part(link.name, group, (frozen(T),) * len(shapes), shapes))
     if not parts:
         return None, tuple(notes)
     if make is not None:
@@ -157,21 +149,3 @@ def _shapes(
         except (InputError, RobotDescriptionError) as error:
             refused.append(f"A collision shape of link {link.name!r} is left out: {error}")
     return tuple(shapes), refused
-
-
-def _capsules(robot: Robot, link: Link) -> list[CollisionShape]:
-    """Return a capsule along each stick from ``link`` to its children, for unknown shapes.
-
-    It begins inside the stick, so that a link that stands on the table does not reach into it. The
-    other end goes round the joint of the child.
-    """
-    lengths = [float(np.linalg.norm(each.T_parent_link[:3, 3])) for each in robot.links]
-    radius = min(STICK_RADIUS_RATIO * max(lengths), MAX_STICK_RADIUS)
-    ball = radius * PrimitiveShape("icosphere", {"subdivisions": 1}).mesh().vertices
-    capsules = []
-    for end in (child.T_parent_link[:3, 3] for child in robot.children(link)):
-        length = float(np.linalg.norm(end))
-        if length > ROD_LENGTH:
-            start = min(radius / length, 1.0) * end
-            capsules.append(hull(np.concatenate((ball + start, ball + end))))
-    return capsules

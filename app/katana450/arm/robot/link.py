@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class Link:
         collisions: the shapes that represent it in collision checks.
         mass: [kg], 0 if the file states none.
         center: (3,) centre of mass in its own frame [m].
-        visuals_missing, collisions_missing: whether the file names such shapes that do not exist.
+        missing: the mesh files of its visuals, and of its collisions, that do not exist.
     """
 
     name: str
@@ -73,13 +74,7 @@ class Link:
     collisions: tuple[Visual, ...]
     mass: float
     center: FloatArray
-    visuals_missing: bool = False
-    collisions_missing: bool = False
-
-    @property
-    def drawn(self) -> tuple[Visual, ...]:
-        """Its visuals without the rods that represent missing ones."""
-        return tuple(visual for visual in self.visuals if not visual.is_rod)
+    missing: tuple[tuple[Path, ...], tuple[Path, ...]] = ((), ())
 
     def at_rest(self, resting: Mapping[str, float]) -> FloatArray:
         """Return the link's pose (4, 4) in its parent with its joint at the value in ``resting``.

@@ -57,11 +57,7 @@ def load(
         if tool is not None:
             raise
         why = str(error)
-    missing = [
-        mesh
-        for link in urdf.links.values()
-        for mesh in (*link.missing_visuals, *link.missing_collisions)
-    ]
+    missing = [mesh for link in urdf.links.values() for files in link.missing for mesh in files]
     notes = tuple(f"There is no mesh at {mesh}." for mesh in dict.fromkeys(missing))
     return Robot(urdf.name, links, arm, why, notes, faults, path)
 
@@ -99,8 +95,7 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
                 collisions=link.collisions,
                 mass=link.mass,
                 center=link.center,
-                visuals_missing=bool(link.missing_visuals),
-                collisions_missing=bool(link.missing_collisions),
+                missing=link.missing,
             )
         )
     return tuple(links), tuple(faults)

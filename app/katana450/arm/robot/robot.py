@@ -177,23 +177,11 @@ class Robot:
     def bodies(self, link: Link) -> tuple[Visual, ...]:
         """Return the shapes of ``link`` that are checked for contacts.
 
-        These are its collision shapes, or what is drawn if no link of the robot has any. A link
-        of which collision shapes are missing has both.
+        These are its collision shapes, or what is drawn if no link of the robot has any.
         """
-        if self.collides and not link.collisions_missing:
+        if self.collides:
             return link.collisions
-        return (*link.collisions, *link.drawn)
-
-    def names_shapes(self, link: Link) -> bool:
-        """Return whether the file names shapes of ``link`` for contacts, which may be missing."""
-        missing = link.collisions_missing or (link.visuals_missing and not self.collides)
-        return missing or bool(self.bodies(link))
-
-    def lacks_shapes(self, link: Link) -> bool:
-        """Return whether shapes of ``link`` for contacts are missing, and not drawn either."""
-        if link.collisions_missing:
-            return link.visuals_missing or not link.drawn
-        return link.visuals_missing and not self.collides
+        return tuple(visual for visual in link.visuals if not visual.is_rod)
 
     @cached_property
     def moving(self) -> frozenset[str]:
@@ -279,10 +267,8 @@ class Robot:
         if low >= high:
             low, high = driven.lower, driven.upper
         if not driven.slides:
-            low, high = (
-                -math.pi if low == -math.inf else low,
-                math.pi if high == math.inf else high,
-            )
+            low = -math.pi if low == -math.inf else low
+            high = math.pi if high == math.inf else high
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise RobotDescriptionError(
                 f"Joint {driven.name!r} of {self.name} cannot be driven: its range is {low:g} to "

@@ -64,7 +64,7 @@ class UrdfLink:
         visuals, collisions: its shapes.
         mass: [kg], 0 if not stated.
         center: (3,) centre of mass in the frame of the link [m].
-        missing_visuals, missing_collisions: the mesh files of its shapes that do not exist.
+        missing: the mesh files of its visuals, and of its collisions, that do not exist.
     """
 
     name: str
@@ -72,8 +72,7 @@ class UrdfLink:
     collisions: tuple[Visual, ...]
     mass: float
     center: FloatArray
-    missing_visuals: tuple[Path, ...]
-    missing_collisions: tuple[Path, ...]
+    missing: tuple[tuple[Path, ...], tuple[Path, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +161,8 @@ def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink
     mass, center = 0.0, np.zeros(3)
     if link.inertial is not None and link.inertial.mass is not None:
         mass, center = max(link.inertial.mass, 0.0), _origin(link.inertial)[:3, 3]
-    lost = tuple(tuple(files) for files in missing)
-    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), *lost)
+    lost = tuple(missing[0]), tuple(missing[1])
+    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), lost)
 
 
 def _joint(joint: Any) -> UrdfJoint:

@@ -8,10 +8,10 @@ from katana450.extension import Extension
 
 if TYPE_CHECKING:
     from katana450.arm.robot.robot import Robot
-    from katana450.maths.collision.world import CollisionWorld
+    from katana450.extension import RobotWorld
 
 
-def _world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
+def _world(robot: Robot) -> RobotWorld:
     from katana450.extensions.bodies.robot_world import robot_world
 
     return robot_world(robot)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from katana450.arm.robot.collision import as_modelled, world_of
+from katana450.arm.robot.collision import as_modelled, table, world_of
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
+from katana450.extensions.bodies.cautions import cautions
+from katana450.extensions.bodies.estimated_shapes import with_estimates
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.bodies.pieces import pieces
 from katana450.extensions.bodies.table import standing
@@ -17,17 +21,21 @@ from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import Settings
 
+if TYPE_CHECKING:
+    from katana450.extension import RobotWorld
 
-def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
-    """Return the bodies and pairs of ``robot``, and sentences for a person on what is left out.
+
+def robot_world(robot: Robot) -> RobotWorld:
+    """Return the bodies and pairs of ``robot``, sentences on what is left out, and cautions.
 
     x is that of ``world_of``. An arm of the five-axis family keeps the pairs that sampled postures
     bring near each other, and its collision shapes count as convex. All other shapes are divided by
-    ``pieces``. A robot that is driven joint by joint has its table here, an arm in its session. The
-    world is None if no link has a shape.
+    ``pieces``. Links of unknown shape get those of ``with_estimates``. A robot that is driven joint
+    by joint has its table here, an arm in its session. The world is None if no link has a shape.
     """
-    if robot.arm is not None and robot.arm.chain.n == ARM_JOINTS:
-        return world_of(robot, as_modelled if robot.collides else pieces)
+    five_axes = robot.arm is not None and robot.arm.chain.n == ARM_JOINTS
+    divide = cache(as_modelled if five_axes and robot.collides else pieces)
+    complete, unknown = with_estimates(robot, divide)
     found: list[str] = []
 
     def make(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
@@ -46,8 +54,11 @@ def robot_world(robot: Robot) -> tuple[CollisionWorld | None, tuple[str, ...]]:
             {**rest.close, **under.pairs.close},
         )
 
-    world, notes = world_of(robot, pieces, make)
-    return world, (*notes, *found)
+    world, notes = world_of(complete, divide, None if five_axes else make)
+    on_table = world if world is None or robot.arm is None else world.with_obstacles((table(),))
+    start = _at_home(robot)
+    x = _at_rest(robot) if start is None else start
+    return world, (*notes, *found), tuple(cautions(robot, unknown, on_table, x))
 
 
 def _at_rest(robot: Robot) -> FloatArray:

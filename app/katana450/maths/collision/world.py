@@ -43,14 +43,12 @@ class Part:
         mover: index of the rigid group it moves with; GROUND stands still.
         T_mover_shape: pose (4, 4) of each of its shapes in the frame of the group [m].
         shapes: convex shapes; together they are the part.
-        estimated: whether some shapes of the link are unknown, so these may not contain it.
     """
 
     name: str
     mover: int
     T_mover_shape: tuple[FloatArray, ...]
     shapes: tuple[CollisionShape, ...]
-    estimated: bool = False
 
 
 def obstacle(name: str, T_base_shape: FloatArray, *shapes: CollisionShape) -> Part:

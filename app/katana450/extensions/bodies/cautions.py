@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 
 from katana450.arm.control.messages import UNCHECKED, short
 from katana450.arm.robot.robot import Robot
+from katana450.extensions.bodies.estimated_shapes import drawn
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -15,31 +16,36 @@ MAX_LENGTH = 10.0
 """[m] Parts that are longer, and links that are farther from their parent, look wrong."""
 
 
-def cautions(robot: Robot, world: CollisionWorld | None, x: FloatArray) -> tuple[str, ...]:
-    """Return what the driver of ``robot`` must know of its ``world`` [rad or m].
+def cautions(
+    robot: Robot, unknown: Collection[str], world: CollisionWorld | None, x: FloatArray
+) -> Iterator[str]:
+    """Return what the driver of ``robot`` must know of its ``world``.
 
-    x: (k,) joint values of the world where the robot starts.
+    Args:
+        robot: the robot as in its file.
+        unknown: names of the links of which shapes are unknown.
+        world: its bodies and the table; None without shapes.
+        x: (k,) joint values [rad or m] of the world where the robot starts.
     """
-    far = [link for link in robot.links if np.linalg.norm(link.T_parent_link[:3, 3]) > MAX_LENGTH]
-    distant = tuple(
-        f"{link.name} is {short(float(np.linalg.norm(link.T_parent_link[:3, 3])))} m from its "
-        f"parent {link.parent}: check the origin of its joint."
-        for link in far
-    )
+    for link in robot.links:
+        distance = float(np.linalg.norm(link.T_parent_link[:3, 3]))
+        if distance > MAX_LENGTH:
+            yield (
+                f"{link.name} is {short(distance)} m from its parent {link.parent}: check the "
+                "origin of its joint."
+            )
     if world is None:
-        return (UNCHECKED, *distant)
-    return (*_unchecked(robot, world), *distant, *_implausible(robot, world, x))
-
-
-def _unchecked(robot: Robot, world: CollisionWorld) -> Iterator[str]:
+        yield UNCHECKED
+        return
     checked = {part.name for part in world.parts}
-    shaped = (link for link in robot.links if link.drawn or robot.names_shapes(link))
-    unchecked = [link.name for link in shaped if link.name not in checked]
+    shaped = [link.name for link in robot.links if drawn(link) or link.name in unknown]
+    unchecked = [name for name in shaped if name not in checked]
     if unchecked:
         yield f"Not checked for contacts: {', '.join(unchecked)}."
-    estimated = [part.name for part in world.parts if part.estimated]
+    estimated = [part.name for part in world.parts if part.name in unknown]
     if estimated:
         yield f"Contacts are estimated, because shapes cannot be read: {', '.join(estimated)}."
+    yield from _implausible(robot, world, x)
 
 
 def _implausible(robot: Robot, world: CollisionWorld, x: FloatArray) -> Iterator[str]:
