@@ -127,7 +127,7 @@ class Ring:
 
     @property
     def unsynced(self) -> bool:
-        """Whether ``sync`` has anything to bring to the disk."""
+        """True if ``sync`` has something to bring to the disk."""
         return bool(self._unsynced)
 
     def put_all(self, records: Sequence[TickRecord]) -> None:
