@@ -88,7 +88,7 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
     (folder / "more.yaml").write_text(MORE, encoding="utf-8")
     with katana450.connect(server.url, name="Ada") as client:
         run_script(client, LEFT, 1.0)
-        waited_for(lambda: _started(client), "episodes")
+        client.episodes.start("nod")
         assert main(["run", str(named), "--url", server.url]) == 0
         episode = client.episodes.stop("success")
         for text in (LEFT, RIGHT):
@@ -171,15 +171,6 @@ def test_info_repair_and_export_keep_scripts(
     assert {each.name: each.data.decode() for each in attached} == found
     with Reader(bag) as reader:
         assert reader.message_count > 100
-
-
-def _started(client: Client) -> bool:
-    try:
-        client.episodes.start("nod")
-    except RefusedError:
-        # The process that records starts some seconds later.
-        return False
-    return True
 
 
 @pytest.mark.long

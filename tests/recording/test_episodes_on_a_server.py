@@ -168,11 +168,11 @@ def test_killed_server_leaves_an_episode_that_is_recovered(
     assert kept.episode.length > 1.0
 
 
-@pytest.mark.long
 def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) -> None:
     started(server, "last")
     move(server, *POSTURES)
     server.stop()
+    assert "Traceback" not in server.output
     (kept,) = EpisodeFolder(folder).kept()
     assert kept.episode.outcome is EpisodeOutcome.UNFINISHED
     assert kept.episode.length > 1.0

@@ -88,6 +88,7 @@ class EpisodeListener:
         # A process that was killed leaves its socket file.
         with suppress(OSError):
             Path(address).unlink()
+        self._closed = False
         # Without a key: a client that stalls in its handshake must not keep others out.
         self._listener = Listener(address, backlog=8)
         text = json.dumps({"port": port, "address": address, "key": self._key.hex()}).encode()
@@ -95,12 +96,21 @@ class EpisodeListener:
         for work, name in ((self._accept, "episode requests"), (self._tick, "episode clock")):
             threading.Thread(target=work, name=name, daemon=True).start()
 
+    def close(self) -> None:
+        """Take no more requests."""
+        self._closed = True
+        # Its socket may be gone with the private folder of the server.
+        with suppress(OSError):
+            self._listener.close()
+
     def _accept(self) -> None:
         reported = ""
         while True:
             try:
                 connection = self._listener.accept()
             except OSError as error:
+                if self._closed:
+                    return
                 # As when too many files are open: later requests may be accepted.
                 if reported != (reported := str(error)):
                     log.error("A request about episodes could not be accepted: %s.", error)

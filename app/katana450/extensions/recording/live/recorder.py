@@ -21,6 +21,7 @@ from katana450.platform_support import lower_priority
 
 if TYPE_CHECKING:
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+    from katana450.extensions.recording.episodes.link import EpisodeListener
     from katana450.extensions.recording.files.header import RecordingHeader
     from katana450.extensions.recording.live.ring import Ring
 
@@ -65,14 +66,15 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
         supervisor.ended.wait(START_DELAY)
         ring, header = _ring(config)
-        keeper = _keeper(config, ring, header)
+        keeper, listener = _episodes(config, ring, header)
         try:
             while True:
                 _receive(pipe, ring)
                 pipe = connected_to_ticks(facts.address, supervisor.ended)
         finally:
-            if keeper is not None:
+            if keeper is not None and listener is not None:
                 keeper.close()
+                listener.close()
             ring.close()
     except EOFError:
         # The server ends.
@@ -96,8 +98,10 @@ def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     return Ring(config.folder, header, scripts=scripts), header
 
 
-def _keeper(config: RecorderConfig, ring: Ring, header: RecordingHeader) -> EpisodeKeeper | None:
-    """Return the keeper of the episodes, which takes requests; None if the folder forbids it."""
+def _episodes(
+    config: RecorderConfig, ring: Ring, header: RecordingHeader
+) -> tuple[EpisodeKeeper, EpisodeListener] | tuple[None, None]:
+    """Return the keeper of the episodes, and what takes requests; None if the folder forbids it."""
     from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
     from katana450.extensions.recording.episodes.link import EpisodeListener
@@ -107,11 +111,11 @@ def _keeper(config: RecorderConfig, ring: Ring, header: RecordingHeader) -> Epis
         folder.claim()
         keeper = EpisodeKeeper(folder, ring, config.folder, header.metadata["utc_offset_ns"])
         address = f"{config.facts.address.name}-episodes"
-        EpisodeListener(keeper, config.episodes, address, config.facts.port, header.salt)
+        listener = EpisodeListener(keeper, config.episodes, address, config.facts.port, header.salt)
     except (InputError, OSError) as error:
         log.error("Episodes cannot be recorded: %s", error)
-        return None
-    return keeper
+        return None, None
+    return keeper, listener
 
 
 def _receive(pipe: Connection, ring: Ring) -> None:
