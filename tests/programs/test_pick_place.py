@@ -178,6 +178,32 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
 
 
 @pytest.mark.parametrize(
+    ("steps", "stopped"),
+    [
+        ("- pick: c\n- place: {at: {x: 240, y: -110}}\n", "c cannot be placed there: .* meet b"),
+        (
+            (
+                "- gripper: closed\n- move: {x: 0, y: -240, z: 50, pitch: 90, roll: 0}\n"
+                "- gripper: open\n"
+            ),
+            "finger would meet post",
+        ),
+    ],
+)
+def test_fingers_without_room_to_open_are_refused(stage: Stage, steps: str, stopped: str) -> None:
+    """A run would wait for fingers that press against a neighbour."""
+    size = (30.0, 40.0, 50.0)
+    objects = (
+        box("a", (180.0, -110.0), size),
+        box("b", (240.0, -180.0), size),
+        box("c", (230.0, 110.0), size, yaw=30.0),
+        replace(box("post", (-40.0, -240.0), (10.0, 60.0, 60.0)), can_be_held=False),
+    )
+    with pytest.raises(InputError, match=rf"{stopped}\. Leave more room beside"):
+        planned(stage, f"- tool: grasp\n{steps}", *objects)
+
+
+@pytest.mark.parametrize(
     ("side", "size"),
     [
         pytest.param("above", (40.0, 40.0, 12.0), marks=pytest.mark.long),

@@ -9,7 +9,6 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import part
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
@@ -21,6 +20,7 @@ from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, LOW, Appr
 from katana450.extensions.programs.carry import APPROACHES
 from katana450.extensions.programs.conditions import Held
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.finger_planning import with_fingers
 from katana450.extensions.programs.located_step import Conditional
 from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder
 from katana450.extensions.programs.schema_parts import (
@@ -151,7 +151,7 @@ class Grasp:
                 replace(builder.state, tool=hand.tool),
             )
         opened = builder.plan_context.arm.gripper.opened
-        after = builder.after(cmd.SetGripper(opened))
+        after = with_fingers(builder, opened)
         builder.note(f"grasp {self.name}: open", MoveFingers(opened), after)
         branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
         # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
@@ -280,9 +280,11 @@ class Grasp:
         """
         now = builder.state
         builder.state = builder.standing(q)
-        held = builder.after(cmd.SetGripper(builder.plan_context.arm.gripper.closed))
-        builder.state = now
-        if held.grip is None:
+        try:
+            held = with_fingers(builder, builder.plan_context.arm.gripper.closed)
+        finally:
+            builder.state = now
+        if held.held is None or held.held.name != self.name:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
         others = tuple(each for each in held.objects if each.name != self.name)
         world = builder.plan_context.session.world_at(replace(held, objects=others))
@@ -314,11 +316,10 @@ def _joint_room(builder: PlanBuilder, q: FloatArray) -> float:
 
 def _why_not_held(state: State) -> str:
     """Return why the closed fingers do not hold an object."""
-    for finding in state.findings:
-        if finding.reason is Reason.CONTACT and finding.parts:
-            return f"{' and '.join(map(part, finding.parts))} would touch first"
-        if finding.reason is Reason.LOPSIDED:
-            return "only one of them would touch it"
+    if state.held is not None:
+        return f"they would close on {state.held.name}"
+    if any(finding.reason is Reason.LOPSIDED for finding in state.findings):
+        return "only one of them would touch it"
     return "they close without touching it"
 
 

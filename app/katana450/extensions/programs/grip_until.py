@@ -12,6 +12,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.finger_planning import with_fingers
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.schema_parts import OBJECT, Schema, mapping, number_or_text
 from katana450.extensions.programs.script_context import ScriptContext
@@ -121,9 +122,7 @@ class GripUntil:
         if not isinstance(model, TouchModel):
             raise InputError("The pads of this gripper are not known, so its force is not either.")
         before = builder.state
-        closed = (
-            before if before.grip is not None else builder.after(cmd.SetGripper(fingers.closed))
-        )
+        closed = before if before.grip is not None else with_fingers(builder, fingers.closed)
         if closed.held is None or closed.grip is None:
             raise InputError(
                 "The fingers would close without an object between them. Move the open gripper "
@@ -137,7 +136,7 @@ class GripUntil:
         angle = _angle_for(self.force, model, closed, fingers)
         action = CloseUntil(angle, closed.held.name, force=self.force, model=model, gripper=fingers)
         builder.state = closed
-        builder.note(f"grip until {self.force:g} N", action, builder.after(cmd.SetGripper(angle)))
+        builder.note(f"grip until {self.force:g} N", action, with_fingers(builder, angle))
 
 
 STEPS: dict[str, type[Step]] = {"grip": GripUntil}

@@ -9,7 +9,6 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.arm.control.support import check_carried, surface_below
@@ -19,6 +18,7 @@ from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.carry import APPROACHES, carry
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.finger_planning import with_fingers
 from katana450.extensions.programs.places import point
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.schema_parts import (
@@ -217,7 +217,7 @@ def let_go(builder: PlanBuilder) -> None:
     """Append the opening of the fingers and the retreat. Raises InputError without room."""
     at, q, hand = builder.target, builder.q, builder.hand
     opened = builder.plan_context.arm.gripper.opened
-    builder.note("let go", MoveFingers(opened), builder.after(cmd.SetGripper(opened)))
+    builder.note("let go", MoveFingers(opened), with_fingers(builder, opened))
 
     def draw_back(away: float) -> None:
         end = hand.retreat(q, away)

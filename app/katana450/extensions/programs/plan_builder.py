@@ -48,9 +48,6 @@ ALONG = np.linspace(0.0, 1.0, 5)
 CARRY = 1.0
 """[m/s^2] Maximum acceleration of the tool while it carries an object."""
 
-MAX_CLOSING_TICKS = 500
-"""Maximum duration of a finger motion in ticks."""
-
 TICK = 0.01
 """[s] Period of the simulated control cycle."""
 
@@ -298,8 +295,8 @@ class PlanBuilder:
                 self._brief = brief
         raise refused
 
-    def after(self, command: Command, ticks: int = MAX_CLOSING_TICKS) -> State:
-        """Return the state at rest after ``command``, as the session itself computes it."""
+    def after(self, command: Command, ticks: int) -> State:
+        """Return the state ``ticks`` after ``command``, or at rest, as the session computes it."""
         session, state = self.plan_context.session, self.state
         given: tuple[Command, ...] = (command,)
         for _ in range(ticks):

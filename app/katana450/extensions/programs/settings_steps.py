@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-import numpy as np
-
 from katana450 import tolerances
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import MIN_SPEED
-from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, SetSpeed, UseTool, Wait
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.finger_planning import finger_unit, with_fingers
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.schema_parts import (
     OBJECT,
@@ -28,7 +24,6 @@ from katana450.extensions.programs.schema_parts import (
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.maths.planning.plan import MARGIN
 
 MAX_PAUSE = 3600.0
 """[s] Maximum duration of a wait."""
@@ -81,13 +76,13 @@ class Gripper:
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         ends = {"open": fingers.opened, "closed": fingers.closed}
-        unit, scale = ("mm", 1e-3) if fingers.slides else ("deg", math.radians(1.0))
+        unit, scale = finger_unit(builder)
         angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
         if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:
             low, high = fingers.lower / scale, fingers.upper / scale
             raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
         angle = fingers.clamp(angle)
-        held = _with_fingers(builder, angle)
+        held = with_fingers(builder, angle)
         if self.holding and (held.held is None or held.held.name != self.holding):
             instead = "nothing" if held.held is None else held.held.name
             raise InputError(
@@ -104,18 +99,6 @@ def _finger_position(value: YamlValue) -> float | str:
     if value.number is not None:
         return read.number(-180.0, 180.0, "deg or mm")(value)
     return read.choice("open", "closed")(value)
-
-
-def _with_fingers(builder: PlanBuilder, angle: float) -> State:
-    """Return the state after the fingers were moved to ``angle`` [rad or m].
-
-    It is simulated where they may meet an object or let one go.
-    """
-    state, world = builder.state, builder.world
-    nearest = None if world is None else world.nearest(np.append(builder.q, angle))
-    if state.grip is not None or (nearest is not None and nearest.distance < MARGIN):
-        return builder.after(cmd.SetGripper(angle))
-    return replace(state, gripper=angle, gripper_setpoint=angle, gripper_goal=angle)
 
 
 @dataclass(frozen=True)
