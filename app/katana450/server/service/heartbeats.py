@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import time
+from collections import deque
 from collections.abc import Callable
 
 from katana450.arm.runtime.readiness import SocketChannel, ack_age, data_age, readable
+from katana450.server.service.least_delay import LeastDelay
 
 KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
 """Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
@@ -22,9 +25,16 @@ MAX_ACK_AGE = 3.0
 """[s] Age of the newest acknowledgement from which on an open connection counts as lost. The kernel
 sends no probes while data waits for its acknowledgement, so keepalive does not see such a loss."""
 
+RECENT_MESSAGES = 8
+"""Number of handled messages whose least delay is that of the unread ones: those that a busy server
+handles late seem to be delayed."""
+
 
 class LastHeartbeat:
     """The newest heartbeat of one participant, stamped when its message is handled.
+
+    A message with the time of its making counts from the time at which it would have arrived with
+    the least delay of its connection: a late one does not prove that the sender is there now.
 
     Attributes:
         open: Number of its requests that wait for the end of a motion. While there is one, its open
@@ -35,11 +45,26 @@ class LastHeartbeat:
         """Count the participant as alive now. ``clock`` is in seconds."""
         self._clock = clock
         self._newest = clock()
+        self._least_delay = LeastDelay()
+        self._delays: deque[float] = deque(maxlen=RECENT_MESSAGES)
         self.open = 0
 
-    def note(self) -> None:
-        """Note that a message of the participant is being handled."""
-        self._newest = max(self._newest, self._clock() - self._age())
+    def note(self, made: float | None = None, limit: float = math.inf) -> float:
+        """Note that a message of the participant is being handled; return its delay [s].
+
+        ``made``: time of its making [s] on the clock of the participant. Without it the message
+        counts from its receipt, and its delay is 0. The delay, and ``limit``, are those of
+        ``LeastDelay.excess``.
+        """
+        t, delay = self._clock(), 0.0
+        if made is None:
+            received = t - self._age()
+        else:
+            delay = self._least_delay.excess(made, t, limit)
+            received = t - delay
+            self._delays.append(delay)
+        self._newest = max(self._newest, received)
+        return delay
 
     @property
     def newest(self) -> float:
@@ -73,7 +98,8 @@ class Arrival(LastHeartbeat):
     def newest(self) -> float:
         """Time of the newest heartbeat [s], including a message that is not read yet."""
         if self._line is not None and readable(self._line.fileno()):
-            self.note()
+            unread = self._clock() - self._age() - min(self._delays, default=0.0)
+            self._newest = max(self._newest, unread)
         return super().newest
 
     def _age(self) -> float:
