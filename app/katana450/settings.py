@@ -22,6 +22,8 @@ class Settings:
         frame_rate: maximum rate of view updates [Hz].
         ready: posture in which the arm starts and to which Home returns [rad].
         silence: heartbeat timeout of the driver, after which a moving arm brakes [s].
+        sample_delay: delay above the least of its connection, from which a sample of a jog, drag or
+            stream is not executed [s].
         strict_silence: whether a simulated arm reacts to silence as a real one: with a latched stop
             in place of a pause.
         access: file of the access links; without it nobody has to sign in.
@@ -41,6 +43,7 @@ class Settings:
     frame_rate: float = 60.0
     ready: tuple[float, ...] = tuple(math.radians(angle) for angle in READY_POSTURE_DEG)
     silence: float = 0.25
+    sample_delay: float = 0.15
     strict_silence: bool = False
     access: Path | None = None
     insecure: bool = False

@@ -28,7 +28,7 @@ from katana450.server.service import serialize
 from katana450.server.service.hub import TICK
 from katana450.server.service.participants import Participant
 from katana450.server.view.controls import listener
-from katana450.server.viser_bridge.frames import FrameSlot
+from katana450.server.viser_bridge.frames import FrameSlot, Stamp
 from katana450.server.viser_bridge.gestures import Gestures, _Browser
 from katana450.server.viser_bridge.guard import Guard
 from tests.browser.server import free_port
@@ -194,9 +194,9 @@ class Hooked:
         client: Any = SimpleNamespace(add_notification=lambda *_, **__: None)
         internals.pretend_client(server, CLIENT, client)
 
-    def receive(self) -> None:
+    def receive(self, delay: float = 0.0) -> None:
         """Receive a message in the gateway and pass it on."""
-        self.slot.stamps.append(self.gate.revocations)
+        self.slot.stamps.append(Stamp(self.gate.revocations, delay))
 
     async def handle(self, message: Any) -> None:
         """Handle the message in viser."""

@@ -42,6 +42,17 @@ def value_change(handle: Any, value: object) -> wire.GuiUpdateMessage:
     return wire.GuiUpdateMessage(handle._impl.uuid, {"value": value})
 
 
+def drag(name: str, phase: str, *position: Any) -> Any:
+    """Return the message of a browser for a ``phase`` of a drag: start, update or end."""
+    if phase == "update":
+        return wire.TransformControlsUpdateMessage(name, (1.0, 0.0, 0.0, 0.0), position)
+    kinds = {
+        "start": wire.TransformControlsDragStartMessage,
+        "end": wire.TransformControlsDragEndMessage,
+    }
+    return kinds[phase](name)
+
+
 def pretend_client(server: viser.ViserServer, client_id: int, client: Any) -> None:
     """Register ``client`` as the handle of a connected browser."""
     server._connected_clients[client_id] = client

@@ -198,7 +198,7 @@ def test_server_of_the_app_uses_our_producer() -> None:
 
 
 def test_messages_of_a_browser_wait_for_viser_and_keep_their_order_and_stamps() -> None:
-    heard: list[tuple[str, int]] = []
+    heard: list[tuple[str, frames.Stamp]] = []
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
         slot = frames.FrameSlot()
@@ -218,13 +218,13 @@ def test_messages_of_a_browser_wait_for_viser_and_keep_their_order_and_stamps() 
         await asyncio.wrap_future(there(begin()))
         pass_on = await receiver
         for number in range(100):
-            slot.stamps.append(number)
+            slot.stamps.append(frames.Stamp(number))
             pass_on(f"{number}")
         await asyncio.wrap_future(there(asyncio.sleep(0.0)))
 
     with thread_of_viser() as viser:
         asyncio.run(act(viser))
-    assert heard == [(f"{number}", number) for number in range(100)]
+    assert heard == [(f"{number}", frames.Stamp(number)) for number in range(100)]
 
 
 def test_messages_after_the_end_of_viser_are_dropped() -> None:

@@ -76,6 +76,7 @@ class Gateway:
         key = secrets.token_urlsafe(32)
         self.viser: viser.ViserServer = open_server(key)
         self.hub = Hub(time.monotonic, settings.silence, meshes, ClearBy(settings.clear_by))
+        self.hub.gate.sample_delay = settings.sample_delay
         self.hub.people, self.hub.stop_path = web.people, web.stop_path
         self.hub.gate.recorder = web.recorder
         guard = Guard(self.viser)

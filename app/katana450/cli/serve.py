@@ -58,6 +58,7 @@ def serve_with(options: Namespace) -> int:
         host=options.host,
         port=options.port,
         silence=options.silence,
+        sample_delay=options.sample_delay,
         strict_silence=options.strict_silence,
         access=options.access,
         insecure=options.insecure,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from katana450.arm.control.lease import Person, Role
@@ -48,12 +48,15 @@ class Actor:
         seen: number of revocations (``CommandGate.revocations``) at the time of the gesture, or the
             number that an API program knows; None for a command that is handled on receipt.
         grounds: why the command was accepted; None until ``CommandGate`` has accepted it.
+        delay: time [s] by which the command or gesture took longer than the least delay of its
+            connection; 0 if unknown.
     """
 
     person: Person
     channel: CommandChannel
     seen: int | None = None
     grounds: Grounds | None = None
+    delay: float = field(default=0.0, compare=False)
 
     @property
     def key(self) -> str:

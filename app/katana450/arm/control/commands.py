@@ -123,7 +123,7 @@ class Nudge(AxisCommand):
     limit it.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits(joints_only=True)
+    traits: ClassVar[CommandTraits] = CommandTraits(relative=True, joints_only=True)
 
     axis: int
     by: float

@@ -134,7 +134,9 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.INTERNAL: lambda _: "internal error: the arm holds; see the server's log",
     Reason.RESTARTED: lambda _: "the arm's process was started again; see the server's log",
     Reason.WAITING: lambda _: "paused: the next command moves the arm",
-    Reason.DRIVER_SILENT: lambda f: f"the driver fell silent: no message for {f.amount:.2f} s",
+    Reason.DRIVER_SILENT: lambda f: (
+        f"the driver fell silent: the newest message is {f.amount:.2f} s old"
+    ),
     Reason.DRIVER_LEFT: lambda _: "the driver's window was closed",
     Reason.SERVER_SILENT: lambda f: (
         f"the page's server was silent for {f.amount:.2f} s: it hangs, or this machine is too busy"

@@ -22,7 +22,7 @@ class StepTool(BaseCommand):
     cannot be reached, the nearest pose becomes the target.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits()
+    traits: ClassVar[CommandTraits] = CommandTraits(relative=True)
 
     by: FloatArray
     frame: JogFrame = JogFrame.BASE
@@ -49,6 +49,11 @@ class Jog(BaseCommand):
     def __post_init__(self) -> None:
         object.__setattr__(self, "rates", _tool_numbers("The jog", self.rates))
         _check_frame("jog", self.frame)
+
+    @property
+    def sample(self) -> bool:
+        """True if it is refused when it arrives late; the end of a jog, without rates, is not."""
+        return bool(self.rates.any())
 
 
 @dataclass(frozen=True)

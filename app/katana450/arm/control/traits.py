@@ -15,6 +15,7 @@ class CommandTraits:
 
     Attributes:
         stream: several in a row are one motion, so a newer one replaces one that waits for a tick.
+        relative: counts from the present target, so that several in a row add up.
         while_stopped: takes effect while a stop holds the arm; all others are refused then.
         while_paused: takes effect during a pause. A jog does not: it has no goal to keep for later.
         supersedes: ends the motion or the program that is under way or being planned.
@@ -28,6 +29,7 @@ class CommandTraits:
     """
 
     stream: bool = False
+    relative: bool = False
     while_stopped: bool = False
     while_paused: bool = True
     supersedes: bool = True
@@ -52,6 +54,14 @@ class BaseCommand:
     def parts(self) -> tuple[BaseCommand, ...]:
         """The single commands in this one."""
         return (self,)
+
+    @property
+    def sample(self) -> bool:
+        """True if it is one of many in a row, which is refused when it arrives late.
+
+        The hand may have let go since it was made.
+        """
+        return self.traits.stream or self.traits.relative
 
     def replaces(self, waiting: BaseCommand) -> bool:
         """Return whether ``waiting``, the newest command before this one, need not be executed."""

@@ -133,12 +133,16 @@ class Request(
         id: Number or text of the client's own, repeated in the answer.
         revocations: Number from a state or an answer. A command is refused if there was a stop or
             a change of driver since then.
+        made: Time of its making on the client's own clock [s], in all requests of a connection or
+            in none. The server compares it with the least delay so far. A jog, a step, a sample of
+            a stream or another target that is late is refused, and a late heartbeat counts as old.
     """
 
     traits: ClassVar[RequestTraits]
 
     id: Id = None
     revocations: Annotated[int, Meta(ge=0)] | None = None
+    made: float | None = None
 
     def command(self) -> Command | None:
         """Return the command of the request.

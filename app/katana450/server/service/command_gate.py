@@ -22,9 +22,11 @@ from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.last_pause import LastPause
+from katana450.server.service.least_delay import check_in_time
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import guarded
 from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
+from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
 
@@ -46,12 +48,13 @@ class CommandGate:
     A lock puts commands, stops and changes of the lease into one order. A gesture can be older than
     its place in that order: it can wait in viser's socket while a stop arrives and is cleared. So
     each gesture carries the number of revocations at its receipt (``Actor.seen``), and the gate
-    refuses an older number.
+    refuses an older number. It also refuses a sample with a delay above ``sample_delay`` [s].
     """
 
     def __init__(self, clock: Callable[[], float], clear_by: ClearBy = ClearBy.DRIVER) -> None:
         """Create a gate without an arm. ``clock`` is in seconds. ``clear_by``: see ``ClearBy``."""
         self._clock = clock
+        self.sample_delay = Settings.sample_delay
         self.lock = threading.RLock()
         """Lock that keeps other commands, stops and changes of the lease out."""
         self.lease = Lease()
@@ -70,8 +73,7 @@ class CommandGate:
         self.presser_of: Callable[[StopCause], Actor | None] = lambda _: None
         """Function that returns the participant that pressed STOP; None for another cause."""
         self.delivered: list[Callable[[cmd.Command, Actor, State, bool], None]] = []
-        """Callbacks with each delivered command, its actor, the state before it, and whether that
-        state includes every earlier command."""
+        """Callbacks with command, actor, the state before, and whether that includes all before."""
         self._clear_by = clear_by
         self._presses = Presses()
         self._cleared = 0
@@ -116,6 +118,8 @@ class CommandGate:
         if not all(each.traits.while_stopped for each in command.parts):
             self.check_runs()
             self._check_settled(actor)
+        if any(each.sample for each in command.parts):
+            check_in_time(actor.delay, self.sample_delay)
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
         return self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import nullcontext
 from dataclasses import replace
 
@@ -95,7 +96,9 @@ class Dispatcher:
 
     def _execute(self, participant: Participant, request: requests.Request) -> answers.Answer:
         hub = self._hub
-        hub.heartbeat(participant)
+        still = request.traits.free or request.traits.question
+        limit = math.inf if still else hub.gate.sample_delay
+        delay = hub.heartbeat(participant, request.made, limit)
         if request.traits.admin and participant.person.role is not Role.ADMIN:
             raise LeaseError("Only an admin may do this.")
         match request:
@@ -120,7 +123,7 @@ class Dispatcher:
             return answers.Done()
         # Read before the move: a stop in between is newer than the answer.
         revocations = hub.gate.revocations
-        ticket = hub.move(participant, command, request.revocations)
+        ticket = hub.move(participant, command, seen=request.revocations, delay=delay)
         # A stream does not wait for its answers. A command that is planned first has no ticket yet.
         at_once = request.traits.stream or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))

@@ -210,16 +210,16 @@ class Hub:
         """Return the connected participant of ``key``; None if it is not connected."""
         return self._participants.get(key)
 
-    def at_scene(self, key: str, seen: int) -> Actor:
+    def at_scene(self, key: str, seen: int, delay: float = 0.0) -> Actor:
         """Return the actor of a gesture at viser's controls. For any thread.
 
-        ``key``: key of the window. ``seen``: number of revocations at the receipt of the gesture.
-        Raises LeaseError if the window has no control socket.
+        ``key``: key of the window. ``seen``, ``delay``: see ``Actor``. Raises LeaseError if the
+        window has no control socket.
         """
         participant = self._participants.get(key)
         if participant is None:
             raise LeaseError("Open the start page to drive the arm.")
-        return Actor(participant.person, CommandChannel.SCENE, seen)
+        return Actor(participant.person, CommandChannel.SCENE, seen, delay=delay)
 
     @property
     def participants(self) -> list[Participant]:
@@ -315,14 +315,17 @@ class Hub:
             raise LeaseError("That window or program is no longer connected.")
         return found
 
-    def heartbeat(self, participant: Participant) -> None:
-        """Count a message of ``participant`` as a heartbeat at the time of its receipt."""
-        participant.heartbeat.note()
+    def heartbeat(
+        self, participant: Participant, made: float | None = None, limit: float = math.inf
+    ) -> float:
+        """Count a message of ``participant`` as a heartbeat; see ``LastHeartbeat.note``."""
+        delay = participant.heartbeat.note(made, limit)
         self._update_lease()
+        return delay
 
-    def move(self, participant: Participant, command: cmd.Command, seen: int | None = None) -> int:
-        """Submit ``command`` of ``participant``; return its ticket. ``seen``: see ``Actor``."""
-        return self.gate.submit(command, replace(participant.actor, seen=seen))
+    def move(self, participant: Participant, command: cmd.Command, **more: Any) -> int:
+        """Submit ``command`` of ``participant``; return its ticket. ``more``: see ``Actor``."""
+        return self.gate.submit(command, replace(participant.actor, **more))
 
     # Watch
 

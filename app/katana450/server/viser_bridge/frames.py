@@ -39,6 +39,18 @@ FRAME_SLOT_HEADER = "X-Katana450-Frame-Slot"
 """Header in which the gateway names the frame slot of a browser's connection."""
 
 
+class Stamp(NamedTuple):
+    """The receipt of a message of a browser.
+
+    Attributes:
+        revocations: number of revocations at that time.
+        delay: delay [s] beyond the least of the connection; 0 if unknown.
+    """
+
+    revocations: int
+    delay: float = 0.0
+
+
 class FrameSlot:
     """The passage between the gateway's and viser's end of one browser's connection.
 
@@ -50,8 +62,7 @@ class FrameSlot:
     Attributes:
         name: secret name by which viser's end finds the slot.
         key: key of the window that the browser shows, empty if there is none.
-        stamps: number of revocations at the receipt of each message on its way to viser, oldest
-            first.
+        stamps: the receipt of each message on its way to viser, oldest first.
     """
 
     def __init__(self, key: str = "", refused: Callable[[str], None] = lambda _: None) -> None:
@@ -63,7 +74,7 @@ class FrameSlot:
         """
         self.name = secrets.token_hex(16)
         self.key = key
-        self.stamps: deque[int] = deque()
+        self.stamps: deque[Stamp] = deque()
         self._refused = refused
         self._frames: deque[bytes] = deque()
         self._taker = asyncio.get_running_loop()

@@ -8,7 +8,7 @@ and its window shows the old value again. The callback's command then goes throu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import viser
@@ -18,7 +18,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.errors import LeaseError
 from katana450.server.service.hub import Hub
-from katana450.server.viser_bridge.frames import FrameSlot, slot_of
+from katana450.server.service.least_delay import check_in_time
+from katana450.server.viser_bridge.frames import FrameSlot, Stamp, slot_of
 from katana450.server.viser_bridge.guard import Guard
 
 DRAGGING = (wire.TransformControlsUpdateMessage, wire.TransformControlsDragEndMessage)
@@ -105,10 +106,10 @@ class Gestures:
         if browser is None:
             # The connection does not come from the gateway.
             return
-        seen = browser.slot.stamps.popleft()
+        stamp = browser.slot.stamps.popleft()
         if self._guard.drives(message):
             try:
-                actor = self._admitted(browser, message, seen)
+                actor = self._admitted(browser, message, stamp)
             except LeaseError as refusal:
                 browser.slot.refuse(str(refusal))
                 actor = None
@@ -119,26 +120,38 @@ class Gestures:
             browser.actor = actor
         await self._pass_on(client_id, message)
 
-    def _admitted(self, browser: _Browser, message: Any, seen: int) -> Actor | None:
-        """Return the actor of ``message``; None for a part of a void drag.
+    def _admitted(self, browser: _Browser, message: Any, stamp: Stamp) -> Actor | None:
+        """Return the actor of ``message``, with its ``stamp``; None for a part of a void drag.
 
-        ``seen`` is the number of revocations at the receipt of the message. Raises LeaseError with
-        the reason for a refusal.
+        Raises LeaseError with the reason for a refusal.
         """
         if isinstance(message, DRAGGING):
             held = browser.drags.get(message.name)
             if isinstance(message, wire.TransformControlsDragEndMessage):
                 browser.drags.pop(message.name, None)
             # The start of the drag was refused, or a revocation ended the drag before its end.
-            return None if held is None or not self._gate.is_current(held) else held
-        actor = self._hub.at_scene(browser.slot.key, seen)
+            if held is None or not self._gate.is_current(held):
+                return None
+            # viser gets a late message too: the next one continues the drag, and the gate refuses
+            # its command. The end of a drag is never late.
+            held = replace(held, delay=stamp.delay)
+            if isinstance(message, wire.TransformControlsUpdateMessage):
+                try:
+                    check_in_time(stamp.delay, self._gate.sample_delay)
+                except LeaseError as refusal:
+                    browser.slot.refuse(str(refusal))
+            return held
+        actor = self._hub.at_scene(browser.slot.key, *stamp)
         runner = self._hub.runner
         if self._guard.is_of(message, runner.controls):
             # The owner of a run may differ from the driver.
             self._gate.check_current(actor)
             runner.check_may_touch(actor)
             return actor
+        is_start = isinstance(message, wire.TransformControlsDragStartMessage)
+        if is_start:
+            check_in_time(actor.delay, self._gate.sample_delay)
         actor = self._gate.claim(actor)
-        if isinstance(message, wire.TransformControlsDragStartMessage):
+        if is_start:
             browser.drags[message.name] = actor
         return actor

@@ -7,6 +7,7 @@ messages that our page can send. `CommandGate` decides which participant may com
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum, auto
@@ -33,6 +34,10 @@ NO_MESSAGE = 25.0
 SEEN = "Seen"
 """Type of our script's message with the number of frames on the screen, which viser never gets."""
 
+MADE = "made"
+"""Field that our script adds to each message, with the time of its making [s] on the page's clock.
+viser never gets it."""
+
 MAX_LOGGED_MESSAGES = 20
 """Maximum number of bad messages of one browser in the log, so that a flood cannot fill it."""
 
@@ -53,11 +58,13 @@ class FilterResult:
         ruling: the decision.
         seen: number of frames on the screen if the message reports it.
         message: the decoded message if it passes.
+        made: time of its making [s] on the clock of the page; None if it has none.
     """
 
     ruling: Ruling
     seen: int | None = None
     message: Any = None
+    made: float | None = None
 
 
 class MessageFilter:
@@ -82,17 +89,21 @@ class MessageFilter:
         if data is None or len(data) > MAX_MESSAGE_BYTES:
             return self._drop("none", "it is too long or not binary", t, NO_MESSAGE)
         try:
-            match msgspec.msgpack.decode(data):
+            fields = msgspec.msgpack.decode(data)
+            made = fields.pop(MADE, None)
+            if made is not None and not math.isfinite(made):
+                raise ValueError
+            match fields:
                 case {"type": str(kind), "count": int(count), **rest} if kind == SEEN and not rest:
-                    return FilterResult(Ruling.DROP, seen=count)
-            message = wire.Message.deserialize(data)
+                    return FilterResult(Ruling.DROP, seen=count, made=made)
+            message = wire.Message.deserialize(msgspec.msgpack.encode(fields))
         except Exception as error:
             # A message that viser's decoder rejects, by any error, is not passed to viser.
             return self._drop("none", f"it cannot be read ({type(error).__name__})", t, NO_MESSAGE)
         objection = self._guard.objection(message)
         if objection is not None:
             return self._drop(type(message).__name__, objection, t)
-        return FilterResult(Ruling.PASS, message=message)
+        return FilterResult(Ruling.PASS, message=message, made=made)
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1

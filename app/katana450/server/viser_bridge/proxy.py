@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from contextlib import suppress
 
 import viser
@@ -16,10 +17,11 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE, Identity
+from katana450.server.service.least_delay import LeastDelay
 from katana450.server.service.participants import actor_of, key_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.viser_bridge.flow import FlowControl
-from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot
+from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot, Stamp
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import FilterResult, MessageFilter, Ruling
 from katana450.server.viser_bridge.viser_server import KEY_HEADER
@@ -119,6 +121,7 @@ class _Line:
         self._browser = browser
         self._key = key
         self._flow = FlowControl()
+        self._least_delay = LeastDelay()
         self._room = asyncio.Event()
         self._refused_at = float("-inf")
         self._due = float("-inf")
@@ -198,7 +201,8 @@ class _Line:
             data = message.get("bytes")
             result = message_filter.judge(data, self._hub.clock())
             if result.ruling is Ruling.PASS:
-                self.slot.stamps.append(self._hub.gate.revocations)
+                stamp = Stamp(self._hub.gate.revocations, self._delay(result))
+                self.slot.stamps.append(stamp)
                 pass_on(result.message)
             elif result.ruling is Ruling.CLOSE or not self._note(result):
                 log.warning("Disconnected a browser that sent too many invalid messages.")
@@ -209,8 +213,17 @@ class _Line:
         """Note the frames on the screen; return False if the reported number is impossible."""
         if result.seen is None:
             return True
+        self._delay(result)
         self._room.set()
         return self._flow.seen(result.seen, self._hub.clock())
+
+    def _delay(self, result: FilterResult) -> float:
+        """Return the delay of a message beyond the least of this connection [s]."""
+        if result.made is None:
+            return 0.0
+        moves = result.message is not None and self._guard.drives(result.message)
+        limit = self._hub.gate.sample_delay if moves else math.inf
+        return self._least_delay.excess(result.made, self._hub.clock(), limit)
 
     def _refuse(self, why: str) -> None:
         """Show in the browser's window why its gesture was refused."""
