@@ -53,6 +53,15 @@ when the holder of the lease falls silent or disconnects. After a stop nothing m
 is received from that program for 1 s (`--owner-silence`). A request with `wait` counts as a heartbeat
 [until its motion has ended](#one-line-one-motion).
 
+On a connection that has become slow, samples would still move the arm after a person has let go. So
+each request may have `made`, the time of its making [s] on the client's own clock. The server compares
+both clocks by the least delay of the connection. A `jog`, `step_tool`, `nudge`, `servo` or other target
+that took 0.15 s more than that (`--sample-delay`) is refused with the reason, and a heartbeat counts as
+that much older. The end of a motion is never late: a `jog` with zero rates, `end_drag`, `hold`, `stop`. A
+longer delay counts as usual after 10 s without a late command. The page sends `made` with everything,
+and the Python client with heartbeats and with samples sent by `send`. A request without `made` counts
+from its receipt, whatever its delay.
+
 The answer to a command comes once the arm's process has taken it, a tick or two later. The answer to
 a later question can come first. A command is answered with one of these:
 
@@ -211,7 +220,7 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     lines = [f"### {heading}\n", text, ""]
     described = msgspec.json.schema_components([kind])[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
-        if field.name == "id" or (tag == "do" and field.name in ("revocations", "wait")):
+        if field.name == "id" or (tag == "do" and field.name in ("revocations", "made", "wait")):
             continue
         shape = _shape(described["properties"][field.name])
         default = "" if field.required else f", default `{_json(field.default)}`"

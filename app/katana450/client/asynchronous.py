@@ -83,10 +83,12 @@ class AsyncClient:
     async def send(self, request: requests.Request) -> None:
         """Send ``request`` without waiting for an answer: for streams, Servo and Jog.
 
-        Raises LostError if the connection is lost.
+        The server refuses a sample that arrives late. Raises LostError if the connection is lost.
         """
         if self._lost is not None:
             raise LostError(self._lost)
+        if request.id is None or request.traits.stream:
+            request = msgspec.structs.replace(request, made=time.monotonic())
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
@@ -238,8 +240,7 @@ class AsyncClient:
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """Upload the mesh in ``file``; scene objects refer to it by its key.
 
-        ``unit``: mm, cm, in or m; None to let the server guess it. Raises RefusedError with what is
-        wrong.
+        ``unit``: mm, cm, in or m; None to let the server guess it. Raises RefusedError.
         """
         data = await asyncio.to_thread(file.read_bytes)
         return await asyncio.to_thread(self._site.mesh, data, file.name, unit)
