@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.visual import Visual, unreadable_mesh
+from katana450.arm.robot.visual import Visual, scene_in
 from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.srgb import to_srgb
@@ -94,11 +94,7 @@ def _read(visual: Visual) -> Sequence[VisualMesh]:
 
     bare = visual.source.suffix.lower() == ".stl"
     T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
-    try:
-        scene = trimesh.load_scene(visual.source)
-    except Exception as error:
-        raise unreadable_mesh(visual.source) from error
-    shapes = []
+    scene, shapes = scene_in(visual.source), []
     for node in scene.graph.nodes_geometry:
         T_file, name = scene.graph[node]
         mesh = scene.geometry[name]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +36,9 @@ SINGLE_FILES = (".glb", ".ply", ".stl")
 
 GEOMETRY_FILES = (*SINGLE_FILES, ".dae", ".obj")
 """Suffixes of mesh files that contain all their vertices; others of their files are for colours."""
+
+UNIT = re.compile(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']")
+"""The unit of a COLLADA file [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +94,8 @@ class Visual:
 
         Raises RobotDescriptionError if the file cannot be read.
         """
-        import trimesh
-
         if isinstance(self.source, Path):
-            try:
-                mesh = trimesh.load_scene(self.source).to_mesh()
-            except Exception as error:
-                raise unreadable_mesh(self.source) from error
+            mesh = scene_in(self.source).to_mesh()
         elif isinstance(self.source, PrimitiveShape):
             mesh = self.source.mesh()
         else:
@@ -121,13 +120,24 @@ class Visual:
         return kept(make, self.source.suffix, data, *own, *inputs)
 
 
-def unreadable_mesh(source: Path) -> RobotDescriptionError:
-    """Return the error for a mesh file that its reader rejects, whatever the reader reports."""
-    kind = source.suffix or "its format"
-    return RobotDescriptionError(
-        f"{source} cannot be read as a mesh: the file is corrupt, or {kind} is not supported. "
-        "Export it again, for example as binary STL."
-    )
+def scene_in(source: Path) -> Any:
+    """Return the contents of a mesh file as a scene of trimesh [m].
+
+    The unit that a COLLADA file states applies, as in RViz. Raises RobotDescriptionError for a file
+    that its reader rejects, whatever the reader reports.
+    """
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(source)
+        unit = UNIT.search(source.read_bytes()) if source.suffix.lower() == ".dae" else None
+        return scene if unit is None else scene.apply_scale(float(unit[1]))
+    except Exception as error:
+        kind = source.suffix or "its format"
+        raise RobotDescriptionError(
+            f"{source} cannot be read as a mesh: the file is corrupt, or {kind} is not supported. "
+            "Export it again, for example as binary STL."
+        ) from error
 
 
 def rods(ends: Sequence[FloatArray]) -> tuple[Visual, ...]:
@@ -148,6 +158,8 @@ def mesh_file(name: str, folder: Path) -> Path:
 
     The path in ``package://name/path`` is searched for beside the file and in the folders above it.
     """
+    # A relative folder does not name all folders above it.
+    folder = folder.absolute()
     if not name.startswith("package://"):
         return (folder / name.removeprefix("file://")).resolve()
     whole = Path(name.removeprefix("package://"))
