@@ -109,3 +109,9 @@ def test_a_bar_moves_in_a_fork_and_stops_at_its_prong(
     again, _, _ = robot_world(load(path))
     assert again is not None
     assert again.fingerprint.differs_by(world.fingerprint) == 0.0
+
+
+def test_cone_with_many_sides_is_a_part() -> None:
+    cone = trimesh.creation.cone(radius=0.02, height=0.06, sections=300)
+    (corners,) = divided_mesh(np.asarray(cone.vertices), np.asarray(cone.faces))
+    np.testing.assert_allclose(np.ptp(corners, axis=0), (0.04, 0.04, 0.06), atol=2e-4)

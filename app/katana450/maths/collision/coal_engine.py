@@ -18,12 +18,20 @@ SIGNED = coal.DistanceRequest()
 SIGNED.gjk_tolerance = 1e-8
 
 
+MAX_NEIGHBOURS = 255
+"""Maximum number of edges at a corner of a hull of coal."""
+
+
 class CoalEngine:
     """The engine on platforms with coal wheels."""
 
     def hull(self, corners: FloatArray) -> Any:
         """Return the convex hull of ``corners`` (n, 3) [m]."""
-        return coal.Convex.convexHull(_listed(corners), False, "")
+        try:
+            return coal.Convex.convexHull(_listed(corners), False, "")
+        except RuntimeError:
+            # A corner has more than MAX_NEIGHBOURS.
+            return coal.Convex.convexHull(_listed(_with_few_neighbours(corners)), False, "")
 
     def box(self, size: FloatArray) -> Any:
         """Return a box of ``size`` (3,) [m] about its middle."""
@@ -59,7 +67,10 @@ class CoalEngine:
 
     def triangles(self, points: FloatArray) -> FloatArray:
         """Return the corners (m, 3, 3) of the triangles of the hull of ``points`` (n, 3)."""
-        convex = coal.Convex.convexHull(_listed(points), True, "Qt")
+        try:
+            convex = coal.Convex.convexHull(_listed(points), True, "Qt")
+        except RuntimeError:
+            return _triangles(points)
         corners = np.array([convex.point(i) for i in range(convex.num_points)])
         faces = [convex.polygons(i) for i in range(convex.num_polygons)]
         return np.asarray(corners[np.array([[face[0], face[1], face[2]] for face in faces])])
@@ -69,3 +80,32 @@ def _listed(points: FloatArray) -> Any:
     listed = coal.StdVec_Vec3s()
     listed.extend(list(points))
     return listed
+
+
+def _triangles(points: FloatArray) -> FloatArray:
+    """Return the corners (m, 3, 3) of the triangles of any hull, which coal cannot make."""
+    # Such hulls are rare, and the library takes a quarter of a second to load.
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(points[ConvexHull(points).simplices])
+
+
+def _with_few_neighbours(corners: FloatArray) -> FloatArray:
+    """Return at most MAX_NEIGHBOURS points (k, 3) [m] whose hull contains ``corners`` (n, 3) [m].
+
+    They are farthest in directions that are spread evenly on a sphere, and then scaled up about
+    their middle.
+    """
+    height = np.linspace(1.0, -1.0, MAX_NEIGHBOURS)
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(MAX_NEIGHBOURS)
+    round_axis = np.sqrt(1.0 - height**2)
+    directions = np.stack((round_axis * np.cos(turn), round_axis * np.sin(turn), height), axis=1)
+    middle = corners.mean(axis=0)
+    around = corners - middle
+    few = around[np.unique((around @ directions.T).argmax(axis=0))]
+    a, b, c = _triangles(few).transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    heights = np.einsum("ij,ij->i", normals, a)
+    # By the height, which is negative where the normal points inwards.
+    reach = (around @ (normals / heights[:, None]).T).max()
+    return np.asarray(few * float(reach) + middle)
