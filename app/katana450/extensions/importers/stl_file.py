@@ -6,6 +6,7 @@ Source: 3D Systems, StereoLithography Interface Specification (1989).
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,9 @@ HEADER = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 """A triangle of a binary file."""
 
+UNCOUNTED = (0, 0xFFFFFFFF)
+"""Numbers of triangles in files that were written as a stream, before they were counted."""
+
 _VERTEX = rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)\s+"
 _FACET = re.compile(
     rb"\s*facet\s+normal\s+\S+\s+\S+\s+\S+\s+outer\s+loop\s+"
@@ -36,7 +40,10 @@ _SOLID = re.compile(rb"\s*(end)?solid\b[^\r\n]*", re.IGNORECASE)
 
 def read_stl(data: bytes, name: str) -> MeshReading:
     """Return all triangles of all solids. Raises InputError for an invalid file."""
-    count = int.from_bytes(data[80:84], "little")
+    count, note = int.from_bytes(data[80:84], "little"), ""
+    whole, rest = divmod(len(data) - HEADER, TRIANGLE.itemsize)
+    if count in UNCOUNTED and whole > 0 and not rest:
+        count, note = whole, "The file does not say how many triangles it has: all were read."
     # Some binary files begin with "solid" too, so the size decides.
     if len(data) >= HEADER and len(data) == HEADER + count * TRIANGLE.itemsize:
         check_triangles(count, name)
@@ -44,7 +51,7 @@ def read_stl(data: bytes, name: str) -> MeshReading:
         left_out = (
             ("colours, which the STL standard does not define",) if rows["extra"].any() else ()
         )
-        return _reading(doubles(rows["corners"]), name, left_out)
+        return replace(_reading(doubles(rows["corners"]), name, left_out), note=note)
     if _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
         return _reading(_text(data, name), name)
     if len(data) < HEADER:
