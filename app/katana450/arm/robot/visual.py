@@ -129,7 +129,7 @@ def scene_in(source: Path) -> Any:
     import trimesh
 
     try:
-        scene = trimesh.load_scene(source)
+        scene: Any = trimesh.load_scene(source)
         unit = UNIT.search(source.read_bytes()) if source.suffix.lower() == ".dae" else None
         return scene if unit is None else scene.apply_scale(float(unit[1]))
     except Exception as error:
