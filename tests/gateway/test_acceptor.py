@@ -13,7 +13,8 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from katana450.server.web.acceptor import Acceptor
+from katana450.server.web import acceptor as acceptors
+from katana450.server.web.acceptor import Acceptor, _Connection
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 
 WAITING = 8
@@ -132,6 +133,78 @@ def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
     assert [each.getMessage() for each in caplog.records] == [
         "A connection could not be accepted: Too many open files."
     ]
+
+
+def test_problem_with_many_addresses_is_one_entry(caplog: pytest.LogCaptureFixture) -> None:
+    async def act() -> int:
+        async with _accepting() as (acceptor, server):
+            crowd = [await _connected(server, f"127.0.1.{n}") for n in range(1, WAITING + 20)]
+            for each in crowd:
+                each.close()
+            return len(acceptor._logged)
+
+    with caplog.at_level(logging.WARNING):
+        assert asyncio.run(act()) == 1
+    (record,) = caplog.records
+    assert record.getMessage() == "Too many connections wait; closed the oldest of 127.0.1.1."
+
+
+@pytest.mark.parametrize("of", [["127.0.0.1"], [f"127.0.1.{n}" for n in range(1, 30)]])
+def test_connections_beyond_the_rate_are_opened_once_they_send(
+    of: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, total = (3.0, 1e3) if len(of) == 1 else (1e3, 3.0)
+    for name, value in {
+        "PREFIX_BURST": one,
+        "PREFIX_RATE": 0.0,
+        "BURST": total,
+        "RATE": 0.0,
+    }.items():
+        monkeypatch.setattr(acceptors, name, value)
+
+    async def act() -> None:
+        async with _accepting() as (acceptor, server):
+            silent = [await _connected(server, of[n % len(of)]) for n in range(6)]
+            speaking = await _connected(server, of[-1])
+            speaking.send(b"x")
+            await asyncio.sleep(0.1)
+            assert [_is_open(each) for each in silent] == [True] * 3 + [False] * 3
+            assert _is_open(speaking)
+            assert not acceptor._surplus
+            # A prefix of its own has places of its own.
+            other = await _connected(server, "127.0.2.1")
+            await asyncio.sleep(0.1)
+            assert _is_open(other) == (len(of) == 1)
+            for each in (speaking, other, *silent):
+                each.close()
+
+    asyncio.run(act())
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ("10.0.0.1", "10.0.0.2", False),
+        ("2001:db8::1", "2001:db8::ffff:1", True),
+        ("2001:db8::1", "2001:db8:0:1::1", False),
+        ("::ffff:10.0.0.1", "::ffff:10.0.0.2", False),
+        ("::ffff:10.0.0.1", "10.0.0.1", True),
+        ("fe80::1%eth0", "fe80::2%eth0", True),
+    ],
+)
+def test_ipv6_networks_count_as_one_prefix(one: str, other: str, *, same: bool) -> None:
+    with socket.socket() as sock:
+        first, second = (_Connection(sock, (host, 1), 0.0).prefix for host in (one, other))
+    assert (first == second) == same
+
+
+def test_hundreds_of_connections_wait_for_a_server_that_is_busy() -> None:
+    with listen("127.0.0.1", 0) as listening:
+        crowd = []
+        for _ in range(300):
+            crowd.append(socket.create_connection(listening.getsockname(), timeout=0.2))
+        for each in crowd:
+            each.close()
 
 
 @pytest.mark.parametrize(("soft", "hard"), [(256, 2048), (256, 512)])

@@ -2,8 +2,12 @@
 
 A connection is *waiting* until a known client sends a request on it, and again once that is
 answered. The number of waiting connections is bounded. One more replaces the oldest waiting
-connection of the address that has the most of them. So no address can keep others out, not even
-that of a reverse proxy, from which all connections come.
+connection of the prefix that has the most of them. So no prefix can keep others out, not even
+that of a reverse proxy, from which all connections come. A prefix is an IPv4 address, or the 64
+bits that an IPv6 network has in common.
+
+Connections beyond a rate, of one prefix or of all, are opened only if they send something at once,
+as every STOP does. Silent ones then cost little.
 """
 
 from __future__ import annotations
@@ -17,6 +21,10 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from ipaddress import IPv6Address
+
+from katana450.caching import cached_property
+from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -32,6 +40,22 @@ SEND_TIMEOUT = 120.0
 
 ACCEPT_BATCH = 8
 """Connections accepted in one turn of the event loop: STOP waits for at most this many."""
+
+RATE, BURST = 200.0, 400.0
+"""Connections of all clients per second, and in a burst, that are opened without a condition."""
+
+PREFIX_RATE, PREFIX_BURST = 50.0, 100.0
+"""The same of one prefix."""
+
+MAX_PREFIXES = 1024
+"""Number of prefixes whose connections are counted; a new one replaces the oldest."""
+
+FIRST_CHECK, GRACE = 0.002, 0.02
+"""[s] Time until it is checked whether a connection beyond these rates has sent something, and from
+then until it is closed if it has not."""
+
+MAX_SURPLUS = 128
+"""Maximum number of connections in this time; one more replaces the oldest."""
 
 CHECK_EVERY = 0.5
 """Interval of the timeout checks [s]."""
@@ -56,6 +80,15 @@ class _Connection:
     transport: asyncio.Transport | None = None
     closing: bool = False
 
+    @cached_property
+    def prefix(self) -> str:
+        """The IPv4 address, or the first 64 bits of the IPv6 address."""
+        host = self.client[0].partition("%")[0]
+        if ":" not in host:
+            return host
+        address = IPv6Address(host)
+        return str(address.ipv4_mapped or address.packed[:8].hex())
+
     @property
     def open(self) -> bool:
         """True while the socket is open."""
@@ -67,6 +100,8 @@ class _Connection:
             self.transport.abort()
         elif self.opening is not None:
             self.opening.cancel()
+        else:
+            self.sock.close()
 
 
 class Acceptor:
@@ -78,15 +113,19 @@ class Acceptor:
         self._maximum = waiting
         self._waiting: dict[tuple[str, int], _Connection] = {}
         self._busy: dict[tuple[str, int], _Connection] = {}
+        self._surplus: dict[_Connection, asyncio.TimerHandle] = {}
         self._tasks: list[asyncio.Task[None]] = []
         self._logged: dict[str, float] = {}
+        self._budget = TokenBucket(RATE, BURST, 0.0)
+        self._budgets: dict[str, TokenBucket] = {}
 
     def start(
         self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None = None
     ) -> Acceptor:
         """Start to accept connections in the running event loop."""
         self._listening.setblocking(False)
-        work = (self._accept(protocol, tls), self._watch())
+        self._protocol, self._tls = protocol, tls
+        work = (self._accept(), self._watch())
         self._tasks = [asyncio.create_task(each) for each in work]
         return self
 
@@ -98,8 +137,11 @@ class Acceptor:
     async def wait_closed(self) -> None:
         """Wait until accepting has ended, then close the waiting connections."""
         await asyncio.gather(*self._tasks, return_exceptions=True)
-        for connection in tuple(self._waiting.values()):
+        for timer in self._surplus.values():
+            timer.cancel()
+        for connection in (*self._waiting.values(), *self._surplus):
             connection.close()
+        self._surplus.clear()
 
     @contextmanager
     def kept(self, client: tuple[str, int] | None) -> Iterator[None]:
@@ -117,40 +159,74 @@ class Acceptor:
             if connection.open:
                 self._wait(connection)
 
-    async def _accept(
-        self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None
-    ) -> None:
+    async def _accept(self) -> None:
         loop = asyncio.get_running_loop()
         while True:
             for _ in range(ACCEPT_BATCH):
                 try:
                     sock, address = await loop.sock_accept(self._listening)
                 except OSError as error:
-                    self._report(f"A connection could not be accepted: {error.strerror}.")
+                    self._report("A connection could not be accepted: %s.", error.strerror)
                     # A client that disconnected in the queue leaves room for the next.
                     if error.errno in NO_DESCRIPTOR_ERRORS:
                         self._make_room(self._maximum // 2)
                         await asyncio.sleep(BACK_OFF)
                     break
                 connection = _Connection(sock, (address[0], address[1]), loop.time())
-                connection.opening = asyncio.create_task(self._open(connection, protocol, tls))
-                self._wait(connection)
-                if len(self._waiting) > self._maximum:
-                    self._make_room(self._maximum)
+                if self._within_budget(connection):
+                    self._admit(connection)
+                    continue
+                timer = loop.call_later(FIRST_CHECK, self._judge, connection, GRACE)
+                self._surplus[connection] = timer
+                if len(self._surplus) > MAX_SURPLUS:
+                    self._judge(next(iter(self._surplus)))
             # An accept that returns at once does not yield to other tasks.
             await asyncio.sleep(0)
 
-    async def _open(
-        self,
-        connection: _Connection,
-        protocol: Callable[[], asyncio.Protocol],
-        tls: ssl.SSLContext | None,
-    ) -> None:
-        loop = asyncio.get_running_loop()
+    def _within_budget(self, connection: _Connection) -> bool:
+        """Count ``connection``; return whether its prefix, and all together, may open one more."""
+        t = connection.since
+        budget = self._budgets.pop(connection.prefix, None)
+        budget = self._budgets[connection.prefix] = budget or TokenBucket(
+            PREFIX_RATE, PREFIX_BURST, t
+        )
+        if len(self._budgets) > MAX_PREFIXES:
+            del self._budgets[next(iter(self._budgets))]
+        return budget.take(t) and self._budget.take(t)
+
+    def _judge(self, connection: _Connection, grace: float = 0.0) -> None:
+        """Open the surplus ``connection`` if it has sent something; else close it after ``grace``.
+
+        ``grace`` is in seconds.
+        """
+        self._surplus[connection].cancel()
+        sent = False
+        with suppress(OSError):
+            sent = connection.sock.recv(1, socket.MSG_PEEK) != b""
+        if not sent and grace > 0.0:
+            loop = asyncio.get_running_loop()
+            self._surplus[connection] = loop.call_later(grace, self._judge, connection)
+            return
+        del self._surplus[connection]
+        if sent:
+            self._admit(connection)
+        else:
+            host = connection.client[0]
+            self._report("Too many connections per second; closed a silent one of %s.", host)
+            connection.close()
+
+    def _admit(self, connection: _Connection) -> None:
+        connection.opening = asyncio.create_task(self._open(connection))
+        self._wait(connection)
+        if len(self._waiting) > self._maximum:
+            self._make_room(self._maximum)
+
+    async def _open(self, connection: _Connection) -> None:
+        loop, tls = asyncio.get_running_loop(), self._tls
         timeout = None if tls is None else WAITING_TIMEOUT
         with suppress(OSError):
             connection.transport, _ = await loop.connect_accepted_socket(
-                protocol, connection.sock, ssl=tls, ssl_handshake_timeout=timeout
+                self._protocol, connection.sock, ssl=tls, ssl_handshake_timeout=timeout
             )
 
     def _wait(self, connection: _Connection) -> None:
@@ -164,16 +240,16 @@ class Acceptor:
             del self._waiting[connection.client]
 
     def _make_room(self, maximum: int) -> None:
-        """Close the oldest connection of the commonest address if more than ``maximum`` wait."""
+        """Close the oldest connection of the commonest prefix if more than ``maximum`` wait."""
         for connection in tuple(self._waiting.values()):
             if not connection.open:
                 self._forget(connection)
         if len(self._waiting) <= maximum:
             return
-        peers = Counter(address for address, _ in self._waiting)
-        crowded, _ = peers.most_common(1)[0]
-        oldest = next(each for each in self._waiting.values() if each.client[0] == crowded)
-        self._report(f"Too many connections wait; closed the oldest of {crowded}.")
+        prefixes = Counter(connection.prefix for connection in self._waiting.values())
+        crowded, _ = prefixes.most_common(1)[0]
+        oldest = next(each for each in self._waiting.values() if each.prefix == crowded)
+        self._report("Too many connections wait; closed the oldest of %s.", oldest.client[0])
         self._forget(oldest)
         oldest.close()
 
@@ -202,10 +278,12 @@ class Acceptor:
                     elif t - connection.since > WAITING_TIMEOUT:
                         connection.close()
 
-    def _report(self, problem: str) -> None:
-        """Log ``problem``, but not more often than every ``LOG_EVERY``."""
+    def _report(self, problem: str, value: object) -> None:
+        """Log ``problem`` with its ``value``, but not more often than every ``LOG_EVERY``.
+
+        Addresses belong into ``value``: the times of thousands of texts would take long to keep.
+        """
         t = asyncio.get_running_loop().time()
         if t - self._logged.get(problem, -LOG_EVERY) >= LOG_EVERY:
-            self._logged = {key: at for key, at in self._logged.items() if t - at < LOG_EVERY}
             self._logged[problem] = t
-            log.warning("%s", problem)
+            log.warning(problem, value)

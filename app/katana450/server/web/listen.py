@@ -10,7 +10,9 @@ from ipaddress import ip_address
 from katana450.errors import ConfigurationError
 from katana450.platform_support import claim_port, raise_open_file_limit
 
-BACKLOG = 128
+BACKLOG = 1024
+"""Connections that wait to be accepted. The system drops one more, and the client tries again after
+a second."""
 
 MAX_PORT = 65535
 
