@@ -1,12 +1,13 @@
-"""Time of STOP by both paths, alone and under attack.
+"""Time of STOP by every path, alone and under attack.
 
     python -m benchmarks.stop
 
-The arm swings. A press goes by the driver's own websocket on the main port, and counts until a
-state that is stopped is received; the next press goes to the port of STOP as a new connection of a
-viewer, and counts until the answer ``confirmed``. The server requires access links. Driver and
-presser are in this process, the attackers in another one, the server in its own; all share the
-machine. A press that is not confirmed within 5 s counts as lost.
+The arm swings. Presses go by turns on four paths: the driver's own websocket on the main port,
+until a state that is stopped is received; the main port and the port of STOP, each as a new
+connection of a viewer, until the answer ``confirmed``; and all paths of the Python client at once,
+until the first confirms. The server requires access links. Driver and presser are in this process,
+the attackers in another one, the server in its own; all share the machine. A press that is not
+confirmed within 5 s counts as lost.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ import asyncio
 import json
 import math
 import secrets
+import socket
 import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
@@ -45,6 +48,12 @@ FLOODERS = 3
 
 UPLOADS = 40
 """Uploads that send one byte a second."""
+
+ADDRESSES = 10_000
+"""Addresses of this machine from which silent connections come."""
+
+CONNECTIONS, HELD = 1_000, 2_000
+"""Silent connections per second from these addresses, and how many are held open."""
 
 LINKS = 3
 """Access links that the attackers share: one link may have 32 websockets."""
@@ -79,6 +88,7 @@ def head(path: str, token: str, length: int = 0) -> bytes:
         "Host: localhost",
         f"Authorization: Bearer {token}",
         f"Content-Length: {length}",
+        "Connection: close",
     )
     return "\r\n".join((*lines, "", "")).encode()
 
@@ -154,6 +164,25 @@ async def drip(url: str, token: str) -> None:
         writer.transport.abort()
 
 
+async def connect_often(url: str) -> None:
+    """Open silent connections from many addresses, ``CONNECTIONS`` per second."""
+    server, held = address(url), deque[socket.socket]()
+    began, count = time.monotonic(), 0
+    while True:
+        while count < CONNECTIONS * (time.monotonic() - began):
+            high, low = divmod(count % ADDRESSES, 100)
+            silent = socket.socket()
+            silent.setblocking(False)
+            silent.bind((f"127.1.{1 + high}.{1 + low}", 0))
+            with suppress(BlockingIOError):
+                silent.connect(server)
+            held.append(silent)
+            count += 1
+            if len(held) > HELD:
+                held.popleft().close()
+        await asyncio.sleep(0.005)
+
+
 def many(number: int, of: Callable[[int], Awaitable[None]]) -> list[Awaitable[None]]:
     """Return ``number`` repeated works."""
     return [again(lambda n=n: of(n)) for n in range(number)]  # type: ignore[misc]
@@ -169,6 +198,8 @@ ATTACKS: dict[str, Attack] = {
     "alone": lambda *_: [],
     "silent": lambda url, *_: [keep_silent(url)],
     "silent at STOP": lambda _, stop_url, __: [keep_silent(stop_url)],
+    "addresses": lambda url, *_: [connect_often(url)],
+    "addresses at STOP": lambda _, stop_url, __: [connect_often(stop_url)],
     "branches": lambda url, _, links: many(
         ASKING, lambda n: send_often(url, _token(links, n), BRANCHES, ASKED)
     ),
@@ -182,10 +213,14 @@ ATTACKS: dict[str, Attack] = {
 }
 """Attacks by their names: works for the address of the server, that of STOP, and the links."""
 
+MANY_ADDRESSES = f"{CONNECTIONS:,} silent connections a second from {ADDRESSES:,} addresses"
+
 DESCRIPTIONS = {
     "alone": "none",
     "silent": f"{SILENT:,} silent connections, main port",
     "silent at STOP": f"{SILENT:,} silent connections, port of STOP",
+    "addresses": f"{MANY_ADDRESSES}, main port",
+    "addresses at STOP": f"{MANY_ADDRESSES}, port of STOP",
     "branches": f"{ASKING} programs that query the branches {ASKED:.0f} times a second each",
     "watchers": f"{WATCHERS} programs that receive {WATCHED:.0f} states a second each",
     "STOP flooders": f"{FLOODERS} clients that send STOP all the time, on both ports",
@@ -202,22 +237,38 @@ async def attack(name: str, url: str, stop_url: str, links: Links) -> None:
 # Measurement
 
 
-async def press_main(arm: AsyncClient, states: AsyncGenerator[answers.State, None]) -> float:
-    """Return the time from STOP on the driver's websocket until a stopped state arrives [s]."""
+async def press_main(
+    sending: Awaitable[object], states: AsyncGenerator[answers.State, None]
+) -> float:
+    """Return the time from ``sending`` a STOP until a state that is stopped arrives [s]."""
     await anext(states)
     began = time.perf_counter()
-    await arm.send(requests.Stop(press=secrets.token_hex(8)))
+    pressing = asyncio.ensure_future(sending)
     async for state in states:
         if state.stop == "confirmed":
             break
-    return time.perf_counter() - began
+    took = time.perf_counter() - began
+    await pressing
+    return took
+
+
+async def press_client(arm: AsyncClient) -> float:
+    """Return the time from STOP by ``arm`` until a path confirms it [s]; inf if none does."""
+    began = time.perf_counter()
+    stage = await arm.stop()
+    return time.perf_counter() - began if stage == "confirmed" else math.inf
+
+
+async def post_stop(url: str, token: str) -> bytes:
+    """Send STOP to a port on a new connection, and return the answer."""
+    async with posted(url, head("/api/v1/stop", token)) as reader:
+        return await reader.read()
 
 
 async def press_stop(stop_url: str, token: str) -> float:
     """Return the time from STOP to its port until the answer ``confirmed`` [s]; inf without it."""
     began = time.perf_counter()
-    async with posted(stop_url, head("/api/v1/stop", token)) as reader:
-        answer = await reader.read()
+    answer = await post_stop(stop_url, token)
     return time.perf_counter() - began if b'"confirmed"' in answer else math.inf
 
 
@@ -225,9 +276,17 @@ async def measure(
     name: str, url: str, stop_url: str, links: Links, presses: int
 ) -> dict[str, list[float]]:
     """Return the times of ``presses`` presses by each path [s]; inf for a lost one."""
-    found: dict[str, list[float]] = {"main": [], "stop": []}
     async with aconnect(url, "Driver", links.driver) as arm:
         states = arm.states(100.0)
+        paths: dict[str, Callable[[], Awaitable[float]]] = {
+            "main, websocket": lambda: press_main(
+                arm.send(requests.Stop(press=secrets.token_hex(8))), states
+            ),
+            "main, new connection": lambda: press_main(post_stop(url, links.presser), states),
+            "port of STOP": lambda: press_stop(stop_url, links.presser),
+            "client": lambda: press_client(arm),
+        }
+        found: dict[str, list[float]] = {path: [] for path in paths}
         swinging = asyncio.create_task(swing(arm))
         await asyncio.sleep(1.0)
         for _ in range(presses):
@@ -239,11 +298,8 @@ async def measure(
                 await asyncio.sleep(SWING_SECONDS)
                 try:
                     async with asyncio.timeout(LOST):
-                        if path == "main":
-                            times.append(await press_main(arm, states))
-                        else:
-                            times.append(await press_stop(stop_url, links.presser))
-                except (TimeoutError, OSError, KatanaError):
+                        times.append(await paths[path]())
+                except (TimeoutError, OSError, EOFError, KatanaError):
                     times.append(math.inf)
                     # A generator ends with its timeout.
                     states = arm.states(100.0)
