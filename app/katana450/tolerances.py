@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 # [1] Maximum deviation from orthonormal (largest entry of R^T R - I) of a matrix that is accepted
-# as a rotation. Single-precision numbers and rounded text pass; a scale or a shear does not.
-ROTATION_INPUT: Final = 1e-6
-
-# [1] The same for a matrix that a person or another program printed with four decimals or more,
-# whose rounding is at most 1.8e-4. Used only where requests arrive.
-ROTATION_PRINTED: Final = 1e-3
+# as a rotation. A matrix printed with four decimals, whose rounding is at most 1.8e-4, passes; a
+# scale or a shear does not.
+ROTATION_INPUT: Final = 1e-3
 
 # [1] Deviation from orthonormal (root mean square of six misfits) of a product of a few rotations
 # in double precision. Orthonormalising it would only replace this rounding by another.

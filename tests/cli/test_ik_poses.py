@@ -123,3 +123,19 @@ def test_nearest_is_inside_the_limits_and_names_the_binding_one(arm: MountedArm)
     assert "axis 5 at its limit" in found["reason"]
     (plain,) = ask("ik", [{"T": T.tolist()}])
     assert "nearest" not in plain
+
+
+def test_units_of_people_are_asked_about(arm: MountedArm) -> None:
+    T = forward(arm.chain, np.array([0.2, -0.4, 0.6, 0.3, 0.1]))
+    T[:3, 3] *= 1e3
+    p = [0.3, 0.0, 0.1]
+    requests: list[dict[str, Any]] = [
+        {"T": T.tolist()},
+        {"p": T[:3, 3].tolist(), "wxyz": [1.0, 0.0, 0.0, 0.0]},
+        {"p": p, "rpy": [0.0, 45.0, 0.0]},
+        {"p": p, "pitch": 45.0, "roll": 0.0},
+        {"p": p, "pitch": 0.8, "roll": 0.0},
+    ]
+    units = ("metres", "metres", "radians", "radians")
+    for answer, unit in zip(ask("ik", requests), units, strict=False):
+        assert f"Did you mean {unit}?" in answer["error"]

@@ -19,7 +19,7 @@ from tests.kinematics.targets import targets
 
 ROUNDING = 1e-8
 
-BESIDE_THE_GAP = se3.printed(
+BESIDE_THE_GAP = se3.validated(
     [
         [-0.0559, -0.1403, -0.9885, -0.5313],
         [-0.2657, -0.9523, 0.1502, 0.0546],

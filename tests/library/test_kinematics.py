@@ -185,3 +185,39 @@ def test_other_mechanisms_and_tools_are_refused(
 ) -> None:
     with pytest.raises(katana450.RobotDescriptionError, match=message):
         katana450.load(file, tool)
+
+
+@pytest.mark.parametrize("decimals", [4, 6])
+def test_printed_pose_is_solved_and_its_misfit_is_stated(arm: katana450.Arm, decimals: int) -> None:
+    poses = arm.fk(postures(arm, 20))
+    printed = poses.round(decimals)
+    feasible = 0
+    for T, text in zip(poses, printed, strict=True):
+        found = arm.ik(text)
+        assert isinstance(found.rotation_misfit, float)
+        assert 0.0 < found.rotation_misfit <= 2.0 * 10.0**-decimals
+        assert arm.nearest(text).position_error < 2.0 * 10.0**-decimals
+        assert arm.ik(T).rotation_misfit < 1e-14
+        feasible += bool(found.feasible)
+    assert feasible >= 18
+    misfits = arm.ik(printed).rotation_misfit
+    np.testing.assert_array_equal(misfits, [arm.ik(each).rotation_misfit for each in printed])
+
+
+def test_pose_in_millimetres_is_asked_about(arm: katana450.Arm) -> None:
+    T = arm.fk(Q)
+    T[:3, 3] *= 1e3
+    asks = (
+        lambda: arm.ik(T),
+        lambda: arm.ik(np.stack((arm.fk(Q), T))),
+        lambda: arm.nearest(T),
+        lambda: arm.plan(T),
+    )
+    for ask in asks:
+        with pytest.raises(katana450.InputError, match="Did you mean metres"):
+            ask()
+
+
+def test_angle_in_degrees_is_asked_about(arm: katana450.Arm) -> None:
+    with pytest.raises(katana450.InputError, match=r"Did you mean radians\? 30 deg are 0.5236 rad"):
+        arm.line(pitch=30.0)

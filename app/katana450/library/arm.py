@@ -152,7 +152,7 @@ class Arm:
                 and joints that the pose leaves free, are put nearest to it.
 
         Raises:
-            InputError: another shape, NaN, or a matrix that is no pose.
+            InputError: another shape, NaN, a matrix that is no pose, or a pose in millimetres.
 
         Source: the paper's eq. (12) to (29).
 

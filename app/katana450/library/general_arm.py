@@ -22,10 +22,12 @@ from katana450.library.arm import Arm, Priority
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
+from katana450.maths.kinematics.pose_units import check_metres
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -113,9 +115,11 @@ class GeneralArm(Arm):
                 "Other priorities than 'pose', and one branch, are for five-axis arms. This arm "
                 "takes T and q_hint; `ik` returns its branches."
             )
+        pose = se3.validated(self.pose_frame.to_shoulder(T))
+        check_metres(self.chain, pose[:3, 3].tolist())
         best = nearest_posture(
             self.described.kinematics,
-            self.pose_frame.to_shoulder(T),
+            pose,
             q_hint=q_hint,
             within_limits=within_limits,
         )

@@ -10,8 +10,10 @@ from katana450.arm.control.findings import of_projection
 from katana450.arm.control.messages import REASONS
 from katana450.errors import InputError
 from katana450.library.pose_frame import PoseFrame
+from katana450.maths.geometry import se3
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.pose_units import check_metres
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 
@@ -55,10 +57,11 @@ def nearest(
     if priority not in PRIORITIES:
         known = ", ".join(PRIORITIES)
         raise InputError(f"There is no priority {priority!r}; choose from {known}.")
-    chosen = PRIORITIES[priority]
+    chosen, pose = PRIORITIES[priority], se3.validated(frame.to_shoulder(T))
+    check_metres(chain, pose[:3, 3].tolist())
     best = project(
         chain,
-        frame.to_shoulder(T),
+        pose,
         branch=None if branch is None else Branch.parse(str(branch)),
         within_limits=within_limits,
         q_hint=q_hint,

@@ -19,6 +19,7 @@ from katana450.extensions.programs.tool_moves import ArcGeometry, Circle, Line
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
 from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.pose_units import check_radians
 from katana450.maths.planning.plan import Plan
 
 if TYPE_CHECKING:
@@ -148,7 +149,9 @@ def _number(value: float, name: str) -> float:
 
 def _checked(angles: Sequence[float | str | None]) -> Angles:
     """Return pitch, roll and yaw as floats. Raises InputError, which names a wrong one."""
-    return Angles(*map(_angle, angles, Angles._fields))
+    checked = Angles(*map(_angle, angles, Angles._fields))
+    check_radians((each for each in checked if each is not None), "The orientation")
+    return checked
 
 
 def _angle(value: float | str | None, name: str) -> float | None:

@@ -15,7 +15,7 @@ from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jacobian
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
@@ -77,11 +77,10 @@ def nearest_posture(
     hint the one with the most room to the limits. If none takes it, the position counts first, then
     the orientation. Raises InputError for an invalid `T` or `q_hint`.
     """
-    chain = kinematics.chain
+    chain, target = kinematics.chain, se3.validated(T)
     found = kinematics.inverse(T, q_hint)
     usable = [each for each in found if each.within_limits or not within_limits]
     exact = [each for each in usable if each.exact]
-    target = se3.validated(T)
     if exact:
         hint = None if q_hint is None else chain.check_q(q_hint)
         best = min(exact, key=lambda each: _cost(chain, each.q, hint))
@@ -155,8 +154,7 @@ def is_out_of_reach(chain: Chain, q: FloatArray, reached: FloatArray, target: Fl
     The target is farther away than their lengths, or no small motion from `q` (n,) [rad] inside the
     limits brings the tool point clearly nearer.
     """
-    links = _search(chain).links
-    if math.dist(links.T_S_1[:3, 3], target[:3, 3]) > links.reach:
+    if math.dist(screws.point_on(chain.S[:, 0]), target[:3, 3]) > chain.reach:
         return True
     J = jacobian_space(chain, q)
     v = J[3:] + np.cross(J[:3], reached[:3, 3], axis=0)

@@ -14,6 +14,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.pose_units import check_metres, check_radians
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
 
@@ -41,14 +42,23 @@ def requested_pose(
 
     The forms are ``T``, or ``p`` with ``wxyz``, ``xyzw``, ``rpy`` or with ``pitch`` and ``roll``.
     Pitch and roll are those of the arm's plane, so they have no yaw: of the planes of both
-    shoulders the one that comes nearer is taken. Raises InputError with the key at fault.
+    shoulders the one that comes nearer is taken. Raises InputError with the key at fault, also for
+    numbers that seem to be millimetres or degrees.
     """
+    pose = _requested(request, chain, T_frame_shoulder)
+    check_metres(chain, pose.T[:3, 3].tolist())
+    return pose
+
+
+def _requested(
+    request: Mapping[str, Any], chain: Chain, T_frame_shoulder: FloatArray
+) -> RequestedPose:
     given = [key for key in ("T", *QUATERNIONS, "rpy", "pitch", "roll") if key in request]
     if given == ["T"] and "p" not in request:
         T = numbers(request, "T", 2)
-        printed = se3.printed(T, "T")
+        pose = se3.validated(T, "T")
         misfit = so3.misfit(np.array(T)[:3, :3])
-        return RequestedPose(se3.inverse(T_frame_shoulder) @ printed, misfit)
+        return RequestedPose(se3.inverse(T_frame_shoulder) @ pose, misfit)
     if not given and "p" not in request:
         raise InputError("The key 'T' is missing, or 'p' with an orientation.")
     if given not in (["wxyz"], ["xyzw"], ["rpy"], ["pitch", "roll"]) or "p" not in request:
@@ -61,6 +71,7 @@ def requested_pose(
         pitch, roll = (float(numbers(request, key, 0)) for key in given)
         if not (math.isfinite(pitch) and math.isfinite(roll)):
             raise InputError("pitch and roll must be finite numbers.")
+        check_radians((pitch, roll), "The pose")
         position = (se3.inverse(T_frame_shoulder) @ np.append(p, 1.0))[:3]
         target = ToolTarget(position, pitch, roll)
         poses = [target.pose(chain, target.facing(chain, each, 0.0)) for each in BRANCHES[::2]]
@@ -80,6 +91,7 @@ def _rotation(request: Mapping[str, Any], key: str) -> tuple[FloatArray, float]:
     """Return the rotation (3, 3) of ``key``, and the deviation of a quaternion from length 1."""
     if key == "rpy":
         roll, pitch, yaw = finite_array(numbers(request, key, 1), (3,), key).tolist()
+        check_radians((roll, pitch, yaw), key)
         return so3.from_rpy(roll, pitch, yaw), 0.0
     q = finite_array(numbers(request, key, 1), (4,), key)
     length = math.hypot(*q.tolist())

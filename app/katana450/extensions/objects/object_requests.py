@@ -61,7 +61,7 @@ class ObjectRequests(RequestHandler):
             table = arm.environment.table_height
             T = free_place(scene_object, arm.state.objects, table, near=request.near)
         else:
-            T = se3.printed(request.T, f"The pose of {request.name!r}")
+            T = se3.validated(request.T, f"The pose of {request.name!r}")
             if request.frame is requests.Frame.SHOULDER:
                 T = arm.arm.T_base_shoulder @ T
         if scene_object.fixed:
@@ -129,7 +129,7 @@ class ObjectRequests(RequestHandler):
             return cmd.Attach(request.name, to)
         if to is not Attachment.HAND:
             raise InputError("`T` is a pose on the hand. Use `place` for a pose elsewhere.")
-        T = hand.T_palm_tool @ se3.printed(request.T)
+        T = hand.T_palm_tool @ se3.validated(request.T)
         return cmd.PlaceObject(replace(scene_object, T=T, fixed=True))
 
     def _known(self, name: str) -> SceneObject | None:

@@ -96,28 +96,16 @@ def log(T: FloatArray) -> FloatArray:
     return np.concatenate((w, p - 0.5 * Wp + c * (W @ Wp)))
 
 
-def validated(
-    T: npt.ArrayLike, name: str = "The pose", tolerance: float = tolerances.ROTATION_INPUT
-) -> FloatArray:
-    """Return a clean copy of the pose `T` (4, 4): rotation made orthonormal, last row exact.
+def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
+    """Return a clean copy of the pose `T` (4, 4): the nearest rotation, last row exact.
 
     Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, it is
-    too far away to be computed with, or `so3.misfit` of its rotation exceeds ``tolerance``.
+    too far away to be computed with, or `so3.misfit` of its rotation exceeds ROTATION_INPUT.
     """
-    return np.array(validated_rows(T, name, tolerance))
+    return np.array(validated_rows(T, name))
 
 
-def printed(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
-    """Return the pose that was printed as `T` (4, 4) with four decimals or more.
-
-    Its rotation is the one nearest to the printed numbers. Raises InputError as `validated`.
-    """
-    return validated(T, name, tolerances.ROTATION_PRINTED)
-
-
-def validated_rows(
-    T: npt.ArrayLike, name: str = "The pose", tolerance: float = tolerances.ROTATION_INPUT
-) -> Rows:
+def validated_rows(T: npt.ArrayLike, name: str = "The pose") -> Rows:
     """Return the result of `validated` as nested lists of floats."""
     if type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
         rows: Rows = T.tolist()
@@ -134,7 +122,7 @@ def validated_rows(
         )
     # A name of one letter is a symbol and keeps its case.
     label = name if len(name) == 1 else name[:1].lower() + name[1:]
-    R = so3.validated(M[:3, :3], f"The rotation of {label}", tolerance)
+    R = so3.validated(M[:3, :3], f"The rotation of {label}")
     clean: Rows = from_rotation_translation(R, M[:3, 3]).tolist()
     return clean
 

@@ -168,21 +168,19 @@ def misfit(R: npt.ArrayLike) -> float:
         return float(np.abs(M.T @ M - np.eye(3)).max())
 
 
-def validated(
-    R: npt.ArrayLike, name: str = "The rotation", tolerance: float = tolerances.ROTATION_INPUT
-) -> FloatArray:
+def validated(R: npt.ArrayLike, name: str = "The rotation") -> FloatArray:
     """Return the rotation nearest to `R` (3, 3), as a copy.
 
     Raises InputError when `R` is not finite, has another shape, or its `misfit` exceeds
-    ``tolerance``; the default allows for single-precision rounding.
+    ROTATION_INPUT.
     """
     M = finite_array(R, (3, 3), name)
     off = misfit(M)
     # An overflow gives infinity or NaN.
-    if not off <= tolerance:
+    if not off <= tolerances.ROTATION_INPUT:
         raise InputError(
             f"{name} is not a rotation: its columns are off orthonormal by {off:.2g} "
-            f"(allowed: {tolerance:.0e}); remove scale and shear from it."
+            f"(allowed: {tolerances.ROTATION_INPUT:.0e}); remove scale and shear from it."
         )
     U, _, Vt = np.linalg.svd(M)
     nearest: FloatArray = U @ Vt

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
+from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
@@ -89,6 +91,16 @@ class Chain:
     def n(self) -> int:
         """The number of joints."""
         return len(self.names)
+
+    @cached_property
+    def reach(self) -> float:
+        """An upper bound [m] on the distance of the tool point from the start of axis 1."""
+        point, length = screws.point_on(self.S[:, 0]), 0.0
+        for S in self.S.T[1:]:
+            before, on_axis = point, screws.point_on(S)
+            point = on_axis + S[:3] * float(S[:3] @ (before - on_axis))
+            length += math.dist(before, point)
+        return length + math.dist(point, self.M[:3, 3])
 
     def with_tool(self, M: npt.ArrayLike) -> Chain:
         """Return the same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""

@@ -9,7 +9,6 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.lease import Role
@@ -166,11 +165,11 @@ class Dispatcher:
         """Return the command of ``request``; None for a request about the lease."""
         match request:
             case requests.Pose(T=T, frame=frame):
-                return cmd.SetPose(self._in_shoulder(frame) @ se3.printed(T))
+                return cmd.SetPose(self._in_shoulder(frame) @ se3.validated(T))
             case requests.Position(p=p, frame=frame):
                 return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
             case requests.Orient(R=R, frame=frame):
-                rotation = so3.validated(np.array(R), tolerance=tolerances.ROTATION_PRINTED)
+                rotation = so3.validated(np.array(R))
                 return cmd.OrientTool(self._in_shoulder(frame)[:3, :3] @ rotation)
             case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
                 name = name or f"{shoulder}-{elbow}"
