@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, fromstring, tostring
+from xml.etree.ElementTree import Element, SubElement, fromstring
 
 import numpy as np
 
 from katana450.arm.robot.description import explained
 from katana450.arm.robot.urdf import urdf_of
-from katana450.arm.robot.visual import mesh_file
 from katana450.assembly.robot_files import read_urdf
-from katana450.atomic import write_files, writer_of
-from katana450.errors import ConfigurationError, RobotDescriptionError
+from katana450.errors import RobotDescriptionError
+from katana450.extensions.derived_urdf import derived_urdf
 from katana450.extensions.loops.closure import KINDS, JointLoop, closures
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.platform_support import cache_folder
 
 
 def solved_file(path: Path) -> Path:
@@ -38,19 +35,7 @@ def solved_file(path: Path) -> Path:
         if follower is not None:
             factor, offset = repr(follower.factor), repr(follower.offset)
             SubElement(joint, "mimic", joint=follower.driver, multiplier=factor, offset=offset)
-    for mesh in root.iter("mesh"):
-        # The file lies outside its folder.
-        mesh.set("filename", f"file://{mesh_file(mesh.attrib['filename'], path.parent)}")
-    content = tostring(root)
-    digest = hashlib.sha256(content).hexdigest()[:12]
-    file = cache_folder() / "katana450-loops" / f"{path.stem}-{digest}.urdf"
-    if not file.is_file():
-        try:
-            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        except OSError as error:
-            raise ConfigurationError(f"{file} cannot be written: {error.strerror}.") from error
-        write_files({file: writer_of(content)}, 0o600)
-    return file
+    return derived_urdf(root, path, "loops")
 
 
 def _loop(element: Element, links: set[str], path: Path) -> JointLoop:
