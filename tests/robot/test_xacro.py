@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 import katana450
 from katana450.arm.robot.loader import load
@@ -116,6 +117,40 @@ def test_every_command_takes_xacro(
     capsys.readouterr()
 
 
+def test_arguments_without_default_are_given_by_options(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The argument names an included file, whose meshes are in the package."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    package = tmp_path / "pack"
+    (package / "urdf").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>pack</name></package>")
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(package / "part.stl")
+    (package / "urdf/small.xacro").write_text(
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><link name="$(arg root)"><visual>'
+        '<geometry><mesh filename="package://pack/part.stl"/></geometry></visual></link></robot>'
+    )
+    path = package / "urdf/args.urdf.xacro"
+    path.write_text(
+        '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">'
+        '<xacro:include filename="$(find pack)/urdf/$(arg model).xacro"/></robot>'
+    )
+    monkeypatch.chdir(path.parent)
+    command = ["export", "vrml", "--urdf", path.name, "--out", str(tmp_path / "out")]
+    given = ["--xacro-arg", "model:=small", "--xacro-arg", "root:=base"]
+    assert main([*command, *given]) == 0
+    text = (tmp_path / "out/r.wrl").read_text()
+    assert "base" in text
+    assert "IndexedFaceSet" in text
+    capsys.readouterr()
+    assert main([*command, *given[:2]]) == 1
+    assert "--xacro-arg root:=VALUE" in capsys.readouterr().err
+    plain = tmp_path / "plain.urdf"
+    plain.write_text('<robot name="r"><link name="base"/></robot>')
+    assert main(["export", "vrml", "--urdf", str(plain), "--out", str(tmp_path), *given]) == 1
+    assert "is not in xacro" in capsys.readouterr().err
+
+
 def test_a_file_without_the_suffix_is_expanded_too(tmp_path: Path) -> None:
     path = templated(tmp_path, '<xacro:property name="far" value="0.2"/>', name="arm.urdf")
     text = path.read_text().replace('xyz="0.05 0.0 0.15"', 'xyz="${far / 4} 0 0.15"')
@@ -148,7 +183,7 @@ def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
         ('<xacro:include filename="lost.xacro"/>', r"line 2: .*lost\.xacro cannot be opened"),
         (
             '<link name="$(arg side)"/>',
-            "line 2: .*'side' has no value.* xacro arm.urdf.xacro side:=",
+            "line 2: .*'side' has no value.* --xacro-arg side:=VALUE",
         ),
         ('<link name="$(env HOME)"/>', "line 2: .*no environment variable 'HOME' of ROS"),
         ('<link name="$(eval 1 +)"/>', "line 2: .*syntax"),

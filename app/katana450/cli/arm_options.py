@@ -27,10 +27,25 @@ def add_arm_options(
         help="another robot; `serve` drives the tool of an arm, and any other tree joint by joint "
         "(default: the Katana450)",
     )
+    parser.add_argument(
+        "--xacro-arg",
+        type=_assignment,
+        action="append",
+        metavar="NAME:=VALUE",
+        help="value of an argument of the xacro file that --urdf names; can be repeated",
+    )
     if tool:
         parser.add_argument(
             "--tool", metavar="LINK", help="link to which targets refer (default: the last one)"
         )
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    """Return name and value in NAME:=VALUE. Raises ArgumentTypeError for any other text."""
+    name, sign, value = text.partition(":=")
+    if not (name and sign):
+        raise argparse.ArgumentTypeError(f"NAME:=VALUE is expected, such as model:=small: {text!r}")
+    return name, value
 
 
 def _name(text: str) -> str:

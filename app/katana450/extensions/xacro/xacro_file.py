@@ -7,9 +7,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from xml.etree.ElementTree import fromstring
 
-from katana450.errors import RobotDescriptionError
+from katana450.arm.robot.description import checked
+from katana450.errors import ConfigurationError, RobotDescriptionError
+from katana450.extensions.derived_urdf import derived_urdf
 
 SECONDS = 10.0
 """[s] Timeout of expanding a file."""
@@ -78,6 +82,17 @@ def expanded(path: Path, arguments: Mapping[str, str] | None = None) -> bytes:
     where = str(path) if answer["file"] is None else f"{path}: {answer['file']}"
     line = "" if answer["line"] is None else f", line {answer['line']}"
     raise RobotDescriptionError(f"{where}{line}: this cannot be expanded: {answer['what']}.")
+
+
+def expanded_file(path: Path, arguments: Mapping[str, str]) -> Path:
+    """Return a file with the URDF that the xacro file at ``path`` describes with ``arguments``.
+
+    Raises RobotDescriptionError, and ConfigurationError for a file that is not in xacro.
+    """
+    data = checked(path, partial(expanded, arguments=arguments))
+    if b"xacro" not in path.read_bytes():
+        raise ConfigurationError(f"{path} is not in xacro. Leave --xacro-arg out.")
+    return derived_urdf(fromstring(data), path, "xacro")
 
 
 def _too_large(path: Path) -> RobotDescriptionError:

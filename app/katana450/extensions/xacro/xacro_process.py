@@ -137,8 +137,8 @@ class Expansion:
             return args[name]
         self._at_fault = f"arg {name}"
         raise _FaultError(
-            f"the argument {name!r} has no value and no default. Expand the file with a value: "
-            f"xacro {self._path.name} {name}:=VALUE > robot.urdf"
+            f"the argument {name!r} has no value and no default. Give it one with "
+            f"--xacro-arg {name}:=VALUE"
         )
 
     def _eval_env(self, name: str) -> str:
