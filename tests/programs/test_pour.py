@@ -36,6 +36,7 @@ def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
     run, states = stage.play(program, stage.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
     end, pouring = states[-1], stage.session.pouring
+    assert end.t == pytest.approx(program.duration, abs=0.03 * len(program.tasks))
     assert end.poured is not None
     found = score(end.poured.water, end.poured.course)
     # A film of water stays on the wall of the cup.

@@ -151,20 +151,22 @@ def _print_tasks(program: Program) -> None:
     Where alternatives begin and where they meet is printed between them.
     """
     labels = _labels(program)
+    times = {task.number: task.end - task.begin for task in program.schedule}
     for number, task in enumerate(program.tasks):
         if number in labels:
             print(f"-- {', '.join(labels[number])}")
         details = ""
         if isinstance(task.action, FollowPlan):
             plan = task.action.plan
-            details = f"{plan.duration:.2f} s, {1e3 * plan.length:.0f} mm"
+            seconds = times.get(number, plan.duration)
+            details = f"{seconds:.2f} s, {1e3 * plan.length:.0f} mm"
             if plan.nearest is not None:
                 one, other = map(part, plan.nearest.contact.parts)
                 apart = 1e3 * plan.nearest.contact.distance
                 details += f", {apart:.0f} mm from {one} to {other}"
         print(f"line {task.line:>4}  {task.name:<24} {details}".rstrip())
     longest = "at most " if program.alternatives else ""
-    print(f"{program.steps} steps, {longest}{program.duration:.2f} s of motion at full speed.")
+    print(f"{program.steps} steps, {longest}about {program.duration:.2f} s.")
 
 
 def _labels(program: Program) -> dict[int, list[str]]:

@@ -45,10 +45,9 @@ class FollowPlan:
     plan: Plan
     tau: float = 0.0
 
-    @property
-    def duration(self) -> float:
-        """The duration [s] at full speed, without the part before ``tau``."""
-        return self.plan.duration * (1.0 - self.tau / self.plan.span)
+    def duration_at(self, speed: float) -> float:
+        """Return the duration [s] at ``speed``, 1 for full, without the part before ``tau``."""
+        return self.plan.duration_at(speed) * (1.0 - self.tau / self.plan.span)
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command to follow the plan."""
@@ -74,11 +73,13 @@ class FollowPlan:
 class MoveFingers:
     """Drive the fingers to ``angle`` [rad].
 
-    ``holding``: name of the object that they must hold then; "" if they may be empty.
+    ``holding``: name of the object that they must hold then; "" if they may be empty. ``seconds``:
+    expected duration [s].
     """
 
     angle: float
     holding: str = ""
+    seconds: float = 0.0
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that sets the finger angle."""
@@ -207,6 +208,19 @@ class SetSpeed:
     def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
         """Return 1: the speed applies at once."""
         return 1.0
+
+
+def expected_time(action: Action, speed: float) -> float:
+    """Return the expected duration [s] of ``action`` at ``speed``, a fraction of full speed.
+
+    It is 0 for an action that waits for a condition, because nobody knows when it holds.
+    """
+    match action:
+        case FollowPlan():
+            return action.duration_at(speed)
+        case MoveFingers(seconds=seconds) | Wait(seconds=seconds):
+            return seconds
+    return 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from katana450.arm.control.scene_objects import SceneObject, named
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.actions import Action, FollowPlan, MoveFingers
 from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.hand_choice import hand_of
 from katana450.extensions.programs.hand_planning import HandPlanning
@@ -216,6 +216,9 @@ class PlanBuilder:
 
     def note(self, name: str, action: Action | UntimedPath, state: State) -> None:
         """Append ``action``, which leads to ``state``."""
+        if isinstance(action, MoveFingers):
+            turn = abs(state.gripper_setpoint - self.state.gripper_setpoint)
+            action = replace(action, seconds=turn / self.plan_context.arm.gripper.speed)
         self.actions.append((name, action))
         self.state = state
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task, Wait
+from katana450.extensions.programs.actions import SetSpeed, Task, expected_time
 from katana450.extensions.programs.compiler import Compiler, Report
 from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.conditions import ProgramTime
@@ -39,6 +39,21 @@ class Alternatives(NamedTuple):
     number: int
     otherwise: int
     end: int
+
+
+class ExpectedTask(NamedTuple):
+    """A task of the predicted run: its index, and when it begins and ends at which speed.
+
+    Attributes:
+        number: its index.
+        begin, end: expected times since the run began [s].
+        speed: fraction of full speed.
+    """
+
+    number: int
+    begin: float
+    end: float
+    speed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,33 +101,53 @@ class Program:
 
     @cached_property
     def duration(self) -> float:
-        """Duration of all motions at full speed [s], of the longest possible run."""
-        latest = {self.first: 0.0}
-        for number, task in enumerate(self.tasks):
-            if number not in latest:
-                # It is done, or belongs to an alternative that is not taken.
-                continue
-            action = task.action
-            end = latest[number] + (action.duration if isinstance(action, FollowPlan) else 0.0)
-            for following in self.next(number):
-                latest[following] = max(latest.get(following, 0.0), end)
-        return latest[len(self.tasks)]
+        """Expected duration [s] of the longest possible run, at the speeds of the program."""
+        return self.time_from(self.first, 1.0)
 
-    @cached_property
+    def time_from(
+        self, number: int, speed: float, left: float | None = None, allowed: float = 1.0
+    ) -> float:
+        """Return the expected time [s] from the task ``number`` to the end, of the longest run.
+
+        This is the one clock of a program: of its preview, its list of steps and its time left.
+
+        Args:
+            number: index of the task.
+            speed: fraction of full speed, until a task sets another.
+            left: expected time to the end of the task itself [s], if it has begun.
+            allowed: maximum fraction of full speed that a task may set.
+        """
+        latest = {number: (0.0, speed)}
+        for index in range(number, len(self.tasks)):
+            if index not in latest:
+                # It belongs to an alternative that is not taken.
+                continue
+            end, speed = latest[index]
+            action = self.tasks[index].action
+            if isinstance(action, SetSpeed):
+                speed = min(action.scale(self.speed), allowed)
+            end += expected_time(action, speed) if left is None or index > number else left
+            for following in self.next(index):
+                if following not in latest or end > latest[following][0]:
+                    latest[following] = end, speed
+        return latest[len(self.tasks)][0]
+
+    @property
     def predicted(self) -> tuple[int, ...]:
         """The tasks that are executed if all is as predicted, in their order."""
-        found: list[int] = []
+        return tuple(each.number for each in self.schedule)
+
+    @cached_property
+    def schedule(self) -> tuple[ExpectedTask, ...]:
+        """The predicted tasks in their order, with their expected times."""
+        found: list[ExpectedTask] = []
         number, elapsed, speed = self.first, 0.0, self.speed
         while number < len(self.tasks):
-            found.append(number)
             action = self.tasks[number].action
-            match action:
-                case SetSpeed():
-                    speed = action.scale(self.speed)
-                case FollowPlan():
-                    elapsed += action.duration / speed
-                case Wait(seconds=seconds):
-                    elapsed += seconds
+            if isinstance(action, SetSpeed):
+                speed = action.scale(self.speed)
+            begin, elapsed = elapsed, elapsed + expected_time(action, speed)
+            found.append(ExpectedTask(number, begin, elapsed, speed))
             if isinstance(action, ConditionalJump):
                 holds = action.predicted
                 if isinstance(action.condition, ProgramTime):

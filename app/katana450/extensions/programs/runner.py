@@ -9,7 +9,12 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import finding_text, part
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan, SetSpeed, Wait
+from katana450.extensions.programs.actions import (
+    ACTION_TIMEOUT,
+    FollowPlan,
+    SetSpeed,
+    expected_time,
+)
 from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.grip_until import CloseUntil
 from katana450.extensions.programs.program import Program
@@ -148,31 +153,25 @@ def _tau(program: Program, run: Run, state: State) -> float:
 
 
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
-    """Return the approximate time until ``run`` ends [s], without pauses and finger motions.
+    """Return the expected time until ``run`` ends [s], without pauses and awaited conditions.
 
     Of alternatives the longer one counts. ``allowed`` is the maximum fraction of full speed for the
     tasks to come.
     """
     if run.phase is not Phase.RUNNING:
         return 0.0
-    latest = {run.number: (0.0, state.speed)}
-    for number in range(run.number, len(program.tasks)):
-        if number not in latest:
-            continue
-        left, speed = latest[number]
-        action = program.tasks[number].action
-        begun = run.started and number == run.number
-        rest = 1.0 - action.fraction(state, run.waited) if begun else 1.0
-        if isinstance(action, SetSpeed):
-            speed = min(action.scale(program.speed), allowed)
-        elif isinstance(action, FollowPlan):
-            left += (rest * action.plan.duration if begun else action.duration) / speed
-        elif isinstance(action, Wait):
-            left += rest * action.seconds
-        for following in program.next(number):
-            if following not in latest or left > latest[following][0]:
-                latest[following] = left, speed
-    return latest[len(program.tasks)][0]
+    if not run.started:
+        # A command for the speed may still be on its way to the arm.
+        speed = min(run.speed.scale(program.speed), allowed)
+        return program.time_from(run.number, speed, allowed=allowed)
+    action, speed = program.tasks[run.number].action, state.speed
+    left = expected_time(action, speed)
+    if isinstance(action, FollowPlan):
+        rest = 1.0 - action.fraction(state, run.waited)
+        left = min(left, rest * action.plan.duration_at(speed))
+    else:
+        left = max(left - run.waited, 0.0)
+    return program.time_from(run.number, speed, left, allowed)
 
 
 def skipped(program: Program, run: Run) -> tuple[int, ...]:

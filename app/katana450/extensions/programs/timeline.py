@@ -5,7 +5,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
 from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.program import ExpectedTask, Program
+from katana450.extensions.programs.runner import Run
 from katana450.extensions.programs.simulation import follow_exactly, simulated
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion
@@ -31,75 +31,91 @@ TAU_SAMPLES = 65
 """Number of points at which the place on a segment is tabulated by time."""
 
 
-@dataclass(frozen=True, eq=False)
-class Timeline:
-    """The motions of a program at full speed, on one clock.
-
-    Pauses between the motions, such as for the gripper, are left out. Of two alternatives it has
-    the predicted one.
+class Piece(NamedTuple):
+    """A segment of a plan on the timeline.
 
     Attributes:
-        pieces: segments in their order, each with its finger joint [rad].
-        begins: start times of the segments and the end of the last [s].
-        firsts: index of the first segment of each task of the predicted run, by the index of the
-            task; of tasks without motion, that of the next segment.
+        begin: time at which it begins [s].
+        speed: fraction of full speed.
+        segment: the segment.
+        fingers: the finger joint [rad].
     """
 
-    pieces: tuple[tuple[Segment, float], ...]
-    begins: tuple[float, ...]
+    begin: float
+    speed: float
+    segment: Segment
+    fingers: float
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """The motions of a program on the clock of its schedule: at its speeds, with its waits.
+
+    Of two alternatives it has the predicted one.
+
+    Attributes:
+        pieces: the segments in their order. Between them the arm rests.
+        firsts: index of the first segment of each task with a motion, by the index of the task.
+        schedule: the tasks of the predicted run, by their index.
+        span: the duration [s].
+    """
+
+    pieces: tuple[Piece, ...]
     firsts: Mapping[int, int]
+    schedule: Mapping[int, ExpectedTask]
+    span: float
 
     @staticmethod
     def of(program: Program) -> Timeline:
         """Return the timeline of ``program``."""
-        pieces: list[tuple[Segment, float]] = []
+        pieces: list[Piece] = []
         firsts: dict[int, int] = {}
-        for number in program.predicted:
-            firsts[number] = len(pieces)
-            action = program.tasks[number].action
+        for task in program.schedule:
+            action, begin = program.tasks[task.number].action, task.begin
             if isinstance(action, FollowPlan):
-                plan = action.plan
-                pieces += [(segment, plan.fingers) for segment in plan.segments]
-        durations = (segment.scaling.duration for segment, _ in pieces)
-        begins = tuple(accumulate(durations, initial=0.0))
-        return Timeline(tuple(pieces), begins, firsts)
-
-    @property
-    def span(self) -> float:
-        """The duration [s]."""
-        return self.begins[-1]
+                firsts[task.number] = len(pieces)
+                for segment in action.plan.segments:
+                    pieces.append(Piece(begin, task.speed, segment, action.plan.fingers))
+                    begin += segment.scaling.duration_at(task.speed)
+        schedule = {task.number: task for task in program.schedule}
+        return Timeline(tuple(pieces), firsts, schedule, program.schedule[-1].end)
 
     def at(self, t: float) -> tuple[FloatArray, float]:
         """Return the joints (5,) and the fingers [rad] at ``t`` [s], from 0 to ``span``.
 
         The timeline must not be empty.
         """
-        number = min(max(bisect_right(self.begins, t) - 1, 0), len(self.pieces) - 1)
-        segment, fingers = self.pieces[number]
-        return segment.at(segment.scaling.tau_after(t - self.begins[number])).q, fingers
+        number = max(bisect_right(self.pieces, t, key=lambda piece: piece.begin) - 1, 0)
+        begin, speed, segment, fingers = self.pieces[number]
+        return segment.at(segment.scaling.tau_after(t - begin, speed)).q, fingers
 
     def postures(self, count: int) -> list[tuple[FloatArray, float]]:
         """Return ``count`` postures (joints and fingers [rad]), evenly spaced in time."""
         return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]
 
-    def time_of(self, state: State, task: int) -> float:
-        """Return the time [s] of ``state``, in which the program is at its ``task`` on it."""
-        first, following = self.firsts[task], state.following
-        segment = None if following is None else following.segment
+    def time_of(self, state: State, run: Run) -> float:
+        """Return the time [s] of ``state`` on it, in which the program is at a task of ``run``."""
+        task, first = self.schedule[run.number], self.firsts.get(run.number)
+        following = state.following
+        if first is None:
+            return min(task.begin + run.waited * run.started, task.end)
         number = first if following is None else first + following.number
-        if following is None or number >= len(self.pieces) or self.pieces[number][0] is not segment:
+        piece = self.pieces[min(number, len(self.pieces) - 1)]
+        if following is None or piece.segment is not following.segment:
             # No segment of this task is under way.
-            return self.begins[first]
+            return task.begin
         times, taus = self._tables[number]
-        return self.begins[number] + float(np.interp(following.local, taus, times))
+        return piece.begin + float(np.interp(following.local, taus, times))
 
     @cached_property
     def _tables(self) -> list[tuple[FloatArray, FloatArray]]:
         """The times since the start of each segment [s], and tau [s] at these."""
         tables = []
-        for segment, _ in self.pieces:
-            times = np.linspace(0.0, segment.scaling.duration, TAU_SAMPLES)
-            tables.append((times, np.array([segment.scaling.tau_after(t) for t in times.tolist()])))
+        for _, speed, segment, _ in self.pieces:
+            scaling = segment.scaling
+            times = np.linspace(0.0, scaling.duration_at(speed), TAU_SAMPLES)
+            taus = np.array([scaling.tau_after(t, speed) for t in times.tolist()])
+            tables.append((times, taus))
         return tables
 
 
@@ -115,9 +131,8 @@ def moments(
 ) -> Iterator[Moment]:
     """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
 
-    Of the time between two motions only the end is yielded. Awaited conditions count as true. A
-    program that fails, or takes another alternative than predicted, ends early. One that takes
-    longer than a day raises InputError.
+    Awaited conditions count as true. A program that fails, or takes another alternative than
+    predicted, ends early. One that takes longer than a day raises InputError.
     """
     at_rest = JointMotion.rest(state.setpoint)
     start = replace(
@@ -128,9 +143,9 @@ def moments(
     last = Moment(0.0, start)
     yielded = -apart
     for now, run in simulated(program.rehearsed, session, start, TICK, follow_exactly):
-        if run.number not in timeline.firsts:
+        if run.number not in timeline.schedule:
             break
-        t = max(timeline.time_of(now, run.number), last.t)
+        t = max(timeline.time_of(now, run), last.t)
         if t > last.t and last.t - yielded >= apart:
             yield last
             yielded = last.t

@@ -116,7 +116,11 @@ class Plan:
     @property
     def duration(self) -> float:
         """The duration [s] at full speed, from rest to rest of every segment."""
-        return sum(segment.scaling.duration for segment in self.segments)
+        return self.duration_at(1.0)
+
+    def duration_at(self, fraction: float) -> float:
+        """Return the duration [s] at ``fraction`` of full speed, with rest between segments."""
+        return sum(segment.scaling.duration_at(fraction) for segment in self.segments)
 
     @property
     def length(self) -> float:

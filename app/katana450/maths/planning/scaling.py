@@ -101,11 +101,20 @@ class Scaling:
     @property
     def duration(self) -> float:
         """The duration [s] from rest to rest at full speed."""
-        return rest_to_rest(self.span, self.acceleration, self.jerk)
+        return self.duration_at(1.0)
 
-    def tau_after(self, t: float) -> float:
-        """Return tau [s] at ``t`` [s] after the start at full speed, from 0 to `duration`."""
-        return self.motion_after(t)[0]
+    def duration_at(self, fraction: float) -> float:
+        """Return the duration [s] from rest to rest at ``fraction`` of full speed.
+
+        It limits tau' alone: a short path, whose ramps do not reach the limit, takes no longer.
+        """
+        distance, a, j = (x / fraction for x in (self.span, self.acceleration, self.jerk))
+        return rest_to_rest(distance, a, j)
+
+    def tau_after(self, t: float, fraction: float = 1.0) -> float:
+        """Return tau [s] at ``t`` [s] after the start at ``fraction`` of full speed."""
+        distance, a, j = (x / fraction for x in (self.span, self.acceleration, self.jerk))
+        return fraction * motion_after(t, distance, a, j)[0]
 
     def motion_after(self, t: float) -> tuple[float, float, float]:
         """Return tau [s], tau' [1] and tau'' [1/s] at ``t`` [s] after the start at full speed."""

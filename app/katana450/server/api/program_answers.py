@@ -18,8 +18,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         line: Line of the present step in the script.
         task: Present task in words.
         fraction: Fraction of the task that is done, or of all planning.
-        seconds: Duration of all motions at full speed [s], of the longest possible run.
-        seconds_left: Approximate time until the run ends, at the present speed [s]; 0 if none runs.
+        seconds: Expected duration of the longest possible run, without awaited conditions [s].
+        seconds_left: Expected time until the run ends [s], on the same clock; 0 if none runs.
         why: What is wrong with the program, or why it was planned again or not run.
         skipped: Numbers of the steps of alternatives that the run has not taken.
         unattended: Whether it runs without heartbeats of its owner.

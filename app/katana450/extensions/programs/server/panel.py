@@ -121,7 +121,7 @@ class ProgramsPanel:
             step=TIME_STEP,
             initial_value=0.0,
             disabled=True,
-            hint="Show arm, objects and water at this time [s] of the preview, at full speed",
+            hint="Show arm, objects and water at this time [s] of the preview",
         )
         self._look.on_update(lambda _: self._seek())
         self._seek_time = gui.add_html("", visible=False)
@@ -267,7 +267,7 @@ def _page(progress: Progress | None) -> str:
                 )
         elif progress.status == "ready":
             seconds = shown_seconds(progress.seconds)
-            lines.append(f"{progress.steps} steps, {seconds:.1f} s of motion at full speed")
+            lines.append(f"{progress.steps} steps, about {seconds:.1f} s")
         lines += [escape(line) for line in progress.why.splitlines()]
     body = "".join(f"<div>{line}</div>" for line in lines)
     return f"<div class='k450 program'>{body}</div>" if body else ""

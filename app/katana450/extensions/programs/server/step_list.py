@@ -8,7 +8,7 @@ from html import escape
 from itertools import accumulate
 from typing import NamedTuple
 
-from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.actions import expected_time
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.server.api.answers import Progress
@@ -22,7 +22,7 @@ class ListedStep(NamedTuple):
 
     Attributes:
         name: its name, without the name of an action.
-        seconds: duration of its motions at full speed [s].
+        seconds: its expected duration, without awaited conditions [s].
         alternative: ``then`` or ``else`` for a step of an alternative, otherwise "".
         predicted: whether it is executed if all is as predicted.
     """
@@ -37,20 +37,19 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
     """Return the steps of ``program`` in their order, with those of all alternatives."""
     names: dict[int, str] = {}
     seconds = [0.0] * program.steps
-    predicted = set(program.predicted)
-    expected = {program.tasks[number].number for number in predicted}
+    times = {each.number: each.end - each.begin for each in program.schedule}
+    expected = {program.tasks[number].number for number in times}
     last: dict[int, int] = {}
     # The first task belongs to no step; it sets the speed.
     for number, task in enumerate(program.tasks[1:], 1):
         step = task.number
         # A step after different alternatives is there several times, and listed once.
         is_first = last.get(step, number - 1) == number - 1
-        if not (number in predicted if step in expected else is_first):
+        if not (number in times if step in expected else is_first):
             continue
         last[step] = number
         names.setdefault(step, task.name.partition(":")[0])
-        if isinstance(task.action, FollowPlan):
-            seconds[step] += task.action.duration
+        seconds[step] += times.get(number, expected_time(task.action, program.speed))
     words = _words(program)
     return tuple(
         ListedStep(names.get(step, NOTHING), seconds[step], words[step], step in expected)
