@@ -44,10 +44,12 @@ class ProgramRunner:
     def __init__(self) -> None:
         self.progress: Progress | None = None
         self.program: Program | None = None
+        self.text = ""
         self.requests: list[tuple[str, ProgramOrder | None]] = []
 
     def plan(self, text: str, then: ProgramOrder | None, _actor: Actor) -> None:
         self.requests.append((text, then))
+        self.text = text
 
     def steer(self, order: ProgramOrder, _actor: Actor) -> None:
         self.requests.append(("", order))
@@ -262,6 +264,40 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
     panel.follow()
     assert ghosts() == (False, False)
     assert not panel._seek_time.visible
+
+
+def test_list_and_drop_down_are_one_program(
+    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
+) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    runner = ProgramRunner()
+    panel = panel_of(server, robot, runner, Scripts(tmp_path), session, state)
+    own = panel._choice.value
+    # Another person sends a script that is in no folder.
+    text = "name: Wave\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n"
+    runner.text = text
+    runner.program = compiled(parse(text), PlanContext(session, arm.T_base_shoulder), state)
+    runner.progress = Progress(name="Wave", by="Vera", status="running", step=1, steps=1)
+    panel.follow()
+    assert (panel._choice.value, panel._choice.disabled) == ("Wave of Vera", True)
+    assert "joints" in panel._list.content
+    assert "Edit as text" not in panel._edit.content
+    runner.progress = Progress(name="Wave", by="Vera", status="done", step=1, steps=1)
+    panel.follow()
+    assert not panel._choice.disabled
+    panel._choice.value = own  # type: ignore[misc]  # as above
+    panel.follow()
+    assert (panel._list.content, panel._status.content) == ("", "")
+    panel._choice.value = "Wave of Vera"  # type: ignore[misc]  # as above
+    panel.follow()
+    assert "joints" in panel._list.content
+    panel._orders.value = "Run"  # type: ignore[misc]  # viser declares it read-only
+    panel._order(ANNA)
+    assert runner.requests == [(text, ProgramOrder.RUN)]
+    # A script of the library is shown by its own name.
+    runner.text = Scripts(tmp_path).text("Pour")
+    panel.follow()
+    assert panel._choice.value == "Pour"
 
 
 def test_list_follows_the_folder(

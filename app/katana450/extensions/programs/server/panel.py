@@ -27,7 +27,7 @@ from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
-from katana450.server.view.controls import GestureGate, refuse
+from katana450.server.view.controls import GestureGate, refuse, set_value
 
 ORDERS = {
     "Run": ProgramOrder.RUN,
@@ -60,6 +60,11 @@ class Steering(Protocol):
         """The program whose planning has succeeded; None without one."""
         ...
 
+    @property
+    def text(self) -> str:
+        """The script that was sent last, by anybody; "" before the first one."""
+        ...
+
 
 ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
 """Statuses of a program whose run has ended."""
@@ -88,24 +93,23 @@ class ProgramsPanel:
         self._state = state
         self._drawn: Program | None = None
         self._steps: tuple[ListedStep, ...] = ()
-        # The text of the script that was last requested.
-        self._text = ""
+        # The script that was sent last, and the name under which the drop-down shows it.
+        self._sent = self._sent_name = ""
         # Held while a program is requested: viser runs callbacks in other threads.
         self._order_lock = threading.Lock()
         # Whether the program was requested by Preview, which also shows ghosts.
         self._with_ghosts = False
         self._preview = Preview(server, robot, session)
         gui = server.gui
-        self._listed, names = scripts.changed, tuple(scripts.paths)
+        self._listed, self._names = scripts.changed, tuple(scripts.paths)
         # Some scripts of the library need an arm without its gripper.
-        suitable = (name for name in names if _suits(scripts, name, robot))
+        suitable = (name for name in self._names if _suits(scripts, name, robot))
         self._choice = gui.add_dropdown(
             "Script",
-            names,
+            self._names,
             initial_value=next(suitable, None),
             hint="Scripts of the library, and of the folder of this server",
         )
-        self._choice.on_update(lambda _: self._draw(None))
         self._edit = gui.add_html("")
         self._orders = gui.add_button_group(
             "Program",
@@ -130,13 +134,13 @@ class ProgramsPanel:
 
     def follow(self) -> None:
         """Update the display of the program's progress, and the list of scripts."""
-        if self._scripts.changed != self._listed:
-            self._listed = self._scripts.changed
-            self._choice.options = tuple(self._scripts.paths)
-        edit = _edit_button(self._choice.value)
+        progress = self._steering.progress
+        self._follow_choice(progress)
+        edit = _edit_button(self._choice.value) if self._choice.value in self._names else ""
         if edit != self._edit.content:
             self._edit.content = edit
-        progress = self._steering.progress
+        if self._sent_name not in ("", self._choice.value):
+            progress = None
         status = _page(progress)
         if status != self._status.content:
             self._status.content = status
@@ -154,8 +158,28 @@ class ProgramsPanel:
         if ended and isinstance(self._state().mode, DRIVEN):
             self._preview.end()
 
+    def _follow_choice(self, progress: Progress | None) -> None:
+        """Choose the script that was sent last, by anybody, and keep it while it is used."""
+        sent, is_new = self._steering.text, False
+        in_use = progress is not None and progress.status in (*RUNS, "planning")
+        if sent != self._sent and progress is not None and (progress.name or not in_use):
+            names = (self._choice.value, *self._names)
+            same = (name for name in names if _is_text(self._scripts, name, sent))
+            name = f"{progress.name or 'Script'} of {progress.by}"
+            self._sent, self._sent_name, is_new = sent, next(same, name), True
+        if self._scripts.changed != self._listed or is_new:
+            self._listed, self._names = self._scripts.changed, tuple(self._scripts.paths)
+            chosen = self._sent_name if is_new else self._choice.value
+            options = dict.fromkeys((*self._names, self._sent_name or chosen))
+            self._choice.options = tuple(options)
+            if chosen in options:
+                set_value(self._choice, chosen)
+        if self._choice.disabled != in_use:
+            self._choice.disabled = in_use
+
     def _follow_program(self) -> None:
-        program = self._steering.program
+        is_chosen = self._sent_name in ("", self._choice.value)
+        program = self._steering.program if is_chosen else None
         if program is not self._drawn:
             self._drawn = program
             self._draw(program)
@@ -197,15 +221,15 @@ class ProgramsPanel:
         if button != "Preview" and status in RUNS:
             self._steering.steer(ORDERS[button], actor)
             return
-        text = self._scripts.text(self._choice.value)
-        if button != "Preview" and status == "planning" and text == self._text:
+        name = self._choice.value
+        text = self._scripts.text(name) if name in self._names else self._sent
+        if button != "Preview" and status == "planning" and text == self._steering.text:
             # This script is being planned for a preview; it runs once it is planned.
             self._steering.steer(ORDERS[button], actor)
             return
         with self._order_lock:
             self._with_ghosts = button == "Preview"
             self._steering.plan(text, ORDERS.get(button), actor)
-            self._text = text
             # If the plan of this script was kept, `follow` draws it again.
             self._drawn = None
             self._draw(None)
@@ -236,6 +260,14 @@ def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
     """Return whether the script ``name`` can be read, and can run on ``robot`` with its gripper."""
     try:
         return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
+    except KatanaError:
+        return False
+
+
+def _is_text(scripts: Scripts, name: str, text: str) -> bool:
+    """Return whether ``text`` is that of the script ``name``."""
+    try:
+        return scripts.text(name) == text
     except KatanaError:
         return False
 

@@ -35,6 +35,11 @@ class PanelAccess:
         """The program that is planned."""
         return self._runner.program
 
+    @property
+    def text(self) -> str:
+        """The script that was planned last; "" before the first one."""
+        return self._runner.planner.text
+
     def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
         """Plan ``text`` for ``actor``, then carry out ``then``. Raises KatanaError."""
         self._call(lambda: self._plan(text, then, actor))
@@ -51,7 +56,7 @@ class PanelAccess:
         if then is not None:
             self._hub.gate.check_not_stopped()
         self._runner.script(participant, text, more=False, speed=1.0)
-        self._runner.then(then)
+        self._runner.planner.then = then
 
     def _participant_of(self, actor: Actor) -> Participant:
         self._hub.gate.check_current(actor)
