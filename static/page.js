@@ -324,11 +324,16 @@
       drawnActs = key;
       keepingFocus(byId("acts"), acts());
     }
-    const orders = [status.planning, ...status.orders].join();
+    const orders = [status.planning, ...status.orders, ...(status.continues ?? [])].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
-      const words = { end: status.planning ? "Cancel" : "End", continue: "Continue" };
-      const made = (order) => act(words[order], { do: "steer", order }, order === "continue");
+      const [name, step, steps] = status.continues;
+      const words = { end: status.planning ? "Cancel" : "End", continue: `Continue ${name}` };
+      const made = (order) => {
+        const button = act(words[order], { do: "steer", order }, order === "continue");
+        if (order === "continue") button.title = `Continue ${name} at step ${step} of ${steps}`;
+        return button;
+      };
       keepingFocus(byId("orders"), status.orders.map(made));
     }
     Pace.draw(up ? status : null);

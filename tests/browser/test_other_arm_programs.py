@@ -109,7 +109,7 @@ def test_script_is_previewed_paused_stopped_by_a_phone_and_continued(
     page.page.wait_for_timeout(600)
     assert truth.status()["q"] == stopped
 
-    page.page.get_by_role("button", name="Continue", exact=True).click()
+    page.page.get_by_role("button", name="Continue ").click()
     wait(page, truth, "done", 90.0)
     at_rest(page, truth)
     end = 1e3 * np.array(truth.status()["T"])[:3, 3]

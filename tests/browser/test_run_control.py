@@ -63,7 +63,7 @@ def test_steps_of_a_program_are_controlled_in_the_list(
         truth.wait(moving=False)
         time.sleep(1.0)
         clear_stop(page, truth)
-        page.page.get_by_role("button", name="Continue", exact=True).click()
+        page.page.get_by_role("button", name="Continue ").click()
         wait(reader, lambda each: each.status == "paused" and each.step == 3)
         pause.click()
         wait(reader, lambda each: each.breakpoints == ())

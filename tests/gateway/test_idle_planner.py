@@ -45,7 +45,7 @@ def wait_for_planning(table: Staged) -> None:
 
 
 def idle(table: Staged) -> IdlePlanner:
-    found = table.programs._planner._idle
+    found = table.programs.planner._idle
     assert found is not None
     return found
 
@@ -62,7 +62,7 @@ def test_planned_script_runs_at_once(table: Staged, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(program_planner, "compiled", never)
     table.programs.script(participant, SCRIPT, more=False, speed=1.0)
-    assert table.programs._planner.planning is prepared
+    assert table.programs.planner.planning is prepared
     assert table.status == "ready"
     table.programs.steer(participant, ProgramOrder.RUN)
     assert table.programs.running
@@ -112,7 +112,7 @@ def test_a_plan_for_another_scene_is_not_used(table: Staged) -> None:
     prepared = idle(table)._plannings[0]
     table.arm.rest = replace(table.arm.rest, tool="flange")
     table.programs.script(participant, SCRIPT, more=False, speed=1.0)
-    assert table.programs._planner.planning is not prepared
+    assert table.programs.planner.planning is not prepared
 
 
 def test_library_is_planned_with_the_pour_first() -> None:

@@ -182,7 +182,7 @@ def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow
 def test_cancelled_planning_ends_promptly_and_frees_the_planner(table: Staged, slow: Slow) -> None:
     participant, other = (table.join(page) for page in PAGES)
     ask(table, participant)
-    job = table.programs._planner.planning
+    job = table.programs.planner.planning
     assert job is not None
     with pytest.raises(LeaseError, match="being planned"):
         table.programs.script(other, SCRIPT, more=False, speed=1.0)
@@ -307,17 +307,22 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
     assert table.arm.fraction == 0.3
 
 
-@pytest.mark.parametrize("ends", ["done", "stopped"])
-def test_tool_frame_is_restored_at_the_end_of_a_program(table: Staged, ends: str) -> None:
+@pytest.mark.parametrize("ends", ["done", "ended", "STOP"])
+def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: str) -> None:
     participant, before = table.join(PAGES[0]), table.arm.state.tool
     table.plan(participant, "steps:\n  - tool: flange\n  - wait: 1\n")
     table.programs.steer(participant, ProgramOrder.RUN)
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, tool="flange")
-    if ends == "stopped":
+    if ends == "ended":
         table.programs.steer(participant, ProgramOrder.END)
+    elif ends == "STOP":
+        table.stop("Anybody")
+        table.wait(0.2, participant)
+        # Nothing is selected before the stop is cleared.
+        assert [each for each in table.arm.commands if each == cmd.SetTool(before)] == []
+        table.hub.move(participant, cmd.ClearStop())
     table.wait(3.0, participant)
-    assert table.status == ends
+    assert table.status == ("done" if ends == "done" else "stopped")
     chosen = [each.name for each in table.arm.commands if isinstance(each, cmd.SetTool)]
-    # A program that was ended early can continue, with its own tool frame.
-    assert chosen == (["flange", before] if ends == "done" else ["flange"])
+    assert chosen == ["flange", before]

@@ -111,6 +111,31 @@ def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -
     assert shown["why"].startswith("Nap: wait, step 1 of 2, 25 s left.")
 
 
+def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES)
+    table.plan(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 1\n")
+    table.programs.steer(owner, ProgramOrder.RUN)
+    table.wait(10.5, owner)
+    table.programs.steer(owner, ProgramOrder.END)
+    table.wait(0.1, owner)
+    shown = bar(table, other)
+    assert (shown["headline"], shown["end"]) == ("Nap: ended at step 1 of 2", "step 1 of 2")
+    assert shown["why"] == "Window 1 ended it. Continue resumes it there."
+    shown = bar(table, owner)
+    assert shown["why"] == "You ended it. Continue resumes it there."
+    assert (shown["orders"], shown["continues"]) == (["continue"], ["Nap", 1, 2])
+    table.programs.steer(owner, ProgramOrder.CONTINUE)
+    table.wait(32.0, owner)
+    assert bar(table, owner)["headline"] == "Nap: done in 42 s"
+    table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")
+    shown = bar(table, owner)
+    assert (shown["mood"], shown["headline"]) == ("limited", "The script: cannot run")
+    assert "999" in shown["why"]
+    # As the planning worker reports a motion.
+    table.programs.redirected()
+    assert bar(table, owner)["headline"] == "On target"
+
+
 def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
     participant = table.join(PAGES[0])
     table.plan(participant, "steps:\n  - wait: 1\n  - joints: [20, -60, 80, 8, 0]\n")

@@ -93,7 +93,7 @@ def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: App
             assert headers["access-control-allow-origin"] == server.url
             assert headers["access-control-allow-credentials"] == "true"
             shown = await control.wait(stop="confirmed")
-            assert shown["stopped"] == f"{shown['name']} pressed STOP."
+            assert shown["stopped"] == "You pressed STOP."
             assert abs(shown["stopped_at"] - time.time()) < 10.0
             await control.clear_stop()
             await control.say("release_lease")

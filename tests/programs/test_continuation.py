@@ -162,7 +162,15 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
     assert states[-1].setpoint == pytest.approx(program_end(program), abs=1e-9)
 
 
-@pytest.mark.parametrize("changed", ["gripper", "scene", "tool frame"])
+def test_tool_frame_of_the_run_is_selected_again(stage: Stage, program: Program) -> None:
+    run, state = stopped_after(stage, program, 60)
+    interruption = interruption_of(program, run, state)
+    state = given(stage, state, cmd.SetTool("flange"))
+    states = played(stage, continued(interruption, stage.plan_context, state), state)
+    assert (states[0].tool, states[-1].tool) == ("flange", "tcp")
+
+
+@pytest.mark.parametrize("changed", ["gripper", "scene"])
 def test_changed_surroundings_are_refused_by_name(
     stage: Stage, program: Program, changed: str
 ) -> None:
@@ -173,7 +181,6 @@ def test_changed_surroundings_are_refused_by_name(
     commands: dict[str, cmd.Command] = {
         "gripper": cmd.SetGripper(stage.plan_context.arm.gripper.upper),
         "scene": cmd.PlaceObject(SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)),
-        "tool frame": cmd.SetTool("flange"),
     }
     state = given(stage, state, commands[changed])
     assert changed in interruption.changed_to(state)

@@ -10,7 +10,7 @@ import numpy as np
 from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.state import State
 from katana450.errors import BlockedError, InputError
-from katana450.extensions.programs.actions import FollowPlan, MoveFingers, Task
+from katana450.extensions.programs.actions import FollowPlan, MoveFingers, Task, UseTool
 from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
 from katana450.extensions.programs.program import Program
@@ -60,11 +60,14 @@ class Interruption:
     def changed_to(self, state: State) -> str:
         """Return a clause that names what prevents a continuation from ``state``, else "".
 
-        The arm may have moved, with what it holds, and the water may have.
+        The arm may have moved, with what it holds, and the water and the tool frame too.
         """
         before, now = self.situation, Situation.of(state)
         fingers = before.fingers if isinstance(self.task.action, MoveFingers) else now.fingers
-        now = replace(now, posture=before.posture, water=before.water, fingers=fingers)
+        # The continuation selects the tool frame of the run.
+        now = replace(
+            now, posture=before.posture, water=before.water, fingers=fingers, tool=before.tool
+        )
         return before.changed_to(now)
 
 
@@ -93,6 +96,9 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
     # The list of steps takes the name of a step from its first task.
     step = [each.name for each in program.tasks if each.number == task.number][-1].partition(":")[0]
     added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
+    if interruption.situation.tool not in ("", state.tool):
+        tool = UseTool(interruption.situation.tool)
+        added.append(replace(task, name=f"{step}: tool", action=tool, after=None))
     if float(np.abs(state.setpoint - q).max()) > START_TOLERANCE:
         way = _way(plan_context, state, q)
         added.append(replace(task, name=RETURN, action=way, after=None))

@@ -24,6 +24,15 @@ MAX_MARKS = 2
 """Maximum number of marks on one letter."""
 
 
+ACTS = "pressed STOP|ended it|cancelled the planning|went to step|runs it from"
+"""What sentences say that people have done, as a pattern."""
+
+
+def addressed(words: str, name: str) -> str:
+    """Return ``words`` for the person ``name``, who is "You" where they say what that one did."""
+    return re.sub(rf"^{re.escape(name)} (?={ACTS})", "You ", words).replace("You runs", "You run")
+
+
 def free_name(name: str | None, number: int, others: Iterable[Person]) -> str:
     """Return ``name``, or "Window" without one, with ``number`` where it is needed."""
     name = name or f"Window {number}"

@@ -12,6 +12,7 @@ from katana450.server.api import answers
 from katana450.server.service.request_handler import RequestHandler
 
 if TYPE_CHECKING:
+    from katana450.arm.control.lease import Person
     from katana450.server.service.participants import Participant
 
 log = logging.getLogger(__name__)
@@ -86,12 +87,21 @@ class Runner(RequestHandler):
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last run; the state includes it."""
 
-    def status_line(self, state: State, line: StatusLine) -> StatusLine:  # noqa: ARG002
-        """Return the state line of the page in place of ``line``, which describes ``state``.
+    def status_line(
+        self,
+        state: State,  # noqa: ARG002
+        line: StatusLine,
+        reader: Person | None,  # noqa: ARG002
+    ) -> StatusLine:
+        """Return the state line for ``reader`` in place of ``line``, which describes ``state``.
 
         Not called while the arm is stopped, blocked or at fault.
         """
         return line
+
+    def names(self, person: Person) -> bool:  # noqa: ARG002
+        """Return whether the state line names ``person``, for whom it then says "You"."""
+        return False
 
     def orders(self, participant: Participant) -> tuple[str, ...]:  # noqa: ARG002
         """Return the orders that the bar of the page offers to ``participant``.

@@ -15,6 +15,7 @@ from katana450.arm.control.state import State, Status
 from katana450.arm.control.supervision import tracking_error
 from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
+from katana450.server.service.names import addressed
 from katana450.server.service.participants import Participant
 from katana450.server.service.runner import StatusLine
 
@@ -65,7 +66,7 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
         if plans:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")
         if state.status not in FIRST:
-            now = hub.runner.status_line(state, now)
+            now = hub.runner.status_line(state, now, reader)
     if stopped is not None:
         rests = stopped.confirmed and not (state is not None and state.moving)
         now = StatusLine("stopped", "Stopped" if rests else "Stopping…", "")
@@ -166,6 +167,8 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     taker = hub.taken_by(participant)
     age = hub.pictures.age(participant.person.key, hub.clock())
     own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
+    stopped = hub.stopped
+    own_stop = None if stopped is None or stopped.cause.key != person.key else stopped.why
     rights = hub.gate.clear_rights
     clears = rights.allow(person)
     until = "Clear stop is pressed" if clears else f"{rights.names} clears the stop"
@@ -173,10 +176,11 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     if (mode := arm_mode(hub)) in UNCONTROLLED:
         stays = UNCONTROLLED[mode][1]
     return {
-        **(state_line(hub, person)._asdict() if own_pause else {}),
+        **(state_line(hub, person)._asdict() if own_pause or hub.runner.names(person) else {}),
+        **({"stopped": addressed(own_stop, person.name)} if own_stop else {}),
         "pace": pace_refusal(hub, participant),
         "may_clear_stop": clears,
-        "until": "" if hub.stopped is None else stays,
+        "until": "" if stopped is None else stays,
         "name": person.name,
         "role": person.role.value,
         "mine": mine,
@@ -196,6 +200,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         "planning": planning,
         "fraction": round(program.fraction, 2) if program is not None and planning else 0.0,
         "orders": list(hub.runner.orders(participant)) if hub.arm is not None else [],
+        "continues": [program.name, program.step, program.steps] if program is not None else [],
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
         **{
             key: value

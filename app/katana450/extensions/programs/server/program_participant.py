@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, CommandChannel
+from katana450.arm.control.modes import Idle
 from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.server.program_owner import AlwaysAlive, program_identity
@@ -40,7 +42,7 @@ class ProgramParticipant:
         with both times. Raises LeaseError if another participant holds the lease, or the arm is
         stopped.
         """
-        self._hub = hub
+        self._hub, self._owner = hub, owner
         identity, alive = program_identity(name, owner.person), AlwaysAlive(hub.clock)
         joined = hub.join(identity, "program", lambda _notice: None, alive, CommandChannel.PROGRAM)
         try:
@@ -84,20 +86,46 @@ class ProgramParticipant:
             ticket = self._hub.move(self.joined, sent)
         return ticket
 
-    def leave(self, *, done: bool) -> None:
-        """Restore the speed, release the lease and leave the hub.
+    def leave(self) -> LeftTool | None:
+        """Restore speed and tool frame, release the lease and leave the hub.
 
-        ``done``: whether the program has reached its end. Then the tool frame is restored too; one
-        that was interrupted continues with its own.
+        Returns the tool frame if it could not be restored, as after a stop.
         """
-        hub = self._hub
+        hub, tool = self._hub, self._tool
         self._follow_run(self._began, hub.clock())
-        if done and self.drives and hub.present().state.tool != self._tool:
+        left = None if hub.present().state.tool == tool else LeftTool(tool, self._owner)
+        if self.drives and left is not None:
             with suppress(InputError, LeaseError):
-                self.send(cmd.SetTool(self._tool))
+                self.send(cmd.SetTool(tool))
+                left = None
         hub.gate.program = None
         with suppress(InputError):
             hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
         if self.drives:
             hub.release_lease(self.joined)
         hub.leave(self.joined, for_good=True)
+        return left
+
+
+@dataclass(frozen=True)
+class LeftTool:
+    """The tool frame ``tool`` of before a run of ``owner`` that was stopped."""
+
+    tool: str
+    owner: Participant
+
+    def restored(self, hub: Hub) -> LeftTool | None:
+        """Select the tool frame once the stop is cleared; return self before that.
+
+        The driver does so, else the owner. A new motion or target keeps the frame that it began in.
+        """
+        arm, holder = hub.arm, hub.lease.holder
+        if hub.stopped is not None or arm is None or not arm.caught_up or arm.state.stopped:
+            return self
+        participant = self.owner if holder is None else hub.participant(holder.key)
+        if participant is not None and isinstance(arm.state.mode, Idle):
+            with suppress(InputError, LeaseError):
+                hub.move(participant, cmd.SetTool(self.tool))
+                if holder is None:
+                    hub.release_lease(participant)
+        return None

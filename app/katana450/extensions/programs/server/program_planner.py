@@ -108,6 +108,13 @@ class ProgramPlanner:
         if self._idle is not None:
             self._idle.cancel()
 
+    def may_continue(self, interruption: Interruption | None) -> bool:
+        """Return whether a run was interrupted, and nothing is planned or has changed since."""
+        planning, arm = self.planning, self._hub.arm
+        if interruption is None or planning is None or planning.busy or arm is None:
+            return False
+        return not interruption.changed_to(arm.state)
+
     @property
     def will_run(self) -> bool:
         """True if the program runs as soon as it is planned, and the planning has not failed."""

@@ -16,6 +16,7 @@ import msgspec
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs import requests, runner
@@ -25,10 +26,15 @@ from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
-from katana450.extensions.programs.server.program_participant import FollowRun, ProgramParticipant
+from katana450.extensions.programs.server.program_participant import (
+    FollowRun,
+    LeftTool,
+    ProgramParticipant,
+)
 from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.run_progress import run_progress
+from katana450.extensions.programs.server.state_line import RunNews
 from katana450.server.api import answers
 from katana450.server.api.fields import Request
 from katana450.server.service.dispatcher import ACCEPTED
@@ -51,8 +57,10 @@ class ProgramRunner(Runner):
         super().__init__(hub, options)
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
-        self._planner = ProgramPlanner(hub, self._owner, idly=not options.no_idle_planning)
+        self.planner = ProgramPlanner(hub, self._owner, idly=not options.no_idle_planning)
         self._interruption: Interruption | None = None
+        self._left_tool: LeftTool | None = None
+        self._is_news = False  # Whether no other command followed the end of a run or planning.
         self._runs_as: ProgramParticipant | None = None
         self._run: Run | None = None
         self.follow_run: FollowRun = lambda *_: None
@@ -66,12 +74,12 @@ class ProgramRunner(Runner):
     @property
     def program(self) -> Program | None:
         """The planned program."""
-        return self._planner.program
+        return self.planner.program
 
     @property
     def waits(self) -> bool:
         """True if the program runs as soon as it is planned."""
-        return self._planner.then is not None
+        return self.planner.then is not None
 
     def owns(self, participant: Participant) -> bool:
         """Return whether ``participant`` owns the present program."""
@@ -79,7 +87,7 @@ class ProgramRunner(Runner):
 
     def runs_for(self, participant: Participant) -> bool:
         """Return whether the program of ``participant`` runs, or will once it is planned."""
-        return self.owns(participant) and (self.running or self._planner.will_run)
+        return self.owns(participant) and (self.running or self.planner.will_run)
 
     def check_may_touch(self, actor: Actor) -> None:
         """Raise LeaseError if ``actor`` may not drive, or does not own the running program."""
@@ -101,10 +109,6 @@ class ProgramRunner(Runner):
                 self._owner.allow_unattended(participant.person, allowed=allowed)
         return answers.Done()
 
-    def then(self, order: ProgramOrder | None) -> None:
-        """Carry out ``order`` as soon as the present script is planned."""
-        self._planner.then = order
-
     def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> None:
         """Take a part of a script, see ``ProgramPlanner.script``.
 
@@ -113,17 +117,17 @@ class ProgramRunner(Runner):
         """
         if not more and self.running:
             raise LeaseError("A program is running. End it first.")
-        before = self._planner.text
-        if self._planner.script(participant, text, more=more, speed=speed):
-            self._run = None
-            if self._planner.text != before:
+        before = self.planner.text
+        if self.planner.script(participant, text, more=more, speed=speed):
+            self._run, self._is_news = None, True
+            if self.planner.text != before:
                 self._interruption = None
 
     def set_breakpoints(self, participant: Participant, steps: Sequence[int]) -> None:
         """Make the present program pause before ``steps``, from 1. Raises LeaseError."""
-        self._planner.set_breakpoints(participant, steps)
+        self.planner.set_breakpoints(participant, steps)
         if self._run is not None:
-            self._run = replace(self._run, pauses=self._planner.breakpoints)
+            self._run = replace(self._run, pauses=self.planner.breakpoints)
 
     def steer(
         self,
@@ -148,14 +152,14 @@ class ProgramRunner(Runner):
         if at is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
             raise LeaseError("Only `run` and `step` begin at a step.")
         self._owner.check_unattended(unattended=unattended)
-        planning = self._planner.planning
-        if planning is not None and (planning.busy or self._planner.will_run):
+        planning = self.planner.planning
+        if planning is not None and (planning.busy or self.planner.will_run):
             self._owner.check_may_steer(participant.person)
             if at is not None:
                 planning.cancel(f"{participant.person.name} runs it from step {at}.")
                 self._plan_part(participant, order, at, unattended=unattended)
                 return None
-            ticket = self._planner.steer(participant, order)
+            ticket = self.planner.steer(participant, order)
             self._owner.unattended = self._owner.unattended or unattended
             return ticket
         if plans:
@@ -163,19 +167,19 @@ class ProgramRunner(Runner):
             return None
         if begins:
             return self._begin(participant, order, unattended=unattended)
-        if not self.running or self._run is None:
+        if self._runs_as is None or self._run is None:
             raise LeaseError("No program is running.")
         self._owner.check_may_steer(participant.person)
         self.hub.recorder.note("program", participant.actor, {"order": order.value})
         match order:
             case ProgramOrder.RUN | ProgramOrder.RESUME:
-                return self._send(cmd.Resume())
+                return self._runs_as.send(cmd.Resume())
             case ProgramOrder.STEP:
                 self._run, commands = runner.stepping(self._run)
-                return self._send(*commands)
+                return self._runs_as.send(*commands)
             case ProgramOrder.PAUSE:
                 paused = self.hub.present().state.paused
-                ticket = self._send(cmd.Pause())
+                ticket = self._runs_as.send(cmd.Pause())
                 if not paused:
                     self.hub.gate.last_pause = LastPause.by(participant.actor)
                 return ticket
@@ -186,22 +190,23 @@ class ProgramRunner(Runner):
 
     def stopped(self) -> None:
         """Cancel a run that waits for its planning, after STOP."""
-        self._planner.forget_run("STOP was pressed during planning")
+        self.planner.forget_run("STOP was pressed during planning")
 
     def redirected(self) -> None:
         """Cancel a run that waits for its planning, after another command to the arm."""
-        self._planner.stop_idle_planning()
-        self._planner.forget_run("the arm was given another command during planning")
+        self._is_news = False
+        self.planner.stop_idle_planning()
+        self.planner.forget_run("the arm was given another command during planning")
 
     def leave(self, participant: Participant) -> None:
         """Forget ``participant``; end its program, or the run that waits for its planning."""
-        self._planner.forget_parts(participant)
+        self.planner.forget_parts(participant)
         self.end(participant, f"{participant.person.name} left")
 
     def end(self, participant: Participant, why: str) -> None:
         """End the program of ``participant``, or the run that waits for its planning."""
         if self.owns(participant):
-            self._planner.forget_run(why)
+            self.planner.forget_run(why)
             if self.running and not self._owner.unattended:
                 self._end(f"{why}.")
 
@@ -215,9 +220,11 @@ class ProgramRunner(Runner):
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
-        self._planner.plan_idly(t, used=self.running)
+        self.planner.plan_idly(t, used=self.running)
         if self.waits and self._owner.is_silent(t):
-            self._planner.forget_run("its owner sends no heartbeats")
+            self.planner.forget_run("its owner sends no heartbeats")
+        if self._left_tool is not None:
+            self._left_tool = self._left_tool.restored(hub)
         if self.program is not None and self.waits:
             self._start_planned()
         program = self.program
@@ -240,7 +247,7 @@ class ProgramRunner(Runner):
             self._runs_as.follow_speed(arm.state)
             run, commands = runner.step(program, self._run, arm.state, t)
             try:
-                self._send(*commands)
+                self._runs_as.send(*commands)
             except InputError as error:
                 run = runner.ended(run, Phase.FAILED, str(error))
             if run.phase is Phase.RUNNING:
@@ -250,10 +257,10 @@ class ProgramRunner(Runner):
 
     def progress(self) -> answers.Progress | None:
         """Return the progress of the present or last program; None if there was none."""
-        planning, owner = self._planner.planning, self._owner.participant
+        planning, owner, arm = self.planner.planning, self._owner.participant, self.hub.arm
         if planning is None or owner is None:
             return None
-        program, run, arm = planning.program, self._run, self.hub.arm
+        program, run = planning.program, self._run
         if program is None or run is None or arm is None or planning.refused is not None:
             found = planning.progress(owner.person.name)
         else:
@@ -264,21 +271,19 @@ class ProgramRunner(Runner):
             found,
             unattended=self._owner.unattended and self.running,
             began=None if began is None else began.isoformat(timespec="seconds"),
-            breakpoints=tuple(sorted(each + 1 for each in self._planner.breakpoints)),
-            can_continue=self._may_continue,
+            breakpoints=tuple(sorted(each + 1 for each in self.planner.breakpoints)),
+            can_continue=not self.running and self.planner.may_continue(self._interruption),
         )
 
-    @property
-    def _may_continue(self) -> bool:
-        """True if the program was interrupted, and nothing runs, is planned or has changed."""
-        planning, arm = self._planner.planning, self.hub.arm
-        if self._interruption is None or self.running or planning is None or planning.busy:
-            return False
-        return arm is not None and not self._interruption.changed_to(arm.state)
-
-    def status_line(self, state: State, line: StatusLine) -> StatusLine:
+    def status_line(self, state: State, line: StatusLine, reader: Person | None) -> StatusLine:
         """Return the line for the program in place of ``line``."""
-        return state_line.status_line(state, line, self.progress(), waits=self.waits)
+        news = RunNews(self._run, reader) if self._is_news else None
+        return state_line.status_line(state, line, self.progress(), news, waits=self.waits)
+
+    def names(self, person: Person) -> bool:
+        """Return whether the line says what ``person`` has done."""
+        program = self.progress() if self._is_news else None
+        return program is not None and program.why.startswith(person.name)
 
     def orders(self, participant: Participant) -> tuple[str, ...]:
         """Return the orders that the page of ``participant`` offers; none if not the owner."""
@@ -289,8 +294,8 @@ class ProgramRunner(Runner):
 
     def _start_planned(self) -> None:
         """Carry out the order that waits for the end of the planning."""
-        then, self._planner.then = self._planner.then, None
-        owner, planning = self._owner.participant, self._planner.planning
+        then, self.planner.then = self.planner.then, None
+        owner, planning = self._owner.participant, self.planner.planning
         if then is None or owner is None or planning is None:  # It was cancelled meanwhile.
             return
         unattended = self._owner.unattended
@@ -310,7 +315,7 @@ class ProgramRunner(Runner):
         self, participant: Participant, order: ProgramOrder, at: int | None, *, unattended: bool
     ) -> None:
         """Plan the program from a step, or from where it ended early, and then run it."""
-        planning, interruption = self._planner.planning, self._interruption
+        planning, interruption = self.planner.planning, self._interruption
         if planning is None:
             raise LeaseError("No program is planned. Send a script first.")
         if self.running and at is None:
@@ -323,24 +328,24 @@ class ProgramRunner(Runner):
             if self.hub.present().state.moving:
                 raise LeaseError("The arm is moving. Pause it first, and choose the step at rest.")
             self._end(f"{participant.person.name} went to step {at}.")
-        self._planner.check_free(participant)
+        self.planner.check_free(participant)
         if at is None and interruption is not None:
-            self._planner.plan_rest(participant, interruption, planning)
+            self.planner.plan_rest(participant, interruption, planning)
         else:
-            self._planner.plan(participant, planning.text, planning.speed, first_step=(at or 1) - 1)
-        self._run, self._planner.then, self._owner.unattended = None, order, unattended
+            self.planner.plan(participant, planning.text, planning.speed, first_step=(at or 1) - 1)
+        self._run, self.planner.then, self._owner.unattended = None, order, unattended
 
     def _begin(
         self, participant: Participant, order: ProgramOrder, *, unattended: bool
     ) -> int | None:
         """Run the planned program. If the situation has changed, plan it again first."""
-        planning = self._planner.require()
+        planning = self.planner.require()
         changed = planning.changed_to(self.hub.present().state)
         if changed or not planning.whole:
             self.hub.gate.check_not_stopped()
-            self._planner.check_free(participant)
-            self._planner.plan(participant, planning.text, planning.speed, changed)
-            self._run, self._planner.then, self._owner.unattended = None, order, unattended
+            self.planner.check_free(participant)
+            self.planner.plan(participant, planning.text, planning.speed, changed)
+            self._run, self.planner.then, self._owner.unattended = None, order, unattended
             return None
         return self._start(planning, participant, order, unattended=unattended)
 
@@ -354,7 +359,7 @@ class ProgramRunner(Runner):
         follow = partial(self.follow_run, program.name, planning.text)
         self._runs_as = ProgramParticipant(self.hub, program.name, participant, follow)
         self._owner.begin(participant, began, unattended=unattended)
-        self._interruption = None
+        self._interruption = self._left_tool = None
         self._run = replace(
             planning.continues or Run(began),
             t=began,
@@ -363,26 +368,22 @@ class ProgramRunner(Runner):
             phase=Phase.RUNNING,
             why="",
             single=order is ProgramOrder.STEP,
-            pauses=self._planner.breakpoints,
+            pauses=self.planner.breakpoints,
         )
-        how = ", unattended" if unattended else ""
+        how = ", unattended" * unattended
         log.info("%s runs the program %s%s.", participant.person.name, program.name, how)
         what = {"program": program.name, "order": order.value, "unattended": unattended}
         self.hub.recorder.note("program", participant.actor, what)
         return self._runs_as.ticket
 
-    def _send(self, *commands: cmd.Command) -> int | None:
-        """Give ``commands`` to the arm; return the ticket of the last."""
-        assert self._runs_as is not None
-        return self._runs_as.send(*commands)
-
     def _end(self, why: str) -> int | None:
         assert self._run is not None
+        assert self._runs_as is not None
         run, commands = runner.stopped(self._run, why)
         ticket = None
         # An arm that is stopped or does not answer accepts no commands.
         with suppress(LeaseError, InputError):
-            ticket = self._send(*commands)
+            ticket = self._runs_as.send(*commands)
         self._leave_with(run)
         return ticket
 
@@ -393,7 +394,7 @@ class ProgramRunner(Runner):
             # Set first, because the progress is read in other threads too.
             self._interruption = Interruption.of(self.program, run, self.hub.present().state)
         left, self._runs_as, self._run = self._runs_as, None, run
-        left.leave(done=run.phase is Phase.DONE)
-        actor, ended = left.joined.actor, run.phase.value
-        log.info("The program %s: %s", actor.name, run.why or f"{ended}.")
-        self.hub.recorder.note("program", actor, {"ended": ended}, why=run.why)
+        self._left_tool, self._is_news = left.leave(), True
+        actor = left.joined.actor
+        log.info("The program %s: %s", actor.name, run.why or run.phase.value)
+        self.hub.recorder.note("program", actor, {"ended": run.phase.value}, why=run.why)

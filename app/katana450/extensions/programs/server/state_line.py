@@ -3,26 +3,58 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.extensions.programs.requests import ProgramOrder
+from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server.program_planning import PlanningPhase
 from katana450.server.api.answers import Progress
+from katana450.server.service.names import addressed
 from katana450.server.service.runner import StatusLine
 
 RUNS = ("running", "paused", "blocked")
 """Statuses of a program that holds the arm, as in `answers.Progress.status`."""
 
+ENDS = {
+    Phase.STOPPED.value: "ended",
+    Phase.FAILED.value: "failed",
+    PlanningPhase.REFUSED.value: "cannot run",
+    PlanningPhase.CANCELLED.value: "not planned",
+}
+"""What the page says of a program with this status."""
+
+UNPLANNED_ENDS = (Phase.FAILED.value, PlanningPhase.REFUSED.value)
+"""The statuses after which somebody has to look at the reason."""
+
 PLANNING, PROGRAM = "planning", "program"
 """The moods of the page while a program is planned, and while it runs."""
 
 
+class RunNews(NamedTuple):
+    """The end of ``run``, or of a planning without one, which ``reader`` does not know yet."""
+
+    run: Run | None
+    reader: Person | None
+
+
 def status_line(
-    state: State, line: StatusLine, program: Progress | None, *, waits: bool
+    state: State,
+    line: StatusLine,
+    program: Progress | None,
+    news: RunNews | None = None,
+    *,
+    waits: bool,
 ) -> StatusLine:
     """Return the line for ``program`` in place of ``line``, which describes ``state`` alone.
 
-    ``waits``: whether the program runs as soon as it is planned.
+    Args:
+        state: the state of the arm.
+        line: the line without the program.
+        program: the progress of the present or last program.
+        news: an end that is news.
+        waits: whether the program runs as soon as it is planned.
     """
     if program is None:
         return line
@@ -30,7 +62,7 @@ def status_line(
         return _running(state, line, program)
     if program.status == PlanningPhase.PLANNING.value:
         return _planning(state, line, program, waits=waits)
-    return line
+    return line if news is None or state.moving else _ended(line, program, news)
 
 
 def _running(state: State, line: StatusLine, program: Progress) -> StatusLine:
@@ -63,6 +95,23 @@ def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool)
     else:
         about.append("It does not start by itself.")
     return StatusLine(PLANNING, f"{headline} {end}", " ".join(about), end)
+
+
+def _ended(line: StatusLine, program: Progress, news: RunNews) -> StatusLine:
+    """Return the line after the end of ``program``, or of its planning."""
+    if program.status == Phase.DONE.value and news.run is not None:
+        took = f"in {duration(news.run.elapsed)}"
+        return line._replace(headline=f"{program.name}: done {took}", end=took)
+    if program.status not in ENDS:
+        return line
+    end = f"step {program.step} of {program.steps}" if program.step else ""
+    head = f"{program.name or 'The script'}: {ENDS[program.status]}{end and f' at {end}'}"
+    more = "Continue resumes it there." if program.can_continue else ""
+    why = " ".join(program.why.split())
+    why = why if news.reader is None else addressed(why, news.reader.name)
+    whys = (why, more, line.why)
+    mood = "limited" if program.status in UNPLANNED_ENDS else line.mood
+    return StatusLine(mood, head, " ".join(filter(None, whys)), end)
 
 
 def duration(seconds: float) -> str:
