@@ -13,7 +13,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 
-MAX_LINES = 400
+MAX_LINES = 600
 """Maximum length of a file, with comments and docstrings."""
 
 SCHEMAS = {
@@ -47,7 +47,7 @@ def test_workflows_call_targets_of_make() -> None:
         assert called <= targets, file.name
 
 
-def test_python_files_have_at_most_400_lines() -> None:
+def test_python_files_have_at_most_600_lines() -> None:
     folders = ("app", "benchmarks", "docs", "examples", "robot_description", "tests")
     files = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
     assert len(files) > 1000
