@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
@@ -13,7 +13,7 @@ from katana450.arm.control.commands import Command, SetJoints
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.plans import path_to, plan_along
 from katana450.arm.control.scene_objects import SceneObject, named
-from katana450.arm.control.session import Session
+from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan, MoveFingers
@@ -101,19 +101,21 @@ class UntimedPath:
         world: the collision world that they were checked against; None without collision checks.
         state: the state at their start.
         paths: the paths, one after another.
+        tool_speed: maximum speed of the tool point [m/s].
     """
 
     arm: ArmModel
     world: CollisionWorld | None
     state: State
     paths: tuple[Path, ...]
+    tool_speed: float = field(default=TOOL_SPEED, kw_only=True)
 
     def timed(self) -> FollowPlan:
         """Return the timed plan, with limited tool acceleration if an object is held."""
         gentle = None if self.state.grip is None else CARRY
         paths = list(self.paths)
         return FollowPlan(
-            plan_along(self.arm, self.world, self.state, paths, tool_acceleration=gentle)
+            plan_along(self.arm, self.world, self.state, paths, self.tool_speed, gentle)
         )
 
 
@@ -231,8 +233,11 @@ class PlanBuilder:
             name,
         )
 
-    def lead(self, curves: Sequence[AnyCurve], name: str) -> None:
-        """Append the tool's motion along ``curves``, from its present pose, on the same branch."""
+    def lead(self, curves: Sequence[AnyCurve], name: str, tool_speed: float = TOOL_SPEED) -> None:
+        """Append the tool's motion along ``curves``, from its present pose, on the same branch.
+
+        ``tool_speed``: maximum speed of the tool point [m/s]. Raises as ``follow``.
+        """
         planning = self.planning
         paths: list[Path] = []
         made: dict[int, Path] = {}
@@ -244,7 +249,7 @@ class PlanBuilder:
                 made[id(curve)] = path
             paths.append(path)
             q = path.end
-        self.follow(paths, name)
+        self.follow(paths, name, tool_speed)
 
     def pace(self, curve: AnyCurve, duration: float, name: str) -> None:
         """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
@@ -257,10 +262,11 @@ class PlanBuilder:
         paced = PacedPath(untimed.arm, untimed.world, untimed.state, untimed.paths, duration)
         self.actions[-1] = name, paced
 
-    def follow(self, paths: Sequence[Path], name: str) -> None:
+    def follow(self, paths: Sequence[Path], name: str, tool_speed: float = TOOL_SPEED) -> None:
         """Append the motion along ``paths``, the first of which begins at the present posture.
 
-        Raises BlockedError, and InputError for a path on which nothing moves.
+        ``tool_speed``: maximum speed of the tool point [m/s]. Raises BlockedError, and InputError
+        for a path on which nothing moves.
         """
         world, fingers = self.world, self.state.gripper_setpoint
         for path in {id(path): path for path in paths}.values():
@@ -273,7 +279,9 @@ class PlanBuilder:
                 check_clear(path, world, fingers)
         self.note(
             name,
-            UntimedPath(self.plan_context.arm, world, self.state, tuple(paths)),
+            UntimedPath(
+                self.plan_context.arm, world, self.state, tuple(paths), tool_speed=tool_speed
+            ),
             self.standing(paths[-1].end),
         )
 

@@ -67,6 +67,7 @@ OFFSET = any_of(
 BLEND = number_or_text(
     0.0, 1.0, "Fraction of half a leg that a corner cuts off; 0 rests in each corner"
 )
+FEED = number_or_text(0.1, 1000.0, "Speed of the tool point, mm/s; slower where limits require it")
 WITH: Schema = {"type": "object", "description": "Parameters and their values"}
 ARC_PITCH = any_of("Pitch of the tool, deg; roomiest is farthest from the limits", ANGLE)
 

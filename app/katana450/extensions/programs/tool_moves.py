@@ -10,6 +10,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs import places
@@ -20,6 +21,7 @@ from katana450.extensions.programs.schema_parts import (
     ARC_PITCH,
     BLEND,
     BRANCH,
+    FEED,
     LENGTH,
     OFFSET,
     ORIENTATION,
@@ -44,6 +46,11 @@ LEVEL_TOLERANCE = 1e-6
 """[1] Maximum horizontal component of the normal of a level circle."""
 
 
+def feed(fields: Fields) -> float:
+    """Return the maximum speed of the tool point [m/s]; ``fields`` have it in mm/s, or not."""
+    return fields.take("feed", read.number(0.1, 1e3 * TOOL_SPEED), 1e3 * TOOL_SPEED) / 1e3
+
+
 @dataclass(frozen=True)
 class Line:
     """Move the tool on a straight line; its orientation changes evenly."""
@@ -51,17 +58,18 @@ class Line:
     schema: ClassVar[Schema] = mapping(
         "Move the tool point on a straight line, to a point or by an offset",
         "",
-        {"to": reference("point"), "by": OFFSET, **ORIENTATION},
+        {"to": reference("point"), "by": OFFSET, **ORIENTATION, "feed": FEED},
     )
 
     to: FloatArray | None
     by: FloatArray | None
     angles: Angles
     in_base: bool
+    tool_speed: float = TOOL_SPEED
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {to, by, pitch, roll, yaw}. Raises ScriptError."""
+        """Read {to, by, pitch, roll, yaw, feed}. Raises ScriptError."""
         fields = Fields(value, "a line")
         to = fields.take("to", lambda each: places.pose(each, setting), None)
         by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
@@ -70,7 +78,8 @@ class Line:
         angles = places.angles(fields)
         if to is not None:
             angles = angles.or_else(to.angles)
-        found = cls(None if to is None else to.position, by, angles, setting.in_base)
+        end = None if to is None else to.position
+        found = cls(end, by, angles, setting.in_base, feed(fields))
         fields.done()
         return found
 
@@ -83,7 +92,7 @@ class Line:
             end = end.moved(frozen(start.position + offset))
         line = builder.planning.line(start, end)
         try:
-            builder.lead([line], "line")
+            builder.lead([line], "line", self.tool_speed)
         except InputError as error:
             branch, frame = builder.branches(None)[0], builder.frame
             if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
@@ -99,17 +108,18 @@ class Lines:
     schema: ClassVar[Schema] = mapping(
         "Move the tool point on straight lines through places, with rounded corners",
         "through",
-        {"through": reference("through"), "blend": BLEND},
+        {"through": reference("through"), "blend": BLEND, "feed": FEED},
     )
 
     through: tuple[StepTarget, ...]
     blend: float
+    tool_speed: float
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {through, blend}. Raises ScriptError."""
+        """Read {through, blend, feed}. Raises ScriptError."""
         fields = Fields(value, "lines")
-        found = cls(*through(fields, setting))
+        found = cls(*through(fields, setting), feed(fields))
         if any(each.joints is not None or each.branch is not None for each in found.through):
             problem = "`lines` takes points only. Use `via` for joint angles and branches."
             fields.problems += value.wrong(problem).problems
@@ -126,9 +136,10 @@ class Lines:
                 raise InputError(f"Place {number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
-            builder.lead([planning.lines(vias, blend)], "lines")
+            curves = [planning.lines(vias, blend)]
         else:
-            builder.lead([planning.line(a, b) for a, b in pairwise(vias)], "lines")
+            curves = [planning.line(a, b) for a, b in pairwise(vias)]
+        builder.lead(curves, "lines", self.tool_speed)
 
 
 @dataclass(frozen=True)
@@ -141,6 +152,7 @@ class ArcGeometry:
         angles: pitch, roll and yaw [rad]; None to keep one.
         in_base: whether centre, axis and angles are in the base frame, not in {S}.
         is_roomiest: whether the pitch is the one farthest from the limits.
+        tool_speed: maximum speed of the tool point along the curve [m/s].
     """
 
     centre: FloatArray
@@ -148,10 +160,11 @@ class ArcGeometry:
     angles: Angles
     in_base: bool
     is_roomiest: bool = False
+    tool_speed: float = TOOL_SPEED
 
     @classmethod
     def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
-        """Read centre, axis, pitch, roll and yaw. ``axis`` is the name of the axis field."""
+        """Read centre, axis, pitch, roll, yaw and feed. ``axis`` is the name of the axis field."""
         centre = fields.need("centre", lambda each: places.point(each, setting), np.zeros(3))
         direction = fields.need(axis, read.direction, np.eye(3)[0])
         pitch = fields.take("pitch", places.pitch, None)
@@ -160,7 +173,8 @@ class ArcGeometry:
             fields.take("roll", read.degrees(), None),
             fields.take("yaw", read.degrees(), None),
         )
-        return cls(centre, direction, angles, setting.in_base, pitch == places.ROOMIEST)
+        is_roomiest = pitch == places.ROOMIEST
+        return cls(centre, direction, angles, setting.in_base, is_roomiest, feed(fields))
 
     def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
         """Return centre [m] and axis, each (3,), in {S}."""
@@ -183,7 +197,7 @@ class ArcGeometry:
 
         tool_path = builder.first(builder.branches(branch), path)
         builder.move_to(tool_path.start, f"{name}: to its start")
-        builder.follow([tool_path], name)
+        builder.follow([tool_path], name, self.tool_speed)
 
     def follow_or_advise(
         self,
@@ -230,6 +244,7 @@ class Arc:
             "pitch": ARC_PITCH,
             "roll": TURN,
             "yaw": TURN,
+            "feed": FEED,
         },
     )
 
@@ -239,7 +254,7 @@ class Arc:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {centre, axis, angle, climb, pitch, roll, yaw}. Raises ScriptError."""
+        """Read {centre, axis, angle, climb, pitch, roll, yaw, feed}. Raises ScriptError."""
         fields = Fields(value, "an arc")
         found = cls(
             ArcGeometry.read(fields, "axis", setting),
@@ -278,6 +293,7 @@ class Circle:
             "roll": TURN,
             "yaw": TURN,
             "branch": BRANCH,
+            "feed": FEED,
         },
     )
 
@@ -288,7 +304,7 @@ class Circle:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {centre, normal, radius, turns, pitch, roll, yaw, branch}. Raises ScriptError."""
+        """Read the fields of the schema. Raises ScriptError."""
         fields = Fields(value, "a circle")
         found = cls(
             ArcGeometry.read(fields, "normal", setting),
