@@ -35,6 +35,19 @@ def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana
     assert not state.moving
 
 
+def test_plan_is_followed_at_a_fraction_of_its_speed(
+    shoulder_arm: katana450.Arm, client: katana450.Client
+) -> None:
+    plan = shoulder_arm.plan_through([[0.2, -1.0, 1.4, 0.3, 0.0], [0.0, -1.0, 1.4, 0.3, 0.0]])
+    client.joints(plan.start)
+    begun = time.monotonic()
+    state = plan.run(client, speed=0.5)
+    assert 2.0 * plan.duration < time.monotonic() - begun < 2.0 * plan.duration + 3.0
+    np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
+    with pytest.raises(katana450.InputError, match=r"speed is 0\.0; it must be above 0"):
+        plan.run(client, speed=0.0)
+
+
 @pytest.mark.parametrize(
     "where", [pytest.param("on the way to the start", marks=pytest.mark.long), "on the plan"]
 )

@@ -65,6 +65,20 @@ def turned(state: State, end: State, axis: int) -> float:
     return float(np.degrees(end.setpoint[axis - 1] - state.setpoint[axis - 1]))
 
 
+def test_steps_are_repeated_until_a_condition_holds(stage: Stage, empty: State) -> None:
+    text = "  - repeat: {times: 4, until: {joint: {axis: 5, at_least: 15}}, steps: [TURN]}\n"
+    program = planned(stage, text.replace("TURN", "{nudge: {axis: 5, by: 10}}"), empty)
+    _, states = stage.play(program, empty)
+    assert turned(empty, states[-1], 5) == pytest.approx(20.0, abs=1e-6)
+    # One that never holds ends after the last repetition.
+    program = planned(stage, text.replace("TURN", "{nudge: {axis: 5, by: 3}}"), empty)
+    _, states = stage.play(program, empty)
+    assert turned(empty, states[-1], 5) == pytest.approx(12.0, abs=1e-6)
+    for until, why in (("{}", "An until needs exactly one of"), ("{held: 1}", "Expected a text")):
+        with pytest.raises(ScriptError, match=why):
+            parse(f"steps:\n  - repeat: {{times: 2, until: {until}, steps: [home]}}\n")
+
+
 @pytest.mark.parametrize(
     ("ml", "angle", "choices", "skipped"),
     [

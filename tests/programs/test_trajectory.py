@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.continuation import continued
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
@@ -23,6 +25,7 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.trajectory_path import CubicSpline, TrajectoryPath
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
@@ -182,6 +185,33 @@ def test_what_is_no_list_of_rows_is_refused(through: str) -> None:
         parse(f"steps:\n  - trajectory: {{through: {through}}}\n")
 
 
+def test_file_beside_the_script_gives_the_same_plan(stage: Stage) -> None:
+    rows = swing(2.0)
+    table = "t,theta1,theta2,theta3,theta4,theta5,gripper\n" + "".join(
+        ",".join(map(repr, [t, *np.radians(angles).tolist(), 0.0])) + "\n" for t, *angles in rows
+    )
+    files = {"swing.csv": table, "unknown.csv": "time,q1\n0,1\n", "text.csv": "t,theta1\n0,x\n"}
+    named = "define: {go: {steps: [{trajectory: {file: swing.csv}}]}}\nsteps:\n  - call: go\n"
+    alone = attached(named, files.__getitem__)
+    assert "theta5" in alone
+    given, taken = (
+        plan_of(compiled(parse(text), stage.plan_context, stage.begin()))[0]
+        for text in (script(rows), alone)
+    )
+    np.testing.assert_allclose(taken.postures, given.postures, atol=1e-15)
+    np.testing.assert_array_equal(taken.times, given.times)
+    for name, why in (
+        ("unknown.csv", "line 2, column 25: The first line of unknown.csv must name the columns t"),
+        ("text.csv", "line 2, column 25: Line 2 of text.csv is not a number in each column"),
+        ("../swing.csv", "is not the name of a .csv file in the folder"),
+    ):
+        text = f"steps:\n  - trajectory: {{file: {name}}}\n"
+        with pytest.raises(ScriptError, match=re.escape(why)):
+            parse(attached(text, files.__getitem__))
+    with pytest.raises(ScriptError, match=r"The text of swing\.csv is missing"):
+        parse(named)
+
+
 def test_derivatives_are_those_of_the_path(stage: Stage) -> None:
     rows = np.array(swing(2.0))
     path = TrajectoryPath(stage.plan_context.arm.chain, rows[:, 0], np.radians(rows[:, 1:]))
@@ -239,3 +269,26 @@ def test_example_runs(stage: Stage) -> None:
     assert span >= path.duration == 3.0
     run, _ = stage.play(program, stage.begin())
     assert run.phase is Phase.DONE
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        "line: {by: {z: -0.05 m}, feed: 20}",
+        "lines: {through: [{x: 340, y: 0, z: 150}, {x: 340, y: 40, z: 150}], feed: 20}",
+        "arc: {centre: {x: 340, y: 0, z: 170}, axis: x, angle: 60, feed: 20}",
+        "circle: {centre: {x: 340, y: 0, z: 170}, normal: x, radius: 20, feed: 20}",
+    ],
+)
+def test_feed_bounds_the_speed_of_the_tool_point(stage: Stage, step: str) -> None:
+    begin = stage.begin()
+    text = (
+        f"frame: base\nsteps:\n  - move: {{x: 340, y: 0, z: 190, pitch: 50, roll: 0}}\n  - {step}\n"
+    )
+    program = compiled(parse(text), stage.plan_context, begin)
+    _, states = stage.play(program, begin, 20_000)
+    chain = stage.plan_context.arm.chain
+    points = forward_batch(chain, np.array([state.setpoint for state in states]))[:, :3, 3]
+    speeds = np.linalg.norm(np.diff(points, axis=0), axis=1) / TICK
+    assert speeds[-100:].max() < 0.0201
+    assert np.median(speeds[-150:-50]) == pytest.approx(0.02, rel=0.01)

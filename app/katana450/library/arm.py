@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -250,7 +251,25 @@ class Arm:
             ...
         katana450.errors.InputError: ...
         """
-        return MotionPlan(self, self._planner.to(goal, start, seed))
+        return MotionPlan(self, self._planner.through([goal], start, seed))
+
+    def plan_through(
+        self,
+        goals: Sequence[npt.ArrayLike],
+        start: npt.ArrayLike | None = None,
+        *,
+        seed: int = 0,
+    ) -> MotionPlan:
+        """Plan a motion that reaches each of ``goals`` in turn, and rests there for a moment.
+
+        Each goal is joint angles (n,) [rad] or a pose (4, 4) of the tool. Everything else is as in
+        `plan`.
+
+        >>> plan = arm.plan_through([[1.2, -1.0, 1.4, 0.3, 0.0], arm.fk(arm.ready)])
+        >>> bool(np.allclose(arm.fk(plan.end), arm.fk(arm.ready)))
+        True
+        """
+        return MotionPlan(self, self._planner.through(goals, start, seed))
 
     def line(
         self,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from katana450.errors import InputError
 from katana450.library.trajectory import Trajectory, sampled
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.plan import Plan
@@ -87,7 +88,7 @@ class MotionPlan:
 
         return figure_of(self)
 
-    def run(self, client: Client, dt: float = 0.02) -> State:
+    def run(self, client: Client, dt: float = 0.02, speed: float = 1.0) -> State:
         """Drive the arm of a server along this plan; return its state once it rests at the end.
 
         The arm first goes to the start, then follows the joint angles as a stream. A stop or a
@@ -97,12 +98,16 @@ class MotionPlan:
         Args:
             client: a connection, from `katana450.connect`.
             dt: time from one command to the next [s].
+            speed: fraction of the plan's own speed, above 0 and up to 1.
 
         Raises:
             RefusedError: the server refuses a command, or the arm is stopped.
             LostError: the connection is lost.
-            InputError: as `sample`.
+            InputError: as `sample`, or an invalid speed.
         """
         from katana450.library.streaming import stream
 
-        return stream(self.sample(dt), client)
+        if not 0.0 < speed <= 1.0:
+            raise InputError(f"The speed is {speed!r}; it must be above 0 and up to 1.")
+        samples = self.sample(dt * speed)
+        return stream(replace(samples, t=samples.t / speed, qd=samples.qd * speed), client)

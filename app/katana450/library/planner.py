@@ -44,13 +44,16 @@ class Planner:
     T_base_shoulder: FloatArray
     frame: PoseFrame
 
-    def to(self, goal: npt.ArrayLike, start: npt.ArrayLike | None, seed: int) -> Plan:
-        """Plan to joint angles (n,) [rad] or to a pose (4, 4)."""
+    def through(
+        self, goals: Sequence[npt.ArrayLike], start: npt.ArrayLike | None, seed: int
+    ) -> Plan:
+        """Plan to each of ``goals`` in turn: joint angles (n,) [rad] or a pose (4, 4)."""
         builder = self._builder(start, seed)
-        if dimensions(goal) == 2:
-            self._to_pose(builder, goal)
-        else:
-            builder.move_to(self.session.require_arm().chain.check_q(goal), "plan")
+        for goal in goals:
+            if dimensions(goal) == 2:
+                self._to_pose(builder, goal)
+            else:
+                builder.move_to(self.session.require_arm().chain.check_q(goal), "plan")
         if not builder.actions:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
         return _timed(builder)

@@ -89,11 +89,14 @@ class ScriptWriter:
         self._expected[measure] = given(at_least=at_least, at_most=at_most)
 
     @contextmanager
-    def repeat(self, times: int) -> Iterator[None]:
-        """Repeat the steps of the block, which are planned once. A loop of Python does it too."""
+    def repeat(self, times: int, *, until: Mapping[str, Any] | None = None) -> Iterator[None]:
+        """Repeat the steps of the block, which are planned once. A loop of Python does it too.
+
+        ``until``: a condition as of ``when``, such as ``{"held": "cup"}``, which ends it earlier.
+        """
         with self._block() as inside:
             yield
-        self._add("repeat", {"times": times, "steps": inside})
+        self._add("repeat", {"times": times, **given(until=until), "steps": inside})
 
     @contextmanager
     def when(self, **condition: Any) -> Iterator[None]:
@@ -169,13 +172,14 @@ class ScriptWriter:
         pitch: Number | None = None,
         roll: Number | None = None,
         yaw: Number | None = None,
+        feed: Number | None = None,
     ) -> None:
         """Move the tool point on a straight line, to a point or by an offset [mm]."""
-        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll, yaw=yaw))
+        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll, yaw=yaw, feed=feed))
 
-    def lines(self, *places: Place, blend: float | None = None) -> None:
+    def lines(self, *places: Place, blend: float | None = None, feed: Number | None = None) -> None:
         """Move the tool point on straight lines through places with rounded corners."""
-        self._add("lines", {"through": list(places), **given(blend=blend)})
+        self._add("lines", {"through": list(places), **given(blend=blend, feed=feed)})
 
     def arc(
         self,
@@ -187,12 +191,15 @@ class ScriptWriter:
         pitch: Number | None = None,
         roll: Number | None = None,
         yaw: Number | None = None,
+        feed: Number | None = None,
     ) -> None:
         """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
         value = {"centre": centre, "axis": axis, "angle": angle}
-        self._add("arc", {**value, **given(climb=climb, pitch=pitch, roll=roll, yaw=yaw)})
+        self._add(
+            "arc", {**value, **given(climb=climb, pitch=pitch, roll=roll, yaw=yaw, feed=feed)}
+        )
 
-    def circle(
+    def circle(  # noqa: PLR0913 - the fields of the step
         self,
         centre: Point,
         normal: str | Sequence[float],
@@ -203,10 +210,11 @@ class ScriptWriter:
         roll: Number | None = None,
         yaw: Number | None = None,
         branch: str | None = None,
+        feed: Number | None = None,
     ) -> None:
         """Move to the highest point of a circle [mm], then round it."""
         value = {"centre": centre, "normal": normal, "radius": radius}
-        more = given(turns=turns, pitch=pitch, roll=roll, yaw=yaw, branch=branch)
+        more = given(turns=turns, pitch=pitch, roll=roll, yaw=yaw, branch=branch, feed=feed)
         self._add("circle", {**value, **more})
 
     def screw(
@@ -220,8 +228,16 @@ class ScriptWriter:
         """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
         self._add("screw", {"point": point, "axis": axis, **given(angle=angle, climb=climb)})
 
-    def trajectory(self, times: Sequence[Number], postures: Sequence[Sequence[Number]]) -> None:
-        """Move through joint angles [deg] at times [s], slower where limits require."""
+    def trajectory(
+        self, times: Sequence[Number] | str, postures: Sequence[Sequence[Number]] = ()
+    ) -> None:
+        """Move through joint angles [deg] at times [s], slower where limits require.
+
+        ``times`` may be the name of a .csv file beside the script instead, with both.
+        """
+        if isinstance(times, str):
+            self._add("trajectory", {"file": times})
+            return
         rows = zip(times, postures, strict=True)
         self._add("trajectory", {"through": [[time, *angles] for time, angles in rows]})
 

@@ -1,8 +1,9 @@
 """Files that a script names, and their texts within the script.
 
-A script names files beside it, under ``include`` and ``scene``. A reader of scripts opens no file,
-because a script that is sent to a server stands alone. A program that has the folder of the script
-replaces each name by ``{NAME: TEXT}`` on the same line, so that all lines keep their numbers.
+A script names files beside it, under ``include``, ``scene`` and the ``file`` of a trajectory. A
+reader of scripts opens no file, because a script that is sent to a server stands alone. A program
+that has the folder of the script replaces each name by ``{NAME: TEXT}`` on the same line, so that
+all lines keep their numbers.
 """
 
 from __future__ import annotations
@@ -21,14 +22,23 @@ from katana450.extensions.programs.source import MAX_BYTES, ScriptError, YamlVal
 INCLUDE, SCENE = "include", "scene"
 """Fields of a script that name files."""
 
+DEFINE, STEPS = "define", "steps"
+"""Fields of a script with steps."""
+
 MAX_FILES = 16
 """Maximum number of files that a script names, with those that its files name."""
 
 MAX_NAME_LENGTH = 100
 """Maximum number of characters of the name of a file."""
 
-NAME = re.compile(r"[^\\:\0/][^\\:\0]*\.ya?ml")
-"""Pattern of the name of a file."""
+YAML, CSV = ".yaml", ".csv"
+"""Suffixes of files that a script names."""
+
+NAMES = {
+    YAML: re.compile(r"[^\\:\0/][^\\:\0]*\.ya?ml"),
+    CSV: re.compile(r"[^\\:\0/][^\\:\0]*\.csv"),
+}
+"""Patterns of the names of files, by their suffixes."""
 
 
 class AttachedFile(NamedTuple):
@@ -56,15 +66,15 @@ class AttachedFile(NamedTuple):
         return self.texts[self.name]
 
 
-def attached_file(value: YamlValue) -> AttachedFile:
+def attached_file(value: YamlValue, suffix: str = YAML) -> AttachedFile:
     """Read NAME, or {NAME: TEXT}, which may also have the texts of further files.
 
     Raises ScriptError.
     """
     if value.kind != "mapping":
-        return AttachedFile(value, _checked_name(value), {})
+        return AttachedFile(value, _checked_name(value, suffix), {})
     fields = Fields(value, "an attached file")
-    names = [_checked_name(name) for name, _ in value.fields]
+    names = [_checked_name(name, suffix) for name, _ in value.fields]
     texts = {name: fields.take(name, _text, "") for name in names}
     fields.done()
     if not names:
@@ -83,12 +93,12 @@ def _text(value: YamlValue) -> str:
     return str(value.held)
 
 
-def _checked_name(value: YamlValue) -> str:
+def _checked_name(value: YamlValue, suffix: str) -> str:
     """Return the name of a file in the folder of the script or below. Raises ScriptError."""
     name = read.text(value)
-    if not NAME.fullmatch(name) or ".." in name.split("/") or not name.isprintable():
+    if not NAMES[suffix].fullmatch(name) or ".." in name.split("/") or not name.isprintable():
         raise value.wrong(
-            f"{name!r} is not the name of a .yaml file in the folder of the script or below."
+            f"{name!r} is not the name of a {suffix} file in the folder of the script or below."
         )
     if len(name) > MAX_NAME_LENGTH:
         raise value.wrong(f"The name of a file has at most {MAX_NAME_LENGTH} characters.")
@@ -136,7 +146,8 @@ def _opened(
     """
     line, column = node.start_mark.line + 1, node.start_mark.column + 1
     at = YamlValue(line, column, str(node.value), "text", file=file)
-    name = _checked_name(at)
+    suffix = CSV if str(node.value).endswith(CSV) else YAML
+    name = _checked_name(at, suffix)
     if name in texts:
         return {}
     if len(texts) >= MAX_FILES:
@@ -149,7 +160,7 @@ def _opened(
         raise at.wrong(f"{name} has more than {MAX_BYTES // 1024} KB.")
     texts[name] = text
     found = {name: text}
-    for inner in _names(text, name):
+    for inner in _names(text, name) if suffix == YAML else ():
         found |= _opened(inner, name, opened, texts)
     return found
 
@@ -162,6 +173,23 @@ def _names(text: str, file: str) -> Iterator[Any]:
             yield from (each for each in value.value if _is_name(each))
         elif key.value in (INCLUDE, SCENE) and _is_name(value):
             yield value
+        elif key.value in (DEFINE, STEPS):
+            yield from _trajectory_names(value)
+
+
+def _trajectory_names(node: Any) -> Iterator[Any]:
+    """Yield the nodes of the names of files of trajectories in ``node``, in their order."""
+    if isinstance(node, yaml.SequenceNode):
+        for item in node.value:
+            yield from _trajectory_names(item)
+    elif isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if key.value == "trajectory" and isinstance(value, yaml.MappingNode):
+                yield from (
+                    held for name, held in value.value if name.value == "file" and _is_name(held)
+                )
+            else:
+                yield from _trajectory_names(value)
 
 
 def _is_name(node: Any) -> bool:

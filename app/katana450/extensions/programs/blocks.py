@@ -6,7 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.conditions import CHOICE_CONDITIONS, one_condition
+from katana450.extensions.programs.conditions import (
+    CHOICE_CONDITIONS,
+    Condition,
+    ProgramTime,
+    one_condition,
+)
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.located_step import Conditional, LocatedStep, count
 from katana450.extensions.programs.pick import stacked
@@ -114,7 +119,7 @@ class StepReader:
             raise name.wrong(f"There is no step {name}{read.or_known(str(name.held), known)}")
         match name.held:
             case "repeat":
-                found = self._repeated(value)
+                found = self._repeated(name, value)
             case "for_each":
                 found = self._for_each(value)
             case "call":
@@ -139,21 +144,34 @@ class StepReader:
         assert condition is not None
         return Conditional(condition, then, otherwise)
 
-    def _repeated(self, value: YamlValue) -> tuple[LocatedStep, ...]:
+    def _repeated(self, name: YamlValue, value: YamlValue) -> tuple[LocatedStep, ...]:
         fields = Fields(value, "a repeat")
         times = fields.need(
             "times", lambda each: read.whole(1, MAX_REPETITIONS)(self.scope.bound(each)), 1
         )
-        if not fields.has("index"):
+        until = fields.take("until", self._until, None)
+        if until is not None or not fields.has("index"):
             # The same steps again, which are planned only once.
             steps = fields.need("steps", self.steps, ())
             fields.done()
+            if until is not None and times * (count(steps) + 1) <= MAX_STEPS:
+                repeated = steps
+                for _ in range(times - 1):
+                    repeated = (*steps, *_located(name, Conditional(until, (), repeated)))
+                return repeated
             return steps * times if times * count(steps) <= MAX_STEPS else steps * (MAX_STEPS + 1)
         index = fields.take("index", lambda each: each, value)
         numbers = [
             YamlValue(index.line, index.column, str(i), "whole", float(i)) for i in range(times)
         ]
         return self._each(fields, index, numbers)
+
+    def _until(self, value: YamlValue) -> Condition | ProgramTime:
+        fields = Fields(value, "an until")
+        condition = one_condition(fields, CHOICE_CONDITIONS, self.setting, self.scope)
+        fields.done()
+        assert condition is not None
+        return condition
 
     def _for_each(self, value: YamlValue) -> tuple[LocatedStep, ...]:
         fields = Fields(value, "a for_each")

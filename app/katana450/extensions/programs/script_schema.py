@@ -73,6 +73,12 @@ DEFINITIONS: dict[str, Schema] = {
     },
 }
 
+CHOICE_FIELDS = {
+    **CONDITION_FIELDS,
+    "time": mapping("Time since the program began, s", "", BOUNDS_OF),
+}
+"""Schemas of the conditions of an ``if`` and an ``until``, by their names."""
+
 BLOCK_VALUES: dict[str, Schema] = {
     "stack": mapping(
         "Pick an object and place it on the middle of another",
@@ -83,7 +89,12 @@ BLOCK_VALUES: dict[str, Schema] = {
         "Repeat steps",
         "times steps",
         {
-            "times": number_or_text(1, MAX_REPETITIONS, "How often"),
+            "times": number_or_text(1, MAX_REPETITIONS, "How often; with `until`, at most"),
+            "until": {
+                **mapping("Repeat until this holds after the steps", "", CHOICE_FIELDS),
+                "minProperties": 1,
+                "maxProperties": 1,
+            },
             "index": {**TEXT, "description": "Name of the counter, from 0"},
             "steps": reference("steps"),
         },
@@ -107,8 +118,7 @@ BLOCK_VALUES: dict[str, Schema] = {
             "Steps that depend on one condition, which is measured when the step is reached",
             "then",
             {
-                **CONDITION_FIELDS,
-                "time": mapping("Time since the program began, s", "", BOUNDS_OF),
+                **CHOICE_FIELDS,
                 "then": reference("steps", "Steps if the condition holds"),
                 "else": reference("steps", "Steps if it does not hold"),
             },

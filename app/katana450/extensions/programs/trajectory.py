@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -12,11 +15,19 @@ from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.attached_files import CSV, attached_file
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.places import LEAST_JOINTS, MAX_JOINTS
 from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
 from katana450.extensions.programs.recorded_pace import recorded_scaling
-from katana450.extensions.programs.schema_parts import Schema, list_of, mapping, reference
+from katana450.extensions.programs.schema_parts import (
+    TEXT,
+    Schema,
+    any_of,
+    list_of,
+    mapping,
+    reference,
+)
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
@@ -40,6 +51,9 @@ MAX_TIME = 24 * 3600.0
 """[s] Maximum time of a posture."""
 
 TRAJECTORY = "trajectory"
+
+JOINT_COLUMN = re.compile(r"theta[1-9][0-9]?")
+"""Pattern of the name of a column with the angles of a joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +84,15 @@ class FollowTrajectory:
 
     schema: ClassVar[Schema] = mapping(
         "Move through postures at given times, on a smooth path, slower where limits require it",
-        "through",
-        {"through": list_of(reference("posture"), 2, MAX_POSTURES)},
+        "",
+        {
+            "through": list_of(reference("posture"), 2, MAX_POSTURES),
+            "file": any_of(
+                "A .csv file beside the script: t [s], theta1 and so on [rad]",
+                TEXT,
+                {"type": "object"},
+            ),
+        },
     )
 
     times: FloatArray
@@ -79,9 +100,11 @@ class FollowTrajectory:
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {through: rows of a time [s] and the angles [deg]}. Raises ScriptError."""
+        """Read {through: rows of a time [s] and angles [deg]}, or {file}. Raises ScriptError."""
         fields = Fields(value, "a trajectory")
-        rows = fields.need("through", _rows, ())
+        rows = fields.take("through", _rows, None)
+        if rows is None:
+            rows = fields.need("file", _rows_of_file, ())
         fields.done()
         table = np.array(rows)
         return cls(frozen(table[:, 0]), frozen(table[:, 1:]))
@@ -113,6 +136,31 @@ def _rows(value: YamlValue) -> Sequence[tuple[float, ...]]:
     for item, row in zip(value.items, rows, strict=True):
         if len(row) != 1 + joints:
             raise item.wrong(f"Expected a time and {joints} angles, as in the first row.")
+    return rows
+
+
+def _rows_of_file(value: YamlValue) -> Sequence[tuple[float, ...]]:
+    """Read the times [s] and angles [rad] of a .csv file. Raises ScriptError with its row."""
+    file = attached_file(value, CSV)
+    lines = csv.DictReader(file.text.splitlines())
+    names = [name for name in lines.fieldnames or () if JOINT_COLUMN.fullmatch(name)]
+    joints = [f"theta{number}" for number in range(1, len(names) + 1)]
+    if "t" not in (lines.fieldnames or ()) or sorted(names) != sorted(joints):
+        raise file.at.wrong(
+            f"The first line of {file.name} must name the columns t, in s, and theta1, theta2 and "
+            "so on, in rad, as `katana450 record export` writes them."
+        )
+    rows = []
+    for number, line in enumerate(lines, start=2):
+        try:
+            row = tuple(float(line[name]) for name in ("t", *joints))
+        except (TypeError, ValueError):
+            row = (math.nan,)
+        if not all(map(math.isfinite, row)):
+            raise file.at.wrong(f"Line {number} of {file.name} is not a number in each column.")
+        rows.append(row)
+    if not 2 <= len(rows) <= MAX_POSTURES:
+        raise file.at.wrong(f"{file.name} has {len(rows)} rows, not 2 to {MAX_POSTURES}.")
     return rows
 
 
