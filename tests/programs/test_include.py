@@ -129,7 +129,7 @@ def test_file_that_several_files_include_is_read_once() -> None:
         ({"parts.yaml": "let: {a: 1}\npose: {}"}, "parts.yaml", 2, "no 'pose'"),
         ({"parts.yaml": "steps: [home]"}, "parts.yaml", 1, "An included file has no 'steps'"),
         ({"parts.yaml": "define: {\n a: {steps: [hme]}}"}, "parts.yaml", 2, "did you mean 'home'"),
-        ({"parts.yaml": "let: [1"}, "parts.yaml", 1, "not valid YAML"),
+        ({"parts.yaml": "let: [1"}, "parts.yaml", 1, "A comma or ] is missing in a list"),
         ({"parts.yaml": ""}, "parts.yaml", 1, "The file is empty"),
         ({"parts.yaml": "# a\nframe: shoulder"}, "parts.yaml", 2, "in the frame shoulder"),
         ({"parts.yaml": "let: {a: &b 1}"}, "parts.yaml", 1, "Anchors"),

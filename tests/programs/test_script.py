@@ -90,9 +90,25 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps: [home]\nspeeed: 1", 2, "did you mean 'speed'"),
         ("a: &x 1\nsteps: [home]", 1, "Anchors"),
         ("steps: !!python/object:os.system [home]", 1, "Tags"),
-        ("steps: [home", 1, "not valid YAML"),
-        ("steps:\n\t- home", 2, "not valid YAML"),
-        ("steps: [home]\n\x07", 2, "not valid YAML"),
+        ("steps: [home", 1, "A comma or ] is missing in a list"),
+        ("steps:\n- move: {x: 1, y: 2\n- home\n", 2, "A comma or } is missing in a mapping"),
+        ("steps:\n\t- home", 2, "Indent with blanks"),
+        ("steps: [home]\n\x07", 2, "character U+0007 is not allowed"),
+        ("steps:\n- move: @a", 2, "Put the text in quotes"),
+        ("name: a: b\nsteps: [home]", 1, "A colon cannot stand here"),
+        ("frame: base\nname\nsteps: [home]", 2, "A colon and a blank are missing"),
+        ("steps: - home", 1, "on a line of its own"),
+        ("steps:\n  - home\n - home", 3, "indented differently"),
+        ("steps: [home]]", 1, "This ] closes nothing"),
+        ("steps: [home]\n}", 2, "This } closes nothing"),
+        ("name: 'it's'\nsteps: [home]", 1, "behind the end of a value"),
+        ('name: "abc\nsteps: [home]\n', 1, "A quote has no end"),
+        ('name: "a\\q"\nsteps: [home]', 1, "single quotes"),
+        ("steps: [,]", 1, "A value is missing here"),
+        ("name: x\n---\nsteps: [home]", 2, "Remove the line `---`"),
+        ("steps:\n- joints: [0, 1.57, -0.3, 0.4, 0]", 2, "1.57 looks like radians"),
+        ("steps:\n- nudge: {axis: 1, by: -0.7854}", 2, "`-0.7854 rad`, or `-0.7854 deg`"),
+        ("steps:\n- move: {x: 1, y: 2, z: 3, pitch: pi / 2}", 2, "`(pi / 2) * 1 rad`"),
         ("steps: [home]\nexpect: {speed: 1}", 2, "no 'speed'"),
     ],
 )
@@ -101,6 +117,21 @@ def test_error_is_reported_with_its_line(wrong: str, line: int, said: str) -> No
         parse(wrong)
     assert said in str(refused.value)
     assert any(problem.line == line for problem in refused.value.problems), str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        "joints: [0, 90, 1.571, 0, 0]",
+        "joints: [0, 1.57 rad, 0, 0, 0]",
+        "joints: [0.1, 0.52, 0, 0, 0]",
+        "nudge: {axis: 1, by: 1.57 deg}",
+        "nudge: {axis: 1, by: 1.6}",
+        "trajectory: {through: [[0, 1.571, 0, 0], [1, 0, 1.571, 0]]}",
+    ],
+)
+def test_angles_that_are_surely_meant_are_not_asked_about(step: str) -> None:
+    assert len(parse(f"steps:\n- {step}\n").steps) == 1
 
 
 def test_all_errors_are_reported_together() -> None:

@@ -191,7 +191,7 @@ class JointAngle:
         """Read {axis, at_least, at_most}. Raises ScriptError."""
         fields = Fields(value, "a joint")
         axis = fields.need("axis", read.whole(1, MAX_JOINTS), 1)
-        found = cls(axis - 1, ValueBounds.read(fields, read.degrees(-720.0, 720.0)))
+        found = cls(axis - 1, ValueBounds.read(fields, read.angle(-720.0, 720.0)))
         fields.done()
         return found
 

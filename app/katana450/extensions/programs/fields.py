@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -159,9 +160,55 @@ def choice(*names: str) -> Callable[[YamlValue], str]:
 
 
 def degrees(low: float = -MAX_ANGLE, high: float = MAX_ANGLE) -> Callable[[YamlValue], float]:
-    """Return a reader of an angle in degrees; it returns [rad]."""
+    """Return a reader of an angle in degrees, as programs write it; it returns [rad]."""
     read = number(low, high, "deg")
     return lambda value: math.radians(read(value))
+
+
+def angle(low: float = -MAX_ANGLE, high: float = MAX_ANGLE) -> Callable[[YamlValue], float]:
+    """Return a reader of an angle as people write it; see ``angles``."""
+    read = angles(low, high, 1, 1)
+    return lambda value: read(replace(value, kind="list", held=(value,)))[0]
+
+
+def angles(low: float, high: float, fewest: int, most: int) -> Callable[[YamlValue], list[float]]:
+    """Return a reader of a list of angles in degrees, which refuses those that look like radians.
+
+    It returns [rad].
+    """
+    read = listed(number(low, high, "deg"), fewest, most)
+
+    def all_of(value: YamlValue) -> list[float]:
+        found = read(value)
+        plain = all(item.unit == PLAIN for item in value.items)
+        if plain and max(map(abs, found)) < 2.0 * math.pi + 0.01:
+            for item, angle in zip(value.items, found, strict=True):
+                if _is_fraction_of_pi(item, abs(angle)):
+                    text = str(item.held)
+                    text = f"({text}) * 1" if _decimals(text) is None else text
+                    raise item.wrong(
+                        f"{item.held} looks like radians, and angles are in degrees. Give its "
+                        f"unit: `{text} rad`, or `{text} deg` if that is meant."
+                    )
+        return [math.radians(angle) for angle in found]
+
+    return all_of
+
+
+def _is_fraction_of_pi(value: YamlValue, angle: float) -> bool:
+    """Return whether ``angle`` > 0 is a multiple of pi / 12 to all digits that ``value`` has."""
+    digits = _decimals(str(value.held))
+    digits = 9 if digits is None else digits
+    steps = round(angle * 12.0 / math.pi)
+    # Two decimals are enough only for quarters of a turn.
+    exact = digits >= 3 or (digits == 2 and steps % 6 == 0)
+    return exact and steps > 0 and abs(steps * math.pi / 12.0 - angle) <= 0.51 * 10.0**-digits
+
+
+def _decimals(text: str) -> int | None:
+    """Return the number of decimal places of a number; None for an expression."""
+    whole, _, decimals = text.lstrip("+-").partition(".")
+    return len(decimals) if (whole + decimals).isdigit() else None
 
 
 def millimetres(

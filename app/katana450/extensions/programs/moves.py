@@ -122,7 +122,7 @@ class Nudge:
         """Read {axis, by}. Raises ScriptError."""
         fields = Fields(value, "a nudge")
         axis = fields.need("axis", read.whole(1, places.MAX_JOINTS), 1)
-        found = cls(axis - 1, fields.need("by", read.degrees(-720.0, 720.0), 0.0))
+        found = cls(axis - 1, fields.need("by", read.angle(-720.0, 720.0), 0.0))
         fields.done()
         return found
 

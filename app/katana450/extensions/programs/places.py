@@ -77,20 +77,20 @@ def pose(value: YamlValue, setting: ScriptContext) -> StepTarget:
 
 def joints(value: YamlValue) -> FloatArray:
     """Read the angles (n,) of all joints in degrees; returns [rad]. Raises ScriptError."""
-    return np.array(read.listed(read.degrees(-720.0, 720.0), LEAST_JOINTS, MAX_JOINTS)(value))
+    return np.array(read.angles(-720.0, 720.0, LEAST_JOINTS, MAX_JOINTS)(value))
 
 
 def pitch(value: YamlValue) -> float | str | None:
     """Read a pitch: an angle [rad], ROOMIEST, or None for ``keep``. Raises ScriptError."""
     if value.number is not None:
-        return read.degrees(-360.0, 360.0)(value)
+        return read.angle(-360.0, 360.0)(value)
     named = read.choice("keep", ROOMIEST)(value)
     return None if named == "keep" else named
 
 
 def angles(fields: Fields) -> Angles:
     """Read pitch, roll and yaw [rad]; None where they are absent."""
-    each: Callable[[YamlValue], float | None] = read.degrees(-360.0, 360.0)
+    each: Callable[[YamlValue], float | None] = read.angle(-360.0, 360.0)
     return Angles(*(fields.take(name, each, None) for name in Angles._fields))
 
 

@@ -13,6 +13,7 @@ import yaml
 
 from katana450.errors import InputError
 from katana450.extensions.programs.expression import PLAIN
+from katana450.extensions.programs.yaml_errors import explained
 
 MAX_BYTES = 64 * 1024
 """[bytes] Maximum size of a script."""
@@ -122,16 +123,8 @@ def composed(text: str, what: str, file: str) -> yaml.Node | None:
         # The events are checked first: composing recurses, and resolves anchors.
         _check_bounds(text, what, file)
         return yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line, column = (mark.line + 1, mark.column + 1) if mark is not None else (1, 1)
-        problem = f"This is not valid YAML: {error.problem or error.context or 'unknown syntax'}."
-        raise ScriptError((Problem(line, column, problem, file),)) from error
     except yaml.YAMLError as error:
-        # The text has a character that YAML does not allow.
-        problem = f"This is not valid YAML: {str(error).splitlines()[0]}."
-        line = text[: getattr(error, "position", 0) or 0].count("\n") + 1
-        raise ScriptError((Problem(line, 1, problem, file),)) from error
+        raise ScriptError((Problem(*explained(error, text), file),)) from error
 
 
 def _check_bounds(text: str, what: str, file: str) -> None:

@@ -170,8 +170,8 @@ class ArcGeometry:
         pitch = fields.take("pitch", places.pitch, None)
         angles = Angles(
             pitch if isinstance(pitch, float) else None,
-            fields.take("roll", read.degrees(), None),
-            fields.take("yaw", read.degrees(), None),
+            fields.take("roll", read.angle(), None),
+            fields.take("yaw", read.angle(), None),
         )
         is_roomiest = pitch == places.ROOMIEST
         return cls(centre, direction, angles, setting.in_base, is_roomiest, feed(fields))
@@ -258,7 +258,7 @@ class Arc:
         fields = Fields(value, "an arc")
         found = cls(
             ArcGeometry.read(fields, "axis", setting),
-            fields.need("angle", read.degrees(), 1.0),
+            fields.need("angle", read.angle(), 1.0),
             fields.take("climb", read.millimetres(), 0.0),
         )
         fields.done()
@@ -365,7 +365,7 @@ class Screw:
         found = cls(
             fields.need("point", lambda each: places.point(each, setting), np.zeros(3)),
             fields.need("axis", read.direction, np.eye(3)[0]),
-            fields.take("angle", read.degrees(), 0.0),
+            fields.take("angle", read.angle(), 0.0),
             fields.take("climb", read.millimetres(), 0.0),
             setting.in_base,
         )
