@@ -6,6 +6,7 @@ import pytest
 
 from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.moves import Move
+from katana450.extensions.programs.pick import Pick
 from katana450.extensions.programs.script import Script, parse
 from katana450.extensions.programs.settings_steps import TimedPause
 from katana450.extensions.programs.source import ScriptError
@@ -72,6 +73,11 @@ steps:
   - for_each: {name: p, in: [{a: 1}, {a: 2}], steps: [{wait: p.a * 2}]}
 """)
     assert waits(script) == [1.0, 2.0, 6.0, 2.0, 4.0]
+
+
+def test_item_of_a_list_is_a_name() -> None:
+    script = parse("let: {parts: [cup, basin]}\nsteps:\n  - pick: parts[1]\n")
+    assert [each.step for each in script.steps] == [Pick("basin")]
 
 
 def test_definition_has_parameters_with_defaults() -> None:

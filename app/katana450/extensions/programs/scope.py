@@ -19,6 +19,9 @@ from katana450.extensions.programs.source import YamlValue
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """Pattern of a name."""
 
+ITEM = re.compile(r"\[(\d+)\]")
+"""Pattern of the number of an item of a list, as in ``corner[0]``."""
+
 V = TypeVar("V")
 
 RESERVED = frozenset(
@@ -79,9 +82,10 @@ class Scope:
 
     def _bound_text(self, value: YamlValue) -> YamlValue:
         text = str(value.held)
-        if text in self.values:
+        name = ITEM.sub(r".\1", text)
+        if name in self.values:
             # Errors are reported where the name is used.
-            return replace(self.values[text], line=value.line, column=value.column, file=value.file)
+            return replace(self.values[name], line=value.line, column=value.column, file=value.file)
         try:
             found = evaluate(text, self.numbers)
         except ExpressionError as error:
