@@ -246,7 +246,16 @@ def test_speed_is_a_fraction_of_the_scripts_own(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("steps", "line", "said"),
     [
-        ("  - wait: 1\n  - joints: [0, 0, 0, 0, 500]", 3, "beyond its limit"),
+        (
+            "  - wait: 1\n  - joints: [0, 0, 0, 0, 500]",
+            3,
+            r"Axis 5 would be at 500\.0 deg, beyond its limit: its range is -164.5 to 171.5",
+        ),
+        (
+            "  - via: {through: [{joints: [0, 0, 0, 0, 0]}, {joints: [0, 200, 0, 0, 0]}]}",
+            2,
+            "^.*: Axis 2",
+        ),
         ("  - move: {x: 900, y: 0, z: 0}", 2, "cannot be at"),
         ("  - line: {by: {x: 500}}", 2, "reach"),
         ("  - home\n  - line: {by: {z: -285}}", 3, "table"),

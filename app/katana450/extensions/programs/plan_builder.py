@@ -21,6 +21,7 @@ from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.hand_choice import hand_of
 from katana450.extensions.programs.hand_planning import HandPlanning
 from katana450.extensions.programs.planning_choice import planning_of
+from katana450.extensions.programs.reaching import check_range
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
@@ -370,7 +371,9 @@ class PlanBuilder:
         """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
             self.plan_context.session.check(SetJoints(place.joints))
-            return self.plan_context.arm.chain.check_q(place.joints)
+            q = self.plan_context.arm.chain.check_q(place.joints)
+            check_range(self.chain, q)
+            return q
         return self.joints_of(self.target_at(place), place.branch)
 
     def target_at(self, place: StepTarget, now: DragTarget | None = None) -> DragTarget:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
+from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
@@ -11,6 +16,18 @@ from katana450.maths.kinematics.tracker import leap
 
 EXACT = 1e-9
 """[m] and [rad] Maximum error of a place that counts as reached."""
+
+
+def check_range(chain: Chain, q: FloatArray) -> None:
+    """Raise InputError, with the range, if an axis at ``q`` (n,) [rad] is beyond its limits."""
+    if chain.within_limits(q):
+        return
+    number = int(np.maximum(chain.lower - q, q - chain.upper).argmax())
+    value, low, high = (math.degrees(bounds[number]) for bounds in (q, chain.lower, chain.upper))
+    raise InputError(
+        f"Axis {number + 1} would be at {value:.1f} deg, beyond its limit: its range is "
+        f"{low:.1f} to {high:.1f} deg."
+    )
 
 
 def branches_near(chain: Chain, q: FloatArray) -> tuple[Branch, ...]:

@@ -114,7 +114,7 @@ class TrajectoryPath(PolynomialPath):
             place, axis = np.unravel_index(int(beyond.argmax()), beyond.shape)
             raise InputError(
                 f"At {self.times[0] + t[place]:.2f} s axis {axis + 1} would be "
-                f"{np.degrees(beyond.max()):.2g} deg beyond its limit."
+                f"{np.degrees(beyond.max()):.4g} deg beyond its limit."
             )
 
     @property

@@ -80,7 +80,7 @@ class JointPath(PolynomialPath):
                 axis = int(beyond.argmax())
                 raise InputError(
                     f"Via {number + 1} has axis {axis + 1} at {math.degrees(q[axis]):.1f} deg, "
-                    f"{math.degrees(beyond[axis]):.2g} deg beyond its limit."
+                    f"{math.degrees(beyond[axis]):.4g} deg beyond its limit."
                 )
         # A leg is as long as its duration at full speed, so that no leg has length 0.
         lengths = (np.abs(np.diff(vias, axis=0)) / self.chain.speed).max(axis=1)
