@@ -15,6 +15,10 @@ class KatanaError(Exception):
 class InputError(KatanaError, ValueError):
     """A value from outside is unusable: not finite, of the wrong shape, not a rotation, ..."""
 
+    def after(self, introduction: str) -> InputError:
+        """Return the error with ``introduction`` before its text."""
+        return InputError(f"{introduction}: {self}")
+
 
 class CancelledError(KatanaError):
     """A calculation was cancelled before it had a result."""
@@ -26,6 +30,7 @@ class PathError(InputError):
     Attributes:
         text: the text, with ``{point}`` where the point stands, and ``{parts}`` for the bodies.
         point: (3,) the tool point there [m]; empty if the text has none.
+        frame: name of its frame.
         parts: names of the two bodies that meet; empty if the text names none.
     """
 
@@ -37,10 +42,14 @@ class PathError(InputError):
         parts: Sequence[str] = (),
     ) -> None:
         """Name ``point`` and ``parts`` in ``text``; ``frame``: name of the frame of the point."""
-        self.text, self.point, self.parts = text, point, parts
+        self.text, self.point, self.frame, self.parts = text, point, frame, parts
         shown = ", ".join(f"{1e3 * each:.1f}" for each in point)
         text = text.replace("{point}", f"({shown}) mm in {frame}")
         super().__init__(text.replace("{parts}", " and ".join(parts)))
+
+    def after(self, introduction: str) -> PathError:
+        """Return the error with ``introduction`` before its text, and the point still apart."""
+        return PathError(f"{introduction}: {self.text}", self.point, self.frame, self.parts)
 
 
 class BlockedError(PathError):

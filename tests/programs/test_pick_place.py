@@ -142,7 +142,21 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
             "- pick: part\n- pick: low\n", "already holds an object", marks=pytest.mark.long
         ),
         ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
-        ("- pick: part\n- place: {at: {x: 230, y: 720}}\n", "nothing carries it there"),
+        ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
+        # The pitch of the grasp has nothing to do with it.
+        (
+            "- pick: part\n- place: {at: {x: 230, y: 720}}\n",
+            "nothing carries it there.*choose a place on it.$",
+        ),
+        (
+            "- pick: part\n- place: {at: {x: 100, y: -40}}\n",
+            r"placed there: The path .* at \(100.0, -40.0, \d+.\d\) mm in the base frame",
+        ),
+        ("- pick: part\n- place: {on: basin}\n", "basin is open at its top and cannot carry part"),
+        (
+            "- pick: part\n- place: {at: {x: 60, y: -200}}\n",
+            "basin is open at its top and cannot carry part",
+        ),
         pytest.param(
             "- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n",
             "put it 30.0 mm lower",
@@ -171,6 +185,9 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
         box("part", NEAR, yaw=60.0),
         box("low", (170.0, 190.0), (40.0, 40.0, 10.0)),
         box("far", (550.0, -100.0)),
+        replace(
+            box("basin", (60.0, -200.0), (60.0, 70.0), shape=Shape.CYLINDER), can_be_held=False
+        ),
         replace(box("ball", (100.0, -250.0), (20.0,), shape=Shape.SPHERE), can_be_held=False),
     )
     with pytest.raises(InputError, match=message):

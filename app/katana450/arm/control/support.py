@@ -43,7 +43,7 @@ def check_carried(
     if table is None or scene_object.carried:
         return
     (x, y), lowest = scene_object.T_collision_shape[:2, 3], _lowest(scene_object)
-    tops = [each.T[2, 3] + each.height for each in objects if _is_over(scene_object, each)]
+    tops = [each.T[2, 3] + each.height for each in objects if is_over(scene_object, each)]
     if table.x[0] <= x <= table.x[1] and table.y[0] <= y <= table.y[1]:
         tops.append(0.0)
     if any(lowest - top <= SUPPORT_GAP for top in tops):
@@ -65,7 +65,7 @@ def surface_below(objects: Sequence[SceneObject], scene_object: SceneObject) -> 
     The object is where it would be released; the table is at 0.
     """
     lowest = _lowest(scene_object) + SUPPORT_GAP
-    tops = [each.T[2, 3] + each.height for each in objects if _is_over(scene_object, each)]
+    tops = [each.T[2, 3] + each.height for each in objects if is_over(scene_object, each)]
     return max((float(top) for top in tops if top <= lowest), default=0.0)
 
 
@@ -99,7 +99,7 @@ def _lowest(scene_object: SceneObject) -> float:
     return float(T[2, 3] - reach)
 
 
-def _is_over(scene_object: SceneObject, other: SceneObject) -> bool:
+def is_over(scene_object: SceneObject, other: SceneObject) -> bool:
     """Return whether the middle of ``scene_object`` is over the level top of ``other``."""
     if other.name == scene_object.name or other.carried or other.shape is Shape.SPHERE:
         return False

@@ -6,7 +6,7 @@ each of them, until both are in the same situation, and then once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -195,6 +195,7 @@ class Compiler:
         # The index of the step that grasped the held object, and the place before that step.
         grasp: tuple[int, _Place] | None = None
         refused: Problem | None = None
+        reasons: set[Problem] = set()
         while (index := sum(each.used for each in found)) < end:
             before = self._place
             try:
@@ -202,8 +203,9 @@ class Compiler:
             except ScriptError as error:
                 self._return_to(before)
                 refused = refused or error.problems[0]
+                reasons.add(error.problems[0])
                 if grasp is None or builder.taken is None or builder.taken.chosen is None:
-                    raise self._error(refused) from error
+                    raise self._error(refused, reasons) from error
                 given_up = (*builder.given_up, builder.taken.chosen)
                 number, place = grasp
                 self._return_to(place._replace(given_up=given_up))
@@ -216,6 +218,7 @@ class Compiler:
                 return _Line(found, last.ends)
             if builder.taken is None:
                 grasp, refused, builder.given_up = None, None, ()
+                reasons.clear()
             elif builder.taken is not before.taken:
                 tried_again = builder.taken.chosen is not None and isinstance(last, _UntimedStep)
                 grasp = (len(found) - 1, before) if tried_again else None
@@ -347,11 +350,17 @@ class Compiler:
                 found.append((name, action))
         return found
 
-    def _error(self, refused: Problem) -> ScriptError:
+    def _error(self, refused: Problem, reasons: Set[Problem]) -> ScriptError:
+        """Return the first refusal, with the other pitches of the grasp that have failed too.
+
+        ``reasons``: the refusals with all pitches. A reason that is the same with each of them has
+        nothing to do with the pitch.
+        """
         text = refused.text
         pitches_tried = dict.fromkeys(each.pitch for each in self._builder.given_up)
         tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
-        if len(tried) > 1:
+        at_step = [each for each in reasons if each.line == refused.line]
+        if len(tried) > 1 and len(at_step) > 1:
             pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
             text += f" No other pitch of the grasp helps: tried {pitches} deg."
         return ScriptError((replace(refused, text=text),))

@@ -120,7 +120,7 @@ class Grasp:
         found = cls(
             fields.need("object", read.text, ""),
             fields.take("side", read.choice(FRONT, ABOVE), ""),
-            fields.take("pitch", read.degrees(0.0, 90.0), None),
+            fields.take("pitch", read.angle(0.0, 90.0), None),
             fields.take("height", read.millimetres(1.0, 500.0), None),
         )
         fields.done()
@@ -166,7 +166,7 @@ class Grasp:
         try:
             builder.first(via_home, take)
         except InputError as error:
-            raise InputError(f"{self.name} cannot be grasped at its place: {error}") from error
+            raise error.after(f"{self.name} cannot be grasped at its place") from error
 
     def _approach(self, builder: PlanBuilder, scene_object: SceneObject) -> None:
         """Plan the grasp with the first approach that works. Raises InputError without one."""

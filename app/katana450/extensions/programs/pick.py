@@ -39,7 +39,7 @@ class Pick(Grasp):
         try:
             builder.first(LIFTS, lift)
         except InputError as error:
-            raise InputError(f"{self.name} cannot be lifted: {error}") from error
+            raise error.after(f"{self.name} cannot be lifted") from error
 
 
 def stacked(value: YamlValue, setting: ScriptContext) -> tuple[Step, Step]:

@@ -9,9 +9,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from katana450.arm.control.pouring import CUP
+from katana450.arm.control.pouring import BASIN, CUP
 from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
-from katana450.arm.control.support import check_carried, surface_below
+from katana450.arm.control.support import check_carried, is_over, surface_below
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
@@ -115,11 +115,10 @@ class PlaceHeld:
                 lambda low: _bring(builder, held, low),
             )
         except InputError as error:
-            raise InputError(f"{held.name} cannot be placed there: {error}") from error
+            raise error.after(f"{held.name} cannot be placed there") from error
 
     def _spot(self, builder: PlanBuilder, held: SceneObject) -> FloatArray:
         """Return the place (3,) [m] of the underside in the base frame. Raises InputError."""
-        objects = [each for each in builder.state.objects if not each.carried]
         at = np.zeros(3)
         if self.on:
             at = builder.scene_object(self.on).T[:3, 3]
@@ -128,7 +127,7 @@ class PlaceHeld:
             at = T[:3, :3] @ np.nan_to_num(self.at) + T[:3, 3]
         if self.at is None or math.isnan(self.at[2]):
             high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
-            at = np.array((at[0], at[1], surface_below(objects, high)))
+            at = np.array((at[0], at[1], surface_below(_objects_around(builder), high)))
         standing = _standing(held, at)
         if self.on:
             below = builder.scene_object(self.on)
@@ -137,7 +136,7 @@ class PlaceHeld:
                     f"{self.on} cannot carry {held.name} there: its top must be level, and the "
                     f"middle of {held.name} over it."
                 )
-        check_carried(builder.plan_context.session.environment.table, objects, standing)
+        _check_support(builder, standing)
         return at
 
 
@@ -186,22 +185,7 @@ class Release:
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the release. Raises InputError if the object would fall, or there is no room."""
-        held = held_object(builder, "release")
-        T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
-        lifted = replace(held, T=T, held=False)
-        objects = [each for each in builder.state.objects if not each.carried]
-        below = surface_below(objects, lifted)
-        check_carried(
-            builder.plan_context.session.environment.table,
-            objects,
-            _standing(held, np.append(T[:2, 3], below)),
-        )
-        fall = float(T[2, 3]) - below
-        if fall > MAX_FALL:
-            raise InputError(
-                f"{held.name} would fall {1e3 * fall:.0f} mm. Lower it to at most "
-                f"{1e3 * MAX_FALL:.0f} mm first, or use `place`."
-            )
+        check_fall(builder, held_object(builder, "release"))
         let_go(builder)
 
 
@@ -211,6 +195,37 @@ def held_object(builder: PlanBuilder, step: str) -> SceneObject:
         if each.held:
             return each
     raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
+
+
+def check_fall(builder: PlanBuilder, held: SceneObject) -> None:
+    """Raise InputError if the held object would fall, or nothing carries it, if it is released."""
+    T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+    lifted = replace(held, T=T, held=False)
+    below = surface_below(_objects_around(builder), lifted)
+    _check_support(builder, _standing(held, np.append(T[:2, 3], below)))
+    fall = float(T[2, 3]) - below
+    if fall > MAX_FALL:
+        raise InputError(
+            f"{held.name} would fall {1e3 * fall:.0f} mm. Lower it to at most "
+            f"{1e3 * MAX_FALL:.0f} mm first, or use `place`."
+        )
+
+
+def _check_support(builder: PlanBuilder, standing: SceneObject) -> None:
+    """Raise InputError if nothing carries the object ``standing``, or an open vessel would."""
+    objects = _objects_around(builder)
+    for each in objects:
+        if each.name in (CUP, BASIN) and is_over(standing, each):
+            raise InputError(
+                f"{each.name} is open at its top and cannot carry {standing.name}. Choose a place "
+                "beside it."
+            )
+    check_carried(builder.plan_context.session.environment.table, objects, standing)
+
+
+def _objects_around(builder: PlanBuilder) -> list[SceneObject]:
+    """Return the objects that the hand does not carry."""
+    return [each for each in builder.state.objects if not each.carried]
 
 
 def let_go(builder: PlanBuilder) -> None:
@@ -226,7 +241,7 @@ def let_go(builder: PlanBuilder) -> None:
     try:
         builder.first(APPROACHES, draw_back)
     except InputError as error:
-        raise InputError(f"There is no room to draw back: {error}") from error
+        raise error.after("There is no room to draw back") from error
     builder.taken = None
 
 
@@ -237,7 +252,7 @@ def _spot(value: YamlValue, setting: ScriptContext) -> tuple[FloatArray, float |
     fields = Fields(value, "the place of an object")
     x, y = (fields.need(name, read.millimetres(), 0.0) for name in "xy")
     z = fields.take("z", read.millimetres(), math.nan)
-    yaw = fields.take("yaw", read.degrees(-360.0, 360.0), None)
+    yaw = fields.take("yaw", read.angle(-360.0, 360.0), None)
     fields.done()
     return np.array((x, y, z)), yaw
 

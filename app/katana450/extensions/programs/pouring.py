@@ -167,7 +167,7 @@ class Pour:
             else:
                 self._pour_about_the_lip(builder, cup, basin, rest)
         except InputError as error:
-            raise InputError(f"The cup cannot be emptied into {self.into}: {error}") from error
+            raise error.after(f"The cup cannot be emptied into {self.into}") from error
         builder.predict_water(rest)
 
     def _rest(self, water: Water) -> float:

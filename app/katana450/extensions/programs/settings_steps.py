@@ -12,6 +12,7 @@ from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, SetSpeed, UseTool, Wait
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.finger_planning import finger_unit, with_fingers
+from katana450.extensions.programs.place import check_fall
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.schema_parts import (
     OBJECT,
@@ -89,6 +90,8 @@ class Gripper:
                 f"The fingers would hold {instead} instead of {self.holding}, which has to stand "
                 "where they close."
             )
+        if builder.state.held is not None and held.held is None:
+            check_fall(builder, builder.state.held)
         builder.note("gripper", MoveFingers(angle, self.holding), held)
         if held.grip is None:
             builder.taken = None
