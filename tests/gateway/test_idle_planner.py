@@ -120,3 +120,17 @@ def test_library_is_planned_with_the_pour_first() -> None:
     assert with_gripper[0] == script_text(LIBRARY / "pour.yaml")
     assert len(with_gripper) == len(list(LIBRARY.glob("*.yaml"))) - 1
     assert len(idle_planner._texts(with_gripper=False)) == 1
+
+
+def test_command_during_the_start_of_a_planning_cancels_it(session: Session) -> None:
+    planning = Mock(text=SCRIPT, cancelled=None, busy=True)
+
+    def plan(_text: str, _speed: float) -> Mock:
+        planner.cancel()
+        return planning
+
+    planner = IdlePlanner(plan, with_gripper=True)
+    state = session.begin(session.ready, 0.0, 0.0)
+    planner.tick(state, 0.0, used=True)
+    planner.tick(state, WAIT, used=False)
+    planning.cancel.assert_called_once()

@@ -68,8 +68,8 @@ class ObjectHandles:
     def show(self, visible: bool) -> None:
         """Show or hide the handles."""
         self._shown = visible
-        for name, handle in self._handles.items():
-            # The objects may change meanwhile, because viser calls this in a thread of its own.
+        # The objects may change meanwhile, because viser calls this in a thread of its own.
+        for name, handle in tuple(self._handles.items()):
             scene_object = self._objects.get(name)
             shown = visible and scene_object is not None and not scene_object.carried
             if handle.visible != shown:

@@ -36,7 +36,8 @@ class IdlePlanner:
         """
         self._plan = plan
         self._texts = _texts(with_gripper=with_gripper)
-        self._plannings: list[Planning] = []
+        # Replaced and never changed: a command of any thread cancels the planning.
+        self._plannings: tuple[Planning, ...] = ()
         self._used: float | None = None
 
     def tick(self, state: State, t: float, *, used: bool) -> None:
@@ -47,23 +48,27 @@ class IdlePlanner:
             t: time [s].
             used: whether somebody uses the arm or plans a program, or nobody watches it.
         """
-        if used or state.moving or self._used is None:
+        since = self._used
+        if used or state.moving or since is None:
             self.cancel()
             self._used = t
-        elif t - self._used >= DELAY and not any(each.busy for each in self._plannings):
-            kept = [each for each in self._plannings if not each.changed_to(state)]
-            self._plannings = kept
+        elif t - since >= DELAY and not any(each.busy for each in self._plannings):
+            kept = tuple(each for each in self._plannings if not each.changed_to(state))
             known = [each.text for each in kept]
             text = next((each for each in self._texts if each not in known), None)
             if text is not None:
-                kept.append(self._plan(text, SPEED))
+                kept = (*kept, self._plan(text, SPEED))
+            self._plannings = kept
+            if self._used is None:
+                # A command came meanwhile.
+                self.cancel()
 
     def cancel(self) -> None:
         """Cancel the planning that is under way, keep what is planned, and wait again."""
         self._used = None
         for each in self._plannings:
             each.cancel("The server is in use.")
-        self._plannings = [each for each in self._plannings if each.cancelled is None]
+        self._plannings = tuple(each for each in self._plannings if each.cancelled is None)
 
     def take(self, text: str, speed: float, state: State) -> Planning | None:
         """Return the planning of ``text`` that is done or under way for ``state``, and forget it.
@@ -73,7 +78,7 @@ class IdlePlanner:
         for each in self._plannings:
             same = (each.text, each.speed) == (text, speed) and each.refused is None
             if same and not each.changed_to(state):
-                self._plannings.remove(each)
+                self._plannings = tuple(other for other in self._plannings if other is not each)
                 return each
         return None
 
