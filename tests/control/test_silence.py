@@ -26,6 +26,26 @@ def test_profile_chooses_between_stop_and_pause() -> None:
     assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == stop
     assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(finding=LATE)
     assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == stop
+    # A program keeps its path, unless somebody may stand beside the arm.
+    assert SilenceProfile.SIMULATION.braking(LATE, 0.3, resumes=True) == cmd.Pause(LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT, resumes=True) == stop
+    assert SilenceProfile.REAL_ARM.braking(LATE, 0.3, resumes=True) == stop
+
+
+def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state: State) -> None:
+    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
+    paused = run(session, moving, [cmd.Pause(LATE)], ticks=100)
+    assert paused.pause_cause == LATE
+    assert not paused.moving
+    resumed = run(session, paused, [cmd.Resume()], ticks=300)
+    assert resumed.pause_cause is None
+    assert not resumed.findings
+    assert resumed.q[0] == 1.0
+    # The pause of a person lasts, whether it came before or after.
+    for pauses in ([cmd.Pause(), cmd.Pause(LATE)], [cmd.Pause(LATE), cmd.Pause()]):
+        both = run(session, moving, pauses, ticks=100)
+        assert both.paused
+        assert both.pause_cause is None
 
 
 @pytest.fixture

@@ -65,7 +65,9 @@ class FakeArm:
     @property
     def state(self) -> State:
         stopped = ActiveStop(0.0, 0.0) if self.stopped else self.rest.stopped
-        findings = () if self.cause is None else (Finding(Reason.WAITING), self.cause)
+        findings = self.rest.findings
+        if self.cause is not None:
+            findings = (Finding(Reason.WAITING), self.cause)
         state = replace(self.rest, stopped=stopped, findings=findings)
         return replace(state, goal=state.setpoint + 0.1) if self.moves else state
 

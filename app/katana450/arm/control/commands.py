@@ -222,9 +222,14 @@ class Hold(BaseCommand):
 
 @dataclass(frozen=True)
 class Pause(BaseCommand):
-    """Come to rest on the path, and keep the goal."""
+    """Come to rest on the path, and keep the goal.
+
+    With a ``finding``, which only the server gives, the program that drives may resume by itself.
+    """
 
     traits: ClassVar[CommandTraits] = CommandTraits(pacing=True, supersedes=False, joints_only=True)
+
+    finding: Finding | None = None
 
 
 @dataclass(frozen=True)

@@ -86,15 +86,24 @@ def end_drag(state: State) -> State:
     return replace(state, goal=goal, blocked=False)
 
 
-def paused(state: State) -> State:
-    """Return ``state`` that comes to rest on its path and keeps its goal."""
-    others = without_finding(state, Reason.PAUSED).findings
-    return replace(state, paused=True, findings=(Finding(Reason.PAUSED), *others))
+def paused(state: State, cause: Finding | None = None) -> State:
+    """Return ``state`` that comes to rest on its path and keeps its goal.
+
+    cause: that of a pause by the server, which leaves an earlier pause as it is; None for a person,
+    whose pause lasts.
+    """
+    if state.paused and cause is not None:
+        return state
+    moving = resumed(state)
+    why = (Finding(Reason.PAUSED),) if cause is None else (Finding(Reason.PAUSED), cause)
+    return replace(moving, paused=True, findings=(*why, *moving.findings))
 
 
 def resumed(state: State) -> State:
     """Return ``state`` that continues after a pause."""
-    return without_finding(replace(state, paused=False), Reason.PAUSED)
+    cause = state.pause_cause
+    reasons = (Reason.PAUSED,) if cause is None else (Reason.PAUSED, cause.reason)
+    return without_finding(replace(state, paused=False), *reasons)
 
 
 def with_stream_sample(

@@ -259,8 +259,8 @@ class Session:
         if not isinstance(command, KEEP_DETOUR):
             state = with_detour(state, None)
         match command:
-            case cmd.Pause():
-                return paused(state)
+            case cmd.Pause(finding=cause):
+                return paused(state, cause)
             case cmd.Resume():
                 return resumed(state)
             case cmd.OperateArm():

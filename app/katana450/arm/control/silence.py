@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from katana450.arm.control.commands import Hold, Stop
+from katana450.arm.control.commands import Hold, Pause, Stop
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Finding
 from katana450.arm.control.stop_cause import StopCause
@@ -22,11 +22,17 @@ class SilenceProfile(Enum):
     REAL_ARM = "real arm"
     """The arm stops, and the stop is latched: somebody may stand beside it."""
     SIMULATION = "simulation"
-    """The arm pauses: it brakes and drops its targets, and the next command moves it. Silence of
-    PAUSE_TIMEOUT latches the stop."""
+    """The arm pauses: it brakes and drops its targets, and the next command moves it. A program
+    keeps its path if only the page's server was silent. Silence of PAUSE_TIMEOUT latches the stop.
+    """
 
-    def braking(self, cause: Finding, silence: float) -> Stop | Hold:
-        """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``."""
+    def braking(
+        self, cause: Finding, silence: float, *, resumes: bool = False
+    ) -> Stop | Hold | Pause:
+        """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``.
+
+        resumes: whether a program drives that may resume by itself.
+        """
         if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
             return Stop(StopCause(f"{finding_text(cause)}."), cause)
-        return Hold(finding=cause)
+        return Pause(cause) if resumes else Hold(finding=cause)

@@ -297,6 +297,12 @@ class State:
         return any(finding.reason is Reason.WAITING for finding in self.findings)
 
     @property
+    def pause_cause(self) -> Finding | None:
+        """Cause of a pause by the server from which a program may resume; None without one."""
+        kept = self.paused and not self.waits
+        return next((each for each in self.findings if kept and each.reason in CAUSES), None)
+
+    @property
     def intent(self) -> Idle | Positioning | Tracking | Jogging | Servoing | Following:
         """The mode, or the mode that has superseded the plan which the arm is leaving."""
         return self.mode.then if isinstance(self.mode, Leaving) else self.mode

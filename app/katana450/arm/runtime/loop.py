@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands import OperateArm, Stop
 from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.messages import finding_text
@@ -80,6 +81,7 @@ class ControlLoop:
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
         self._newest: Submission | None = None
+        self._program_drives = False
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Publisher of the states of the loop."""
         self.state_publisher.publish(
@@ -101,6 +103,10 @@ class ControlLoop:
         drained = self._mailbox.drain()
         if drained.submissions:
             self._newest = drained.submissions[-1]
+        for submission in drained.submissions:
+            if any(part.traits.supersedes for part in submission.command.parts):
+                actor = submission.actor
+                self._program_drives = actor is not None and actor.channel is CommandChannel.PROGRAM
         before = self._state
         t = self._clock.now()
         if self._resting and drained.submissions:
@@ -174,10 +180,12 @@ class ControlLoop:
     def brake(self, cause: Finding, silence: float) -> None:
         """Stop or pause a moving arm after ``silence`` [s], for the reason ``cause``."""
         state = self.state_publisher.snapshot.state
-        latched = isinstance(command := self.profile.braking(cause, silence), Stop)
-        if state.stopped is not None or not (state.moving or (latched and state.waits)):
+        resumes = self._program_drives and cause.reason is Reason.SERVER_SILENT
+        command = self.profile.braking(cause, silence, resumes=resumes)
+        latched, halted = isinstance(command, Stop), state.waits or state.pause_cause is not None
+        if state.stopped is not None or not (state.moving or (latched and halted)):
             return
-        if state.waits and not latched:
+        if halted and not latched:
             return
         log.error("%s: %s.", "STOP" if latched else "Paused", finding_text(cause))
         self.paused_at = self._clock.now()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, Hold, Stop
+from katana450.arm.control.commands import Command, Hold, Pause, Stop
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
 from katana450.arm.runtime.tick import Submission
@@ -139,4 +139,4 @@ class Mailbox:
 
 
 def _pauses(command: Command) -> bool:
-    return isinstance(command, Hold) and command.finding is not None
+    return isinstance(command, Hold | Pause) and command.finding is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,9 +13,11 @@ from katana450.arm.control.modes import Idle
 from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.server.program_owner import AlwaysAlive, program_identity
-from katana450.server.service.command_gate import RunningProgram
+from katana450.server.service.command_gate import SETTLE_TIME, RunningProgram
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
+
+log = logging.getLogger(__name__)
 
 FollowRun = Callable[[str, str, float, float | None], None]
 """Function of name and text of a script, and the times at which it began and ended [s]."""
@@ -62,6 +65,7 @@ class ProgramParticipant:
         self._speed = self._commanded = hub.present().state.speed
         self._tool = hub.present().state.tool
         self.allowed = 1.0
+        self._pause_seen: float | None = None
         self._began, self._follow_run = hub.clock(), follow_run
         follow_run(self._began, None)
 
@@ -70,10 +74,22 @@ class ProgramParticipant:
         """True while the program holds the lease."""
         return self._hub.lease.holder == self.joined.person
 
-    def follow_speed(self, state: State) -> None:
-        """Keep a speed that a person has set, to the end of the program and after it."""
+    def follow(self, state: State, t: float) -> None:
+        """Keep a speed that a person has set, and end a pause for which only the server was late.
+
+        The speed is kept to the end of the program and after it. ``t`` is the present time [s].
+        """
         if state.speed != self._commanded:
             self._speed = self.allowed = self._commanded = state.speed
+        if state.pause_cause is None:
+            self._pause_seen = None
+        elif self._pause_seen is None:
+            # What people have ordered meanwhile is read first.
+            self._pause_seen = t
+        elif t - self._pause_seen > SETTLE_TIME and not state.moving:
+            log.info("The program %s continues after a pause.", self.joined.actor.name)
+            with suppress(InputError, LeaseError):
+                self.send(cmd.Resume())
 
     def send(self, *commands: cmd.Command) -> int | None:
         """Give ``commands`` to the arm, no faster than allowed; return the ticket of the last."""

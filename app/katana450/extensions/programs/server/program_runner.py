@@ -244,7 +244,7 @@ class ProgramRunner(Runner):
             return
         arm = hub.arm
         if arm is not None and arm.caught_up:
-            self._runs_as.follow_speed(arm.state)
+            self._runs_as.follow(arm.state, t)
             run, commands = runner.step(program, self._run, arm.state, t)
             try:
                 self._runs_as.send(*commands)
