@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import re
 import zipfile
+from itertools import count
 from pathlib import Path
 
 import mujoco
@@ -18,6 +21,9 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
+from tests.general_arms.chain_urdf import chain_urdf
+from tests.general_arms.links_of_arms import ur5e
+from tests.general_arms.published_arms import PANDA
 
 MASS = 9.271
 """[kg] Mass of the robot."""
@@ -225,7 +231,7 @@ def test_another_mechanism_is_a_model_too(tmp_path: Path, gantry: Robot) -> None
     for link, T in gantry.frames(values).items():
         np.testing.assert_allclose(data.body(link).xpos, T[:3, 3], atol=1e-9, err_msg=link)
     assert model.neq == 2
-    assert [model.key(k).name for k in range(model.nkey)] == ["zero"]
+    assert [model.key(k).name for k in range(model.nkey)] == ["home", "zero"]
 
 
 def test_an_arm_without_masses_holds_itself_too(tmp_path: Path) -> None:
@@ -239,3 +245,66 @@ def test_an_arm_without_masses_holds_itself_too(tmp_path: Path) -> None:
     while data.time < 1.0:
         mujoco.mj_step(model, data)
     assert float(np.abs(data.qpos - start).max()) < SAG
+
+
+def weighed(urdf: str, masses: list[float], efforts: list[float]) -> str:
+    """Return ``urdf`` with the masses [kg] of its links with shapes, and efforts [N m]."""
+    link, joint = count(), count()
+
+    def inertial(found: re.Match[str]) -> str:
+        mass = masses[next(link)]
+        moments = " ".join(f'{name}="{0.01 * mass}"' for name in ("ixx", "iyy", "izz"))
+        return (
+            f'{found[0]}<inertial><mass value="{mass}"/>'
+            f'<inertia {moments} ixy="0" ixz="0" iyz="0"/></inertial>'
+        )
+
+    urdf = re.sub(r'<link name="[^"]+">', inertial, urdf)
+    return re.sub(r'effort="[^"]*"', lambda _: f'effort="{efforts[next(joint)]}"', urdf)
+
+
+UR5 = weighed(
+    # Thick wrists, so that links which are no neighbours overlap.
+    ur5e().replace('radius="0.045" length="0.12"', 'radius="0.06" length="0.24"'),
+    [4.0, 3.76, 8.06, 2.85, 1.37, 1.3, 0.365],
+    [150.0, 150.0, 150.0, 28.0, 0.0, 28.0],
+)
+FRANKA = weighed(
+    chain_urdf("panda", PANDA).replace('radius="0.02"', 'radius="0.06"'),
+    [3.0, 3.0, 3.0, 2.5, 2.0, 1.5],
+    [87.0] * 4 + [12.0] * 3,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "home", "forces"),
+    [
+        # Without an effort: twice the weight that the joint carries.
+        (UR5, (0.0, -np.pi / 2, -np.pi / 2), [150.0, 150.0, 150.0, 28.0, None, 28.0]),
+        (FRANKA, (0.0, -np.pi / 4, 0.0), [87.0] * 4 + [12.0] * 3),
+    ],
+    ids=["ur5", "panda"],
+)
+def test_other_arms_hold_themselves_at_home(
+    tmp_path: Path, text: str, home: tuple[float, ...], forces: list[float | None]
+) -> None:
+    """Links that overlap there do not push each other away, and forces are limited."""
+    (tmp_path / "arm.urdf").write_text(text)
+    command = ["export", "mjcf", "--urdf", str(tmp_path / "arm.urdf"), "--out", str(tmp_path)]
+    assert main(command) == 0
+    zipfile.ZipFile(next(tmp_path.glob("*.zip"))).extractall(tmp_path)
+    (scene,) = tmp_path.glob("*/scene.xml")
+    model = mujoco.MjModel.from_xml_path(str(scene))
+    stated = [math.nan if force is None else force for force in forces]
+    limits = np.where(np.isnan(stated), model.actuator_forcerange[:, 1], stated)
+    assert (limits > 0.0).all()
+    np.testing.assert_allclose(model.actuator_forcerange, np.column_stack((-limits, limits)))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    start, speed = data.qpos.copy(), 0.0
+    np.testing.assert_allclose(start[:3], home, atol=1e-9)
+    while data.time < 5.0:
+        mujoco.mj_step(model, data)
+        speed = max(speed, float(np.abs(data.qvel).max()))
+    assert float(np.abs(data.qpos - start).max()) < SAG
+    assert speed < 0.1

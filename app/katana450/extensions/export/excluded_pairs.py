@@ -2,39 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
+from katana450.arm.robot.structure import ARM_JOINTS
+from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
+from katana450.extensions.export.home import home_vector
+from katana450.maths.collision.linkage import Linkage
+from katana450.maths.collision.world import CollisionWorld, Part
 
-ADJACENT, NEVER = "Adjacent", "Never"
-"""Reasons of MoveIt: joined by at most one joint, or never in contact."""
+ADJACENT, NEVER, DEFAULT = "Adjacent", "Never", "Default"
+"""Reasons of MoveIt: neighbours in the tree, never in contact, in contact at home."""
 
 
 def excluded_pairs(robot: Robot) -> list[tuple[str, str, str]]:
     """Return (link, link, reason) of the pairs of links with collision shapes that cannot meet.
 
-    For an arm these are all pairs that this project does not check either: neighbours, pairs that
-    no sampled posture brings near each other, and those that always overlap. For a mechanism
-    without an arm these are the neighbours.
+    For an arm of the five-axis family these are all pairs that this project does not check either:
+    neighbours, pairs that no sampled posture brings near each other, and those that always overlap.
+    For any other robot these are the neighbours, and the pairs whose hulls touch at home.
     """
-    links = [link for link in robot.links if link.collisions]
-    joined = [
-        (a.name, b.name, ADJACENT)
-        for a, b in combinations(links, 2)
-        if len(_joints_between(robot, a, b)) <= 1
-    ]
-    world = world_of(robot)[0] if robot.arm is not None else None
-    if world is None:
-        return joined
-    names = [part.name for part in world.parts]
-    met = {frozenset((names[a], names[b])) for a, b in world.pairs}
-    adjacent = {frozenset(pair[:2]) for pair in joined}
+    touching: set[tuple[str, str]] = set()
+
+    def at_home(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
+        rest = pairs_at_rest(linkage, parts, home_vector(robot))
+        touching.update((parts[a].name, parts[b].name) for a, b in rest.touching)
+        return CollisionWorld(linkage, parts, rest.checked)
+
+    links = {link.name: link for link in robot.links if link.collisions}
+    if not links:
+        return []
+    family = robot.arm is not None and robot.arm.chain.n == ARM_JOINTS
+    world, _ = world_of(robot, make=None if family else at_home)
+    names = [] if world is None else [part.name for part in world.parts]
+    checked = set() if world is None else {(names[a], names[b]) for a, b in world.pairs}
+
+    def reason(a: str, b: str) -> str:
+        if (a, b) in touching:
+            return DEFAULT
+        near = not family or len(_joints_between(robot, links[a], links[b])) <= 1
+        return ADJACENT if near else NEVER
+
     return [
-        (a, b, ADJACENT if frozenset((a, b)) in adjacent else NEVER)
-        for a, b in combinations(names, 2)
-        if frozenset((a, b)) not in met
+        (a, b, reason(a, b))
+        for a, b in combinations([name for name in names if name in links], 2)
+        if (a, b) not in checked
     ]
 
 

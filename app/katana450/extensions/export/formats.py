@@ -88,9 +88,11 @@ def _urdf(job: ExportJob) -> Mapping[str, bytes]:
 
 
 def _mjcf(job: ExportJob) -> Mapping[str, bytes]:
+    from katana450.assembly.robot_files import read_robot
+    from katana450.assembly.robot_session import find_arm
     from katana450.extensions.export.mjcf import mjcf_files
 
-    return mjcf_files(job.robot, job.options.urdf)
+    return mjcf_files(read_robot(job.options.urdf, None, find_arm), job.options.urdf)
 
 
 def _usd(job: ExportJob) -> Mapping[str, bytes]:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import Settings
 
 
@@ -13,4 +17,17 @@ def home_of(robot: Robot) -> Mapping[str, float]:
     arm = robot.arm
     if arm is None:
         return robot.every({})
-    return robot.every(arm.joint_values(arm.ready(Settings.ready), arm.gripper.clamp(0.0)))
+    return robot.every(arm.joint_values(*_start(arm)))
+
+
+def home_vector(robot: Robot) -> FloatArray:
+    """Return `home_of` as the joint values (k,) [rad or m] of a collision world of ``robot``."""
+    if robot.arm is None:
+        home = home_of(robot)
+        return np.array([*(home[name] for name in robot.driven), 0.0])
+    return np.append(*_start(robot.arm))
+
+
+def _start(arm: MountedArm) -> tuple[FloatArray, float]:
+    """Return the angles (n,) [rad] and the value of the finger joint [rad or m] of ``arm``."""
+    return arm.ready(Settings.ready), arm.gripper.clamp(0.0)

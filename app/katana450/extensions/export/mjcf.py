@@ -195,6 +195,7 @@ class _Model:
                     "joint": name,
                     "kp": _numbers([drive.stiffness], 3),
                     "dampratio": "1",
+                    "forcerange": _numbers((-drive.max_force, drive.max_force), 4),
                     **({"ctrlrange": limits} if limits else {}),
                 },
             )
@@ -221,9 +222,8 @@ class _Model:
 
 
 def keyframes(robot: Robot) -> dict[str, Mapping[str, float]]:
-    """Return the values of all joints [rad or m] at zero, and for an arm at the app's home."""
-    found = {} if robot.arm is None else {"home": home_of(robot)}
-    return {**found, "zero": robot.every({})}
+    """Return the values of all joints [rad or m] at the app's home and at zero."""
+    return {"home": home_of(robot), "zero": robot.every({})}
 
 
 def _body(link: str) -> str:

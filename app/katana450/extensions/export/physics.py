@@ -33,6 +33,12 @@ MAX_FREQUENCY = 400.0
 MIN_LOAD = 0.01
 """[N m, N] Minimum weight for which a drive is made, for joints that carry no mass."""
 
+FORCE_RATIO = 2.0
+"""Maximum force of a drive without a credible effort in the file, as a ratio to its load."""
+
+CREDIBLE_RATIO = 0.5
+"""A smaller effort, as a ratio to the load of a joint, is not that of its motor."""
+
 
 @dataclass(frozen=True, eq=False)
 class Inertial:
@@ -60,20 +66,22 @@ class Inertial:
 class Drive:
     """A position controller of a joint, and the losses of the joint.
 
-    None of the numbers is of a real motor, except damping and friction that the URDF states. The
-    stiffness is as low as `SAG` allows.
+    None of the numbers is of a real motor, except damping, friction and effort that the URDF
+    states. The stiffness is as low as `SAG` allows.
 
     Attributes:
         stiffness: [N m/rad or N/m].
         armature: inertia of the drive, seen at the joint [kg m^2 or kg].
         damping: [N m s/rad or N s/m].
         friction: [N m or N].
+        max_force: [N m or N].
     """
 
     stiffness: float
     armature: float
     damping: float
     friction: float
+    max_force: float
 
 
 def inertials_of(path: Path) -> dict[str, Inertial]:
@@ -113,7 +121,10 @@ def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
     """Return a drive for each movable joint of ``robot``, whose URDF file is at ``path``."""
     inertials = inertials_of(path)
     stated = {
-        joint.get("name", ""): _numbers(joint.find("dynamics"), ("damping", "friction"))
+        joint.get("name", ""): (
+            *_numbers(joint.find("dynamics"), ("damping", "friction")),
+            *_numbers(joint.find("limit"), ("effort",)),
+        )
         for joint in ET.fromstring(read_urdf(path)).iterfind("joint")
     }
     carried = {
@@ -127,13 +138,14 @@ def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
             for other in robot.joints.values()
             if joint.name in (other.name, other.leader)
         ]
-        load = sum(factor * weight for factor, weight, _ in moved)
+        load = max(sum(factor * weight for factor, weight, _ in moved), MIN_LOAD)
         inertia = sum(factor * factor * mass for factor, _, mass in moved)
-        stiffness = max(load, MIN_LOAD) / SAG
+        stiffness = load / SAG
         armature = max(INERTIA_RATIO * inertia, stiffness / MAX_FREQUENCY**2 - inertia)
-        damping, friction = stated.get(joint.name, (0.0, 0.0))
+        damping, friction, effort = stated.get(joint.name, (0.0, 0.0, 0.0))
+        force = effort if CREDIBLE_RATIO * load <= effort < np.inf else FORCE_RATIO * load
         spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
-        found[joint.name] = Drive(stiffness, armature, damping or spring, friction)
+        found[joint.name] = Drive(stiffness, armature, damping or spring, friction, force)
     return found
 
 
