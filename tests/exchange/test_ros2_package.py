@@ -25,6 +25,7 @@ from katana450.cli.main import main
 from katana450.extensions.export.excluded_pairs import ADJACENT, excluded_pairs
 from katana450.extensions.export.home import home_of
 from katana450.extensions.export.ros2.manifest import USED
+from katana450.extensions.rosbridge import names
 from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
@@ -132,10 +133,19 @@ def test_controllers_command_the_driven_joints(folder: Path, katana: Robot) -> N
     assert manager["update_rate"] == 100
     assert set(parameters) == {"arm_controller", "gripper_controller"}
     assert all("type" in manager[name] for name in (*parameters, "joint_state_broadcaster"))
-    commanded = [
-        joint for each in parameters.values() for joint in each["ros__parameters"]["joints"]
-    ]
-    assert commanded == list(katana.driven)
+    arm, gripper = (parameters[name]["ros__parameters"] for name in parameters)
+    assert [*arm["joints"], gripper["joint"]] == list(katana.driven)
+
+
+def test_gripper_has_the_action_of_our_server(folder: Path) -> None:
+    """The controller of this type serves `gripper_cmd` below its name."""
+    parameters = yaml.safe_load((folder / "config" / "controllers.yaml").read_text())
+    manager = parameters["controller_manager"]["ros__parameters"]
+    name, _, action = names.GRIPPER.strip("/").partition("/")
+    assert action == "gripper_cmd"
+    assert manager[name]["type"] == "position_controllers/GripperActionController"
+    assert names.FOLLOW.strip("/").partition("/")[0] in parameters
+    assert "gripper_controllers" in (folder / "package.xml").read_text()
 
 
 def test_launch_files_name_files_of_the_package(folder: Path) -> None:

@@ -68,7 +68,18 @@ def test_mujoco_loads_the_same_robot(model: mujoco.MjModel) -> None:
     assert model.body_mass.sum() == pytest.approx(MASS, abs=1e-9)
     np.testing.assert_allclose(model.body_mass, here.body_mass)
     np.testing.assert_allclose(model.jnt_range, here.jnt_range)
-    np.testing.assert_allclose(model.geom_pos, here.geom_pos, atol=1e-9)
+    np.testing.assert_allclose(model.geom_pos, here.geom_pos, atol=1e-5)
+
+
+def test_driven_joints_have_a_transmission_each(urdf: Path, katana: Robot) -> None:
+    """Drake makes an actuator of each."""
+    driven = [
+        (transmission.findtext("type"), joint.get("name"))
+        for transmission in ET.parse(urdf).getroot().iterfind("transmission")
+        for joint in transmission.iterfind("joint")
+    ]
+    simple = "transmission_interface/SimpleTransmission"
+    assert driven == [(simple, name) for name in katana.driven]
 
 
 def test_mujoco_finds_no_contact_between_neighbours(model: mujoco.MjModel) -> None:
@@ -98,7 +109,7 @@ def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
 ) -> None:
     names = [mesh.get("filename", "") for mesh in ET.parse(urdf).getroot().iter("mesh")]
     files = [name.removeprefix("package://katana450_description/") for name in names]
-    assert {Path(file).suffix for file in files} == {".obj", ".stl"}
+    assert {Path(file).suffix for file in files} == {".obj"}
     there = {f"meshes/{path.name}" for path in (folder / "meshes").iterdir()}
     assert there == {*files, "meshes/materials.mtl"}
 
@@ -246,7 +257,7 @@ def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: P
     np.testing.assert_allclose(there.scene.bounds, [[-0.2, -0.2, -0.1], [2.2, 0.2, 1.2]])
     assert [mesh.get("filename") for mesh in base.iterfind("collision/geometry/mesh")] == [
         f"package://two_description/meshes/{tmp_path.name}_{name}"
-        for name in ("both.obj", "plain.STL")
+        for name in ("both.obj", "plain.obj")
     ]
 
 
@@ -291,7 +302,7 @@ NO_MESH = MESH.format("no.stl")
         ("", "is not a robot description"),
         ("<robot/>", "its <robot> has no name"),
         ('<other name="x"/>', "is <other>, not <robot>"),
-        (f'<robot name="x"><link name="a">{NO_MESH}</link></robot>', "no mesh at .*no.stl"),
+        (f'<robot name="x"><link name="a">{NO_MESH}</link></robot>', "Nothing was written.*no.stl"),
     ],
 )
 def test_invalid_robot_is_refused(tmp_path: Path, text: str, said: str) -> None:

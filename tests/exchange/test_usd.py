@@ -194,3 +194,11 @@ def test_the_same_robot_gives_the_same_text(gantry: Robot) -> None:
 
 def test_strings_are_escaped() -> None:
     assert quoted('a "b" \\ c\n') == '"a \\"b\\" \\\\ c\\n"'
+
+
+def test_size_of_a_dense_mesh_is_stated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("katana450.extensions.export.export.LARGE_BYTES", 4_000_000)
+    assert main(["export", "usd", "--out", str(tmp_path)]) == 0
+    assert "5 MB, because the meshes have 48,942 triangles" in capsys.readouterr().err

@@ -13,6 +13,9 @@ from katana450.errors import InputError
 from katana450.extensions.export.formats import FORMATS, ExportJob, named
 from katana450.extensions.export.trajectory_file import load_motion
 
+LARGE_BYTES = 20_000_000
+"""Size [bytes] of all files together above which the command says why."""
+
 
 def export(
     options: argparse.Namespace, files_of: Callable[[ExportJob], Mapping[str, bytes]]
@@ -39,6 +42,14 @@ def export(
     write_files({folder / name: writer_of(content) for name, content in files.items()})
     for name, content in files.items():
         print(f"{folder / name}: {len(content)} bytes")
+    total = sum(map(len, files.values()))
+    if total > LARGE_BYTES:
+        triangles = sum(len(shape.faces) for link in robot.links for shape in link.shapes)
+        print(
+            f"katana450: These are {total / 1e6:.0f} MB, because the meshes have {triangles:,} "
+            "triangles. Reduce the mesh files to get smaller ones; glb is the smallest format.",
+            file=sys.stderr,
+        )
     return 0
 
 

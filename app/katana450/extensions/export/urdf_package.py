@@ -3,7 +3,8 @@
 Programs differ in the files that they find and read. `package://` names are for ROS, yourdfpy and
 PyBullet. MuJoCo drops folders from names, so the URDF names the folder for it. PyBullet, RViz and
 Drake have trouble with glTF, so such meshes become OBJ, one file per material, and the URDF names
-the colours.
+the colours. Drake refuses the STL of a collision, so collisions become OBJ too. It drives the
+joints that have a <transmission>.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.assembly.robot_files import read_robot, read_urdf
+from katana450.assembly.robot_session import find_arm
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.archive import zipped
 from katana450.extensions.export.names import distinct
@@ -36,7 +38,7 @@ from katana450.extensions.export.ros2.manifest import Maintainer, cmake_text, ma
 from katana450.extensions.export.ros2.srdf import srdf_text
 
 CONVERTED = (".glb", ".gltf")
-"""Suffixes of meshes that become OBJ; others are copied unchanged."""
+"""Suffixes of visual meshes that become OBJ; others are copied unchanged."""
 
 MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
 """Attributes for MuJoCo's compiler: find meshes without `package://`, keep links on fixed joints.
@@ -77,11 +79,13 @@ def package_files(
     (plain,) = distinct([robot])
     package = f"{plain.lower()}_description"
     _weigh_frames(root)
+    model = read_robot(path, None, find_arm)
+    _add_transmissions(root, model)
     meshes = _with_meshes(root, path.parent, f"package://{package}/")
     files = {
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,
-        **_launched(read_robot(path), package, plain),
+        **_launched(model, package, plain),
     }
     files = {
         "package.xml": manifest_text(package, robot, license_name, maintainer).encode(),
@@ -120,21 +124,25 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
     ]
     if not used:
         return {}
-    shapes: dict[Path, Sequence[VisualMesh]] = {}
-    for _, _, source in used:
-        if not source.is_file():
-            raise RobotDescriptionError(f"There is no mesh at {source}.")
-        if source.suffix.lower() in CONVERTED and source not in shapes:
-            shapes[source] = shapes_of(Visual(np.eye(4), np.ones(3), source))
-            if not shapes[source]:
-                raise RobotDescriptionError(f"{source} has no triangles. Export the mesh again.")
-    shown = dict.fromkeys(source for _, element, source in used if element.tag == "visual")
-    names = _names(root, [shape.material for source in shown for shape in shapes.get(source, ())])
+    missing = [str(path) for path in dict.fromkeys(path for *_, path in used) if not path.is_file()]
+    if missing:
+        raise RobotDescriptionError(
+            f"Nothing was written, because mesh files are missing: {', '.join(missing)}. Put them "
+            "there, or remove their elements from the URDF."
+        )
     # A mesh that is only copied is one file for visual and collision.
-    keys = [(source, source in shapes and element.tag == "visual") for _, element, source in used]
+    keys = [
+        (path, element.tag if _is_converted(path, element.tag) else None)
+        for _, element, path in used
+    ]
+    shapes = {path: _triangles(path) for path, tag in dict.fromkeys(keys) if tag is not None}
+    shown = dict.fromkeys(path for path, tag in keys if tag == "visual")
+    names = _names(root, [shape.material for path in shown for shape in shapes[path]])
     groups = {
-        (source, shown): _parts(source, shapes.get(source), names if shown else None)
-        for source, shown in dict.fromkeys(keys)
+        (path, tag): _parts(
+            path, None if tag is None else shapes[path], names if tag == "visual" else None
+        )
+        for path, tag in dict.fromkeys(keys)
     }
     stems = iter(distinct(part.stem for group in groups.values() for part in group))
     placed = {
@@ -153,6 +161,20 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
     if names:
         files[f"meshes/{LIBRARY}"] = mtl_text({n: m for m, n in names.items()}).encode()
     return files
+
+
+def _is_converted(path: Path, tag: str) -> bool:
+    """Return whether the mesh of an element of this ``tag`` becomes OBJ."""
+    suffix = path.suffix.lower()
+    return suffix in CONVERTED if tag == "visual" else suffix != ".obj"
+
+
+def _triangles(path: Path) -> Sequence[VisualMesh]:
+    """Return the surfaces of a mesh file. Raises RobotDescriptionError if there are none."""
+    shapes = shapes_of(Visual(np.eye(4), np.ones(3), path))
+    if not shapes:
+        raise RobotDescriptionError(f"{path} has no triangles. Export the mesh again.")
+    return shapes
 
 
 def _names(root: ET.Element, materials: Sequence[Material]) -> dict[Material, str]:
@@ -206,6 +228,21 @@ def _material(name: str, material: Material) -> ET.Element:
     rgba = " ".join(f"{part:.4g}" for part in (*material.colour, 1.0))
     ET.SubElement(element, "color", rgba=rgba)
     return element
+
+
+def _add_transmissions(root: ET.Element, robot: Robot) -> None:
+    """Give each driven joint a transmission by position, unless the URDF has one for it."""
+    known = {joint.get("name") for joint in root.iterfind("transmission/joint")}
+    for name in robot.driven:
+        if name in known:
+            continue
+        element = ET.SubElement(root, "transmission", name=f"{name}_transmission")
+        ET.SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
+        joint = ET.SubElement(element, "joint", name=name)
+        interface = "hardware_interface/PositionJointInterface"
+        ET.SubElement(joint, "hardwareInterface").text = interface
+        actuator = ET.SubElement(element, "actuator", name=f"{name}_motor")
+        ET.SubElement(actuator, "mechanicalReduction").text = "1"
 
 
 def _weigh_frames(root: ET.Element) -> None:

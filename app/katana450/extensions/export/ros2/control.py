@@ -7,10 +7,14 @@ from xml.sax.saxutils import quoteattr
 
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.home import home_of
-from katana450.extensions.export.ros2.groups import groups_of
+from katana450.extensions.export.ros2.groups import GRIPPER, JointGroup, groups_of
 
 XACRO = "http://www.ros.org/wiki/xacro"
 """Namespace of xacro."""
+
+FOLLOW = "joint_trajectory_controller/JointTrajectoryController"
+GRIP = "position_controllers/GripperActionController"
+"""Controllers with the action `follow_joint_trajectory`, and `gripper_cmd` as on our server."""
 
 UPDATE_RATE = 100
 """[Hz] Rate of the controllers."""
@@ -57,15 +61,13 @@ def controllers_yaml(robot: Robot) -> str:
         "      type: joint_state_broadcaster/JointStateBroadcaster",
     ]
     for group in groups:
-        lines += [
-            f"    {group.controller}:",
-            "      type: joint_trajectory_controller/JointTrajectoryController",
-        ]
+        lines += [f"    {group.controller}:", f"      type: {GRIP if _grips(group) else FOLLOW}"]
     for group in groups:
+        lines += ["", f"{group.controller}:", "  ros__parameters:"]
+        if _grips(group):
+            lines.append(f"    joint: {_quoted(group.joints[0])}")
+            continue
         lines += [
-            "",
-            f"{group.controller}:",
-            "  ros__parameters:",
             "    joints:",
             *(f"      - {_quoted(joint)}" for joint in group.joints),
             "    command_interfaces:",
@@ -75,6 +77,11 @@ def controllers_yaml(robot: Robot) -> str:
             "      - velocity",
         ]
     return "\n".join((*lines, ""))
+
+
+def _grips(group: JointGroup) -> bool:
+    """Return whether the group is a gripper of one driven joint, the only kind that GRIP drives."""
+    return group.name == GRIPPER and len(group.joints) == 1
 
 
 def _quoted(name: str) -> str:

@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 USED = (
     "controller_manager",
+    "gripper_controllers",
     "hardware_interface",
     "joint_state_broadcaster",
     "joint_state_publisher_gui",
