@@ -5,22 +5,23 @@ start of a server. A value that is kept needs neither.
 
 A file is found by a hash of the inputs, of the version of Python and the libraries, and of the size
 and time of every file of this package, so an old value is never used. Its content begins with its
-own hash: a damaged file counts as missing. Where nothing can be written, each start computes the
-values.
+own hash: a damaged file counts as missing. It holds plain values and arrays in MessagePack, which
+can run no code when they are read. Where nothing can be written, or where others can, each start
+computes the values.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import os
-import pickle
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
@@ -40,11 +41,13 @@ LIBRARIES = ("numpy", "trimesh", "yourdfpy")
 HASH_LENGTH = hashlib.sha256().digest_size
 
 
-def kept(make: Callable[[], T], *inputs: bytes | str | np.ndarray[Any, Any]) -> T:
+def kept(make: Callable[[], T], kind: type[T], *inputs: bytes | str | np.ndarray[Any, Any]) -> T:
     """Return the value of ``make``, from the disk if it was computed before from ``inputs``.
 
     Args:
         make: computes the value, which depends on ``inputs`` alone. Its name is part of the hash.
+        kind: type of the value: plain values, arrays and paths, alone and in data classes, named
+            tuples, tuples, lists and dictionaries.
         inputs: everything on which the value depends.
     """
     folder = _folder()
@@ -53,7 +56,7 @@ def kept(make: Callable[[], T], *inputs: bytes | str | np.ndarray[Any, Any]) -> 
     name = f"{make.__module__}.{make.__qualname__}"
     file = folder / _digest((_surroundings(), name, *inputs)).hex()
     with suppress(OSError, _DamagedError):
-        found: T = _loaded(file.read_bytes())
+        found: T = _loaded(file.read_bytes(), kind)
         with suppress(OSError):
             os.utime(file)
         return found
@@ -100,44 +103,54 @@ def _surroundings() -> bytes:
 @cache
 def _folder() -> Path | None:
     """Return the folder of the files; None if it cannot be created or others may write to it."""
-    folder = cache_folder() / "katana450"
     try:
+        # Resolved, so that nobody can lead to another folder later.
+        folder = (cache_folder() / "katana450").resolve()
+        # Nothing is created in the home of another user, which sudo may keep.
+        if not only_this_user_writes(folder):
+            return None
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # Loading a file may run code, so the files must come from this user alone.
         return folder if only_this_user_writes(folder) else None
-    except OSError:
+    except (OSError, RuntimeError):
         return None
 
 
-def _loaded(data: bytes) -> Any:
+def _loaded(data: bytes, kind: type[T]) -> T:
     """Return the value in the content of a file. Raises _DamagedError."""
     if hashlib.sha256(data[HASH_LENGTH:]).digest() != data[:HASH_LENGTH]:
         raise _DamagedError
-    return pickle.loads(data[HASH_LENGTH:])
+    try:
+        return msgspec.msgpack.decode(data[HASH_LENGTH:], type=kind, dec_hook=_restored)
+    except (msgspec.MsgspecError, TypeError, ValueError) as error:
+        raise _DamagedError from error
 
 
 def _store(file: Path, value: object) -> None:
     """Write ``value`` whole or not at all. Raises InputError."""
-    stream = io.BytesIO()
-    _Pickler(stream, pickle.HIGHEST_PROTOCOL).dump(value)
-    content = stream.getvalue()
+    content = msgspec.msgpack.encode(value, enc_hook=_plain)
     write_files({file: writer_of(hashlib.sha256(content).digest() + content)}, mode=0o600)
     files = sorted(file.parent.iterdir(), key=lambda each: each.stat().st_mtime)
     for each in files[:-MAX_FILES]:
         each.unlink(missing_ok=True)
 
 
-class _Pickler(pickle.Pickler):
-    """Keeps arrays read-only, which pickle forgets."""
+def _plain(value: Any) -> object:
+    """Return a path or an array as plain values. Raises TypeError for anything else."""
+    if isinstance(value, Path):
+        return str(value)
+    import numpy as np
 
-    def reducer_override(self, value: Any) -> Any:
-        import numpy as np
-
-        if isinstance(value, np.ndarray) and not value.flags.writeable:
-            return _read_only, (value.copy(),)
-        return NotImplemented
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        return value.dtype.str, value.shape, value.flags.writeable, value.tobytes()
+    raise TypeError(f"{type(value).__name__} cannot be kept on the disk.")
 
 
-def _read_only(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    array.setflags(write=False)
-    return array
+def _restored(kind: Any, plain: Any) -> Any:
+    """Return the path or the array that ``_plain`` turned into ``plain``."""
+    if kind is Path:
+        return Path(plain)
+    import numpy as np
+
+    dtype, shape, writeable, data = plain
+    array = np.frombuffer(data, np.dtype(dtype)).reshape(shape)
+    return array.copy() if writeable else array

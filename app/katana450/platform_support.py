@@ -226,17 +226,24 @@ def cache_folder() -> Path:
 
 
 def only_this_user_writes(folder: Path) -> bool:
-    """Return whether ``folder`` is this user's and nobody else may write to it.
+    """Return whether nobody but this user, and root, may write to ``folder`` or replace it.
 
-    On Windows the folders of a user are protected by inheritance, and the answer is always true.
-    Raises OSError if it is missing.
+    So the folders above it count too, and a missing one is as safe as these. On Windows the folders
+    of a user are protected by inheritance, and the answer is always true. Raises OSError.
     """
-    found = folder.stat()
     if sys.platform == "win32":
         return True
     else:  # noqa: RET505 - so that mypy follows either system
-        others = stat.S_IWGRP | stat.S_IWOTH
-        return found.st_uid == os.getuid() and not found.st_mode & others
+        for part in (folder, *folder.parents):
+            if not part.exists():
+                continue
+            status = part.stat()
+            writers = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+            # In a folder above it like /tmp, nobody may replace what belongs to others.
+            shared = writers and (part == folder or not status.st_mode & stat.S_ISVTX)
+            if status.st_uid not in (os.getuid(), 0) or shared:
+                return False
+        return True
 
 
 def _set_priority_class(priority: int) -> None:

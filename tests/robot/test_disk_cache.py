@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import pickle
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450 import disk_cache
 from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.creases import Drawn
 from katana450.arm.robot.loader import load
+from katana450.arm.robot.surfaces import shapes_of
+from katana450.assembly import page_files
 from katana450.disk_cache import kept
+from katana450.extensions.bodies.pieces import pieces
+from katana450.extensions.conduit.rings import Floats, poses
+from katana450.extensions.conduit.stretches import stretches_of
+from katana450.extensions.water.nodes import _glossy
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
+from katana450.server.view.scene import surface
+from katana450.server.view.scene_objects import _merged
+from katana450.server.viser_bridge import viser_page
 
 
 class Made:
     """Counts how often a value is computed."""
 
-    def __init__(self, value: object = 1.0) -> None:
+    def __init__(self, value: Any = 1.0) -> None:
         self.times = 0
         self.value = value
         self.__module__, self.__qualname__ = __name__, "Made"
 
-    def __call__(self) -> object:
+    def __call__(self) -> Any:
         self.times += 1
         return self.value
 
@@ -45,10 +60,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_value_is_computed_once_for_the_same_inputs() -> None:
     made = Made(np.arange(3.0))
     for _ in range(3):
-        np.testing.assert_array_equal(kept(made, b"a", "b", np.eye(2)), np.arange(3.0))
+        np.testing.assert_array_equal(kept(made, FloatArray, b"a", "b", np.eye(2)), np.arange(3.0))
     assert made.times == 1
     for others in ((b"ab",), (b"a", "b"), (b"a", "b", np.zeros((2, 2))), (b"a", "b", np.eye(4))):
-        kept(made, *others)
+        kept(made, FloatArray, *others)
     assert made.times == 5
 
 
@@ -57,21 +72,42 @@ def test_read_only_array_stays_read_only() -> None:
     array = np.arange(3.0)
     array.setflags(write=False)
     for _ in range(2):
-        found = kept(Made((array, np.zeros(2))), b"")
+        found = kept(Made((array, np.zeros(2))), tuple[FloatArray, FloatArray], b"")
         assert isinstance(found, tuple)
         assert [each.flags.writeable for each in found] == [False, True]
 
 
 def test_damaged_file_is_replaced(folder: Path) -> None:
     made = Made()
-    kept(made, b"a")
+    kept(made, float, b"a")
     (file,) = folder.iterdir()
     whole = file.read_bytes()
     for damaged in (b"", whole[:-1], whole[:40], whole[:-1] + b"x"):
         file.write_bytes(damaged)
-        assert kept(made, b"a") == 1.0
+        assert kept(made, float, b"a") == 1.0
         assert file.read_bytes() == whole
     assert made.times == 5
+
+
+class Harmful:
+    """Leaves a file where it is unpickled."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.touch, (self.file,)
+
+
+def test_pickle_in_the_folder_is_not_read(folder: Path, tmp_path: Path) -> None:
+    made, trace = Made(), tmp_path / "trace"
+    kept(made, float, b"a")
+    (file,) = folder.iterdir()
+    content = pickle.dumps(Harmful(trace))
+    file.write_bytes(hashlib.sha256(content).digest() + content)
+    assert kept(made, float, b"a") == 1.0
+    assert made.times == 2
+    assert not trace.exists()
 
 
 def test_change_of_the_code_makes_a_value_old(
@@ -83,26 +119,27 @@ def test_change_of_the_code_makes_a_value_old(
     monkeypatch.setattr(disk_cache, "__file__", str(package / "disk_cache.py"))
     monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
     for _ in range(2):
-        kept(made, b"a")
+        kept(made, float, b"a")
     assert made.times == 1
     (package / "code.py").write_text("X = 12\n", encoding="ascii")
-    kept(made, b"a")
+    kept(made, float, b"a")
     assert made.times == 2
     assert len(list(folder.iterdir())) == 2
 
 
+@pytest.mark.usefixtures("folder")
 def test_another_version_of_a_library_makes_a_value_old(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     made = Made()
     monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
-    kept(made, b"a")
+    kept(made, float, b"a")
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "unrelated-1.0.dist-info").mkdir()
-    kept(made, b"a")
+    kept(made, float, b"a")
     assert made.times == 1
     (tmp_path / "trimesh-99.0.dist-info").mkdir()
-    kept(made, b"a")
+    kept(made, float, b"a")
     assert made.times == 2
 
 
@@ -112,39 +149,60 @@ def test_error_is_raised_again_and_leaves_no_file(folder: Path) -> None:
 
     for _ in range(2):
         with pytest.raises(ValueError, match="unreadable"):
-            kept(fail, b"a")
+            kept(fail, type(None), b"a")
     assert list(folder.iterdir()) == []
 
 
 def test_number_of_files_is_bounded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(disk_cache, "MAX_FILES", 3)
     for number in range(6):
-        kept(Made(), str(number))
+        kept(Made(), float, str(number))
     assert len(list(folder.iterdir())) == 3
 
 
 def test_value_that_is_used_is_kept_longest(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(disk_cache, "MAX_FILES", 2)
     used, unused = Made(), Made()
-    kept(used, "used")
-    kept(unused, "unused")
+    kept(used, float, "used")
+    kept(unused, float, "unused")
     for file in folder.iterdir():
         os.utime(file, (0, 0))
-    kept(used, "used")
-    kept(Made(), "new")
-    kept(used, "used")
-    kept(unused, "unused")
+    kept(used, float, "used")
+    kept(Made(), float, "new")
+    kept(used, float, "used")
+    kept(unused, float, "unused")
     assert (used.times, unused.times) == (1, 2)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
-def test_folder_that_others_may_write_to_is_not_used(folder: Path) -> None:
+def test_folder_that_others_may_write_to_or_replace_is_not_used(folder: Path) -> None:
     made = Made()
-    kept(made, b"a")
-    folder.chmod(0o777)
+    kept(made, float, b"a")
+    for open_to_others in (folder, folder.parent):
+        open_to_others.chmod(0o777)
+        for _ in range(2):
+            kept(made, float, b"a")
+        open_to_others.chmod(0o700)
+    assert made.times == 5
+    kept(made, float, b"a")
+    assert made.times == 5
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives folders away"
+)
+def test_home_of_another_user_stays_untouched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("XDG_CACHE_HOME", "HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setattr(disk_cache, "_folder", disk_cache._folder.__wrapped__)
+    os.chown(tmp_path, 12345, 12345)
+    made = Made()
     for _ in range(2):
-        kept(made, b"a")
-    assert made.times == 3
+        assert kept(made, float, b"a") == 1.0
+    assert made.times == 2
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
@@ -153,7 +211,7 @@ def test_folder_that_others_may_write_to_is_not_used(folder: Path) -> None:
 )
 def test_folder_that_is_read_only_changes_nothing(folder: Path) -> None:
     folder.chmod(0o500)
-    assert kept(Made(), b"a") == 1.0
+    assert kept(Made(), float, b"a") == 1.0
 
 
 RUN = """
@@ -202,3 +260,25 @@ def test_changed_file_is_read_again(tmp_path: Path) -> None:
     (tmp_path.parent / "meshes").mkdir(exist_ok=True)
     file.write_text(text.replace('name="katana450"', 'name="other"', 1), encoding="utf-8")
     assert load(file).name == "other"
+
+
+def test_every_kind_of_value_is_found_again(folder: Path) -> None:
+    robot = load()
+    visual = next(each for link in robot.links for each in link.visuals if each.glb is not None)
+    stretch = stretches_of(robot)[0]
+    for read in (
+        load,
+        partial(world_of, load()),
+        partial(pieces, visual),
+        partial(shapes_of, visual),
+        partial(surface, visual),
+        partial(visual.kept, lambda: _merged(visual), Drawn),
+        partial(kept, lambda: poses(stretch, 9), Floats),
+        partial(_glossy, np.eye(3), np.zeros((1, 3), np.uint32), (1.0, 2.0, 3.0, 0.5)),
+        page_files.load,
+        viser_page.load,
+    ):
+        read()
+        files = {file: file.stat().st_ino for file in folder.iterdir()}
+        read()
+        assert {file: file.stat().st_ino for file in folder.iterdir()} == files, read

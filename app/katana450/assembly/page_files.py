@@ -40,7 +40,7 @@ def load() -> dict[str, File]:
     def packed() -> dict[str, File]:
         return {name: File.of(each, TYPES[Path(name).suffix]) for name, each in found.items()}
 
-    return kept(packed, *found, *found.values())
+    return kept(packed, dict[str, File], *found, *found.values())
 
 
 def source(script: File) -> str:

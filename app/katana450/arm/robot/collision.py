@@ -31,7 +31,7 @@ MakeWorld = Callable[[Linkage, Sequence[Part]], CollisionWorld]
 
 def as_modelled(shape: Visual) -> Sequence[FloatArray]:
     """Return the vertices of ``shape``: one convex body, its hull."""
-    return [shape.kept(lambda: np.asarray(shape.mesh.vertices))]
+    return [shape.kept(lambda: np.asarray(shape.mesh.vertices), FloatArray)]
 
 
 def world_of(
@@ -88,7 +88,7 @@ def _pairs(
     shapes = [each.mark for part in parts for each in part.shapes]
     places = [(part.mover, part.T_mover_shape) for part in parts]
     bodies = pickle.dumps((groups, places, shapes))
-    return kept(pairs, bodies, lower, upper, library())
+    return kept(pairs, list[tuple[int, int]], bodies, lower, upper, library())
 
 
 def table() -> Part:

@@ -80,10 +80,10 @@ def shapes_of(visual: Visual) -> Sequence[VisualMesh]:
 
     Raises RobotDescriptionError for a mesh file that cannot be read.
     """
-    return visual.kept(lambda: _read(visual))
+    return visual.kept(lambda: _read(visual), list[VisualMesh])
 
 
-def _read(visual: Visual) -> Sequence[VisualMesh]:
+def _read(visual: Visual) -> list[VisualMesh]:
     plain = Material(
         "plain {:02x}{:02x}{:02x}".format(*visual.colour),
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),

@@ -56,6 +56,24 @@ class UrdfJoint:
 
 
 @dataclass(frozen=True, eq=False)
+class UrdfShape:
+    """A shape of a link: a ``Visual`` whose source is either a mesh file or a primitive."""
+
+    T_body_visual: FloatArray
+    scale: FloatArray
+    colour: Color
+    file: Path | None = None
+    primitive: PrimitiveShape | None = None
+
+    @property
+    def visual(self) -> Visual:
+        """The shape that can be read."""
+        source = self.file or self.primitive
+        assert source is not None
+        return Visual(self.T_body_visual, self.scale, source, self.colour)
+
+
+@dataclass(frozen=True, eq=False)
 class UrdfLink:
     """An element <link>.
 
@@ -68,8 +86,8 @@ class UrdfLink:
     """
 
     name: str
-    visuals: tuple[Visual, ...]
-    collisions: tuple[Visual, ...]
+    visuals: tuple[UrdfShape, ...]
+    collisions: tuple[UrdfShape, ...]
     mass: float
     center: FloatArray
     missing: tuple[tuple[Path, ...], tuple[Path, ...]]
@@ -131,7 +149,7 @@ def urdf_of(data: bytes, folder: Path) -> Urdf:
     # Which file a name refers to depends on the files that exist.
     files = [mesh_file(name.decode(errors="replace"), folder) for name in FILENAME.findall(data)]
     found = [f"{each} {each.is_file()}" for each in files]
-    return kept(lambda: _read(data, folder), data, str(folder), *found)
+    return kept(lambda: _read(data, folder), Urdf, data, str(folder), *found)
 
 
 def _read(data: bytes, folder: Path) -> Urdf:
@@ -181,26 +199,27 @@ def _joint(joint: Any) -> UrdfJoint:
 
 def _visual(
     shape: Any, colors: Mapping[str | None, Any], folder: Path, missing: list[Path]
-) -> Visual | None:
+) -> UrdfShape | None:
     """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
-    geometry, scale = shape.geometry, np.ones(3)
-    source: Path | PrimitiveShape
+    geometry, scale, file = shape.geometry, np.ones(3), None
+    primitive = None
     if geometry.box is not None:
-        source = PrimitiveShape("box", {"extents": geometry.box.size})
+        primitive = PrimitiveShape("box", {"extents": np.asarray(geometry.box.size).tolist()})
     elif geometry.cylinder is not None:
-        source = PrimitiveShape(
+        primitive = PrimitiveShape(
             "cylinder", {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length}
         )
     elif geometry.sphere is not None:
-        source = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": geometry.sphere.radius})
+        radius = geometry.sphere.radius
+        primitive = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": radius})
     else:
-        source = mesh_file(geometry.mesh.filename, folder)
-        if not source.is_file():
-            missing.append(source)
+        file = mesh_file(geometry.mesh.filename, folder)
+        if not file.is_file():
+            missing.append(file)
             return None
         if geometry.mesh.scale is not None:
             scale = np.broadcast_to(np.asarray(geometry.mesh.scale, dtype=float), 3)
-    return Visual(_origin(shape), frozen(scale), source, _color(shape, colors))
+    return UrdfShape(_origin(shape), frozen(scale), _color(shape, colors), file, primitive)
 
 
 def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:

@@ -103,10 +103,10 @@ class Visual:
         mesh.apply_transform(self.T_body_visual @ np.diag([*self.scale, 1.0]))
         return mesh
 
-    def kept(self, make: Callable[[], T], *inputs: str, files: Sequence[str] = SINGLE_FILES) -> T:
+    def kept(self, make: Callable[[], T], kind: type[T], files: Sequence[str] = SINGLE_FILES) -> T:
         """Return the value of ``make``, kept on disk where the shape comes from one file.
 
-        The value depends on the shape and on ``inputs`` alone. ``files``: suffixes of files that
+        The value depends on the shape alone. ``kind``: its type. ``files``: suffixes of files that
         are sufficient for it.
         """
         if not isinstance(self.source, Path) or self.source.suffix.lower() not in files:
@@ -117,7 +117,7 @@ class Visual:
             # The reader of the mesh explains why.
             return make()
         own = (self.T_body_visual, self.scale, str(self.colour))
-        return kept(make, self.source.suffix, data, *own, *inputs)
+        return kept(make, kind, self.source.suffix, data, *own)
 
 
 def scene_in(source: Path) -> Any:

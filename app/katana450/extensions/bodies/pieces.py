@@ -65,7 +65,7 @@ def pieces(shape: Visual) -> Sequence[FloatArray]:
 
     if isinstance(shape.source, PrimitiveShape):
         return [convex_body(shape.mesh.vertices).corners]
-    return shape.kept(divided, files=GEOMETRY_FILES)
+    return shape.kept(divided, list[FloatArray], files=GEOMETRY_FILES)
 
 
 def divided_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> list[FloatArray]:

@@ -50,7 +50,7 @@ class _StretchNode:
         self.stretch = stretch
         count = round(stretch.length / PITCH)
         made = pickle.dumps(stretch)
-        self._poses = kept(lambda: poses(stretch, count), made, str(count))
+        self._poses = kept(lambda: poses(stretch, count), Floats, made, str(count))
         self._steps = np.diff(self._poses, axis=0)
         self._shown = 0.0
         rings = self._at(0.0)

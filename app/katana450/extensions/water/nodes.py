@@ -212,7 +212,7 @@ def _glossy(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes
 
     look: red, green and blue (0 to 255, sRGB), and the opacity (0 to 1).
     """
-    return kept(lambda: _exported(corners, faces, look), corners, faces, str(look))
+    return kept(lambda: _exported(corners, faces, look), bytes, corners, faces, str(look))
 
 
 def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:

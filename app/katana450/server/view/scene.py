@@ -256,7 +256,7 @@ class Gap:
 
 def surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """Return vertices (n, 3) [m] and faces (m, 3) of a shape without materials and details."""
-    return visual.kept(lambda: _surface(visual))
+    return visual.kept(lambda: _surface(visual), tuple[npt.NDArray[Any], npt.NDArray[Any]])
 
 
 def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:

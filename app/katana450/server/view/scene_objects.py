@@ -197,7 +197,7 @@ class ObjectShape:
             return _of(_hull(scene_object.solid))
         if self._prop is not None:
             visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop)
-            return visual.kept(lambda: _merged(visual))
+            return visual.kept(lambda: _merged(visual), Drawn)
         return _of(_plain(scene_object))
 
 

@@ -75,7 +75,7 @@ def load() -> ViserPage:
         return ViserPage(File.of(html, "text/html; charset=utf-8"), files)
 
     # Computing it imports numpy and viser.
-    return kept(page, data, zstandard.__version__)
+    return kept(page, ViserPage, data, zstandard.__version__)
 
 
 def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
