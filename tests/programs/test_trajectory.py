@@ -19,6 +19,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.continuation import continued
+from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
@@ -77,6 +78,33 @@ def test_spline_passes_its_values_smoothly(steps: list[float], seed: int) -> Non
         for one, other in zip(before, after, strict=True):
             scale = 1.0 + max(abs(one[3]), abs(other[3]))
             np.testing.assert_allclose(one[:3], other[:3], atol=1e-7 * scale)
+
+
+def test_times_that_cannot_be_kept_are_named_with_the_reason(stage: Stage) -> None:
+    fast = compiled(parse(script([[0.0, *READY], [0.01, 60.0, *READY[1:]]])), *begun(stage))
+    (note,) = fast.notes
+    assert note == (
+        "Line 2, trajectory: Asked to take 0.01 s, it takes 1.56 s: axis 1 would turn at "
+        "6000 deg/s, and its limit is 126.6."
+    )
+    # A slow one only needs time to start.
+    started = compiled(parse(script([[0.0, *READY], [1.0, 10.0, *READY[1:]]])), *begun(stage))
+    (note,) = started.notes
+    assert note.endswith("s: the accelerations from rest and to rest are limited.")
+    assert compiled(parse(script(swing(60.0))), *begun(stage)).notes == ()
+
+
+@pytest.mark.parametrize(("times", "row"), [((0, 1, 1, 2), 3), ((0, 2, 1), 3), ((5, 5), 2)])
+def test_row_with_a_repeated_time_is_named(
+    stage: Stage, times: tuple[float, ...], row: int
+) -> None:
+    rows = [[t, float(number), *READY[1:]] for number, t in enumerate(times)]
+    with pytest.raises(ScriptError, match=rf"Row {row} has the time {times[row - 1]} s\."):
+        compiled(parse(script(rows)), *begun(stage))
+
+
+def begun(stage: Stage) -> tuple[PlanContext, State]:
+    return stage.plan_context, stage.begin()
 
 
 def test_gentle_trajectory_keeps_its_times(stage: Stage) -> None:
@@ -165,7 +193,7 @@ def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:
     ("rows", "why"),
     [
         ([[0, *READY]], "2 to 1200 values"),
-        ([[0, *READY], [0, 5, *READY[1:]]], "after the one before"),
+        ([[0, *READY], [0, 5, *READY[1:]]], "later than that of the row before"),
         ([[0, *READY], [1, *READY]], "moves nothing"),
         ([[0, *READY], [1, *READY[:4]]], "a time and 5 angles, as in the first row"),
         ([[0, *READY[:1]], [1, *READY[:1]]], "the angles of all joints"),

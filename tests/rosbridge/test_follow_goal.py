@@ -12,6 +12,7 @@ import pytest
 from katana450.errors import LeaseError
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
 from katana450.extensions.rosbridge.goals import GoalHost, GoalStatus
+from katana450.extensions.rosbridge.messages import FollowJointTrajectoryResult
 from katana450.extensions.rosbridge.ops import SendActionGoal
 from katana450.server.api import answers
 from katana450.server.service.participants import Participant
@@ -33,7 +34,8 @@ class WaitingRunner(Runner):
 
     def progress(self) -> answers.Progress:
         # A script has no name until its thread has read it.
-        return answers.Progress(name=self.name, by="A client", status=self.status)
+        why = "Line 2, trajectory: Asked to take 0.01 s, it takes 1.56 s: why."
+        return answers.Progress(name=self.name, by="A client", status=self.status, why=why)
 
     def owns(self, participant: Participant) -> bool:  # noqa: ARG002
         return self.owned
@@ -61,7 +63,7 @@ def goal(runner: WaitingRunner) -> FollowGoal:
     args = msgspec.json.encode(trajectory((1.0, AWAY)))
     op = SendActionGoal(action=FOLLOW, args=msgspec.Raw(args), id="goal 1")
     found = FollowGoal(host, op)
-    checked: Any = SimpleNamespace(check_path=lambda *_: None)
+    checked: Any = SimpleNamespace(check_path=lambda *_: None, check_end=lambda *_: None)
     found._checked, found._runs = checked, True
     return found
 
@@ -74,6 +76,15 @@ def test_program_that_runs_with_the_next_tick_is_not_reported_as_cancelled(
     result = goal.follow()
     assert result is not None
     assert result.status is GoalStatus.CANCELED
+
+
+def test_result_says_which_time_was_not_kept(goal: FollowGoal, runner: WaitingRunner) -> None:
+    runner.status = "done"
+    result = goal.follow()
+    assert result is not None
+    assert result.status is GoalStatus.SUCCEEDED
+    assert isinstance(result.values, FollowJointTrajectoryResult)
+    assert result.values.error_string == "Asked to take 0.01 s, it takes 1.56 s: why."
 
 
 def test_cancel_voids_the_run_that_waits(goal: FollowGoal, runner: WaitingRunner) -> None:

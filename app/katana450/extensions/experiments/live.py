@@ -107,7 +107,7 @@ def planned_program(arm: Client) -> None:
     # A program that runs at once may have ended already.
     if now is None or now.status in UNPLANNED_STATUSES:
         raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
-    print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed.")
+    print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed. {now.why}")
 
 
 def _follow(arm: Client, keyboard: Keyboard) -> None:

@@ -40,10 +40,14 @@ class Action(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FollowPlan:
-    """Follow ``plan`` to its end from ``tau`` [s] of it, 0 at its start."""
+    """Follow ``plan`` to its end from ``tau`` [s] of it, 0 at its start.
+
+    ``note``: a sentence on times of the script that the plan cannot keep; empty if it keeps them.
+    """
 
     plan: Plan
     tau: float = 0.0
+    note: str = ""
 
     def duration_at(self, speed: float) -> float:
         """Return the duration [s] at ``speed``, 1 for full, without the part before ``tau``."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import SetSpeed, Task, expected_time
+from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task, expected_time
 from katana450.extensions.programs.compiler import Compiler, Report
 from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.conditions import ProgramTime
@@ -156,6 +156,15 @@ class Program:
             else:
                 number = self.next(number)[0]
         return tuple(found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on the times of the script that its plans cannot keep."""
+        return tuple(
+            f"Line {task.line}, {task.name}: {task.action.note}"
+            for task in self.tasks
+            if isinstance(task.action, FollowPlan) and task.action.note
+        )
 
     @property
     def conditions(self) -> tuple[Task, ...]:

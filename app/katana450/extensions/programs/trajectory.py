@@ -65,9 +65,11 @@ class UntimedTrajectory(UntimedPath):
         gentle = None if self.state.grip is None else CARRY
         bounds = Bounds(self.arm.limits, TOOL_SPEED, gentle)
         fingers = self.state.gripper_setpoint
-        return FollowPlan(
-            plan(self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling)
-        )
+        made = plan(self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling)
+        (path,) = self.paths
+        assert isinstance(path, TrajectoryPath)
+        note = path.slowing(made.duration, bounds.joints.speed)
+        return FollowPlan(made, note=note)
 
 
 @dataclass(frozen=True, eq=False)

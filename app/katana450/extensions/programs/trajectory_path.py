@@ -19,6 +19,10 @@ MIN_INTERVAL = 1e-3
 MAX_OVERSHOOT = 1e-3
 """[rad] How far the spline may pass a joint limit between two postures; setpoints are clamped."""
 
+SLOWED_RATIO, SLOWED_TIME = 0.02, 0.02
+"""Minimum time by which a plan exceeds the times of a trajectory that is named, as a ratio [1] to
+them and in s."""
+
 CHECKS_PER_PIECE = 8
 """Number of places in each piece at which the limits are checked."""
 
@@ -89,10 +93,14 @@ class TrajectoryPath(PolynomialPath):
         times = finite_array(self.times, (np.size(self.times),), "The times")
         shape = (len(times), self.chain.n)
         postures = finite_array(self.postures, shape, "The postures")
-        if len(times) < 2 or float(np.diff(times).min()) < MIN_INTERVAL:
+        if len(times) < 2:
+            raise InputError("A trajectory needs at least two postures.")
+        late = np.flatnonzero(np.diff(times) < MIN_INTERVAL)
+        if late.size:
+            row = int(late[0])
             raise InputError(
-                "A trajectory needs at least two postures, each at least "
-                f"{1e3 * MIN_INTERVAL:g} ms after the one before."
+                f"Row {row + 2} has the time {times[row + 1]:g} s. It must be at least "
+                f"{1e3 * MIN_INTERVAL:g} ms later than that of the row before, {times[row]:g} s."
             )
         if float(np.ptp(postures, axis=0).max()) <= VIA_TOLERANCE:
             raise InputError("This trajectory moves nothing. Remove it, or `wait` instead.")
@@ -116,6 +124,22 @@ class TrajectoryPath(PolynomialPath):
                 f"At {self.times[0] + t[place]:.2f} s axis {axis + 1} would be "
                 f"{np.degrees(beyond.max()):.4g} deg beyond its limit."
             )
+
+    def slowing(self, kept: float, speed: FloatArray) -> str:
+        """Return a sentence on a plan that takes ``kept`` [s] for this; "" if that is its time.
+
+        speed: (n,) maximum speeds of the joints [rad/s].
+        """
+        if kept - self.duration <= max(SLOWED_RATIO * self.duration, SLOWED_TIME):
+            return ""
+        t = np.linspace(0.0, self.duration, CHECKS_PER_PIECE * len(self.times))
+        rates = np.abs(np.diff(self._line.values_at(t), axis=0)).max(axis=0) / t[1]
+        axis = int((rates / speed).argmax())
+        why = "the accelerations from rest and to rest are limited"
+        if rates[axis] > speed[axis]:
+            asked, limit = np.degrees((rates[axis], speed[axis]))
+            why = f"axis {axis + 1} would turn at {asked:.4g} deg/s, and its limit is {limit:.4g}"
+        return f"Asked to take {self.duration:.4g} s, it takes {kept:.2f} s: {why}."
 
     @property
     def duration(self) -> float:

@@ -126,7 +126,7 @@ class FollowGoal(Goal):
                 return self._canceled(now.why)
             case "done":
                 self._trajectory.check_end(self.host.arm.state.q, self._joints)
-                return self._succeeded("")
+                return self._succeeded(PLACE.sub("", now.why))
         if self._runs:
             self._check_path()
         return None

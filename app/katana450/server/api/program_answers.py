@@ -20,7 +20,8 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         fraction: Fraction of the task that is done, or of all planning.
         seconds: Expected duration of the longest possible run, without awaited conditions [s].
         seconds_left: Expected time until the run ends [s], on the same clock; 0 if none runs.
-        why: What is wrong with the program, or why it was planned again or not run.
+        why: What is wrong with the program, why it was planned again or not run, or which times of
+            the script it does not keep.
         skipped: Numbers of the steps of alternatives that the run has not taken.
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.

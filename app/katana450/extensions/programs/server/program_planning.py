@@ -134,7 +134,7 @@ class Planning:
             status=PlanningPhase.READY.value,
             steps=program.steps,
             seconds=program.duration,
-            why=self.note,
+            why=self.note or " ".join(program.notes),
         )
 
     def report(self, stage: PlanningStage) -> None:

@@ -28,6 +28,6 @@ def run_progress(
         fraction=now.fraction,
         seconds=program.duration,
         seconds_left=runner.seconds_left(program, run, state, allowed),
-        why=now.why,
+        why=now.why or " ".join(program.notes),
         skipped=runner.skipped(program, run),
     )
