@@ -28,4 +28,10 @@ class DelayedLink(SlowLink):
         while data := await source.read(WINDOW):
             delay = self.delay + self._random.uniform(0.0, self.jitter)
             due = max(due, self._loop.time() + delay)
-            self._loop.call_at(due, to.write, data)
+            self._loop.call_at(due, _write, to, data)
+
+
+def _write(to: asyncio.StreamWriter, data: bytes) -> None:
+    # The other side may have left meanwhile.
+    if not to.is_closing():
+        to.write(data)

@@ -17,7 +17,7 @@ import viser
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
-from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state import Reason
 from katana450.client.asynchronous import aconnect
 from katana450.errors import LeaseError
@@ -169,6 +169,11 @@ def test_late_heartbeats_are_old_ones(table: Table) -> None:
     assert not moves(table)
     assert table.arm.cause is not None
     assert table.arm.cause.reason is Reason.DRIVER_SILENT
+    beats = table.arm.beats
+    wait(2.0 * PAUSE_TIMEOUT)
+    # The driver is late and not gone, so nothing latches a stop, and the arm's process is not left.
+    assert (table.arm.stops, table.hub.stopped) == (0, None)
+    assert table.arm.beats > beats + 100
 
 
 def test_late_drag_is_shown_and_not_followed_and_its_end_counts(table: Table) -> None:

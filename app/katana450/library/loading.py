@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from threading import Event, Thread
 from typing import Literal
 
 from katana450.assembly.robot_session import describe_robot
@@ -20,9 +15,6 @@ from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
 FrameName = Literal["shoulder", "base"]
-
-REPORT_INTERVAL = 2.0
-"""[s] Time between two reports of the progress of a file that takes long."""
 
 
 def load(
@@ -47,8 +39,6 @@ def load(
         scene: YAML file of further obstacles for plans, beside the arm itself and the table
             (docs/scenes.md); None for those of the app, a cup and a basin.
 
-    The first load of a file with dense meshes can take seconds; stderr then shows the progress.
-
     Raises:
         RobotDescriptionError: the file cannot be read or has no arm of two or more turning axes.
         InputError: the frame is unknown or the scene is invalid; the message says what to do.
@@ -62,36 +52,6 @@ def load(
     katana450.errors.RobotDescriptionError: ...
     """
     path = URDF_PATH if urdf is None else Path(urdf)
-    with _progress_of(path):
-        return _loaded(path, tool, frame, scene)
-
-
-@contextmanager
-def _progress_of(path: Path) -> Iterator[None]:
-    """Report on stderr, every REPORT_INTERVAL, that ``path`` is still being prepared."""
-    began, ended = time.monotonic(), Event()
-
-    def report() -> None:
-        while not ended.wait(REPORT_INTERVAL):
-            print(
-                f"katana450: preparing the shapes of {path.name} for contacts, "
-                f"{time.monotonic() - began:.0f} s so far. Later loads take the result from the "
-                "disk.",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    thread = Thread(target=report, name="progress of a file", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-def _loaded(path: Path, tool: str | None, frame: FrameName, scene: str | Path | None) -> Arm:
-    """Return the arm of ``path``. Arguments and errors: see ``load``."""
     try:
         robot, session, notes = describe_robot(Settings(), path, tool)
     except RobotDescriptionError as error:

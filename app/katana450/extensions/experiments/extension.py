@@ -101,11 +101,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--dry-run", action="store_true", help="only plan, and print the tasks")
     parser.add_argument(
-        "--report",
-        type=Path,
-        metavar="DIR",
-        help="write figures, measures and a table of the run, which also drives the arm of a "
-        "server unless --headless is given",
+        "--report", type=Path, metavar="DIR", help="write figures, measures and a table of the run"
     )
     parser.add_argument(
         "--speed", type=_fraction, default=1.0, help="fraction of its own speed (default: 1)"

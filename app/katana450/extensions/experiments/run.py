@@ -63,11 +63,6 @@ def _run(text: str, source: str, options: Namespace) -> int:
             from katana450.extensions.experiments.measured import report_measured
 
             report = partial(report_measured, simulated, options)
-            print(
-                f"Simulated. The script now runs on the server at {options.url}, whose arm moves; "
-                "--headless only simulates.",
-                flush=True,
-            )
         if options.watch:
             from katana450.extensions.experiments.watch import watch
 

@@ -21,7 +21,6 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
-from katana450.maths.kinematics.turns import nearest_turn
 
 POSITION_FIRST = 100.0
 """Weight of the position relative to the orientation if a pose cannot be reached."""
@@ -82,17 +81,17 @@ def nearest_posture(
     found = kinematics.inverse(T, q_hint)
     usable = [each for each in found if each.within_limits or not within_limits]
     exact = [each for each in usable if each.exact]
-    hint = None if q_hint is None else chain.check_q(q_hint)
     if exact:
+        hint = None if q_hint is None else chain.check_q(q_hint)
         best = min(exact, key=lambda each: _cost(chain, each.q, hint))
         return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
     if within_limits:
         search = _search(chain)
         starts = [chain.clamp(each.q) for each in found]
-        if hint is not None:
-            starts.insert(0, chain.clamp(hint))
+        if q_hint is not None:
+            starts.insert(0, chain.clamp(q_hint))
         for weight in (POSITION_FIRST, POSITION_ALONE):
-            q = nearest_turn(chain, search.nearest(target, starts, weight), hint)
+            q = search.nearest(target, starts, weight)
             posture = GeneralPosture(chain, target, tuple(q), "numerical")
             usable = [*usable, posture]
             if posture.position_error <= POSITION_WORTH_TELLING:

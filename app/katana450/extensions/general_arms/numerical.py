@@ -30,7 +30,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.turns import in_limits_turn, nearest_turn
+from katana450.maths.kinematics.turns import in_limits_turn
 
 QUICK_STEPS: Final = 14
 """Maximum number of steps from one seed. Most seeds that lead to the target need fewer."""
@@ -124,13 +124,12 @@ class Numerical:
     ) -> Sequence[GeneralPosture]:
         """Return one posture inside the limits; see `Kinematics.inverse`.
 
-        The search begins at `q_hint` (n,) [rad], which also chooses among full turns. If no seed
-        reaches the pose, the posture is the nearest that was found.
+        The search begins at `q_hint` (n,) [rad]. If no seed reaches the pose, the posture is the
+        nearest that was found.
         """
         pose = np.array(se3.validated_rows(T))
         hint = None if q_hint is None else self.chain.clamp(q_hint)
-        q = nearest_turn(self.chain, np.array(self.solve(pose, hint)), hint)
-        return [GeneralPosture(self.chain, pose, tuple(q.tolist()), "numerical")]
+        return [GeneralPosture(self.chain, pose, self.solve(pose, hint), "numerical")]
 
     def solve(
         self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS

@@ -43,7 +43,6 @@ from katana450.extensions.general_arms.spherical_wrist import (
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.turns import nearest_turn
 
 SWIVELS: Final = 64
 """Number of swivels of the first round."""
@@ -189,27 +188,22 @@ class SevenAxes:
 
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
         """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""
-        chain = self.chain
-        low, high = float(chain.lower[self.swivel]), float(chain.upper[self.swivel])
-        if high - low > math.tau:
-            # Full turns of the swivel give the same postures; the hint chooses among them.
-            low = -math.pi if low <= -math.pi <= high - math.tau else low
-            high = low + math.tau
+        low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
+        low, high = max(low, -math.pi), min(high, math.pi)
         step = (high - low) / SWIVELS
         swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
             beside = self._search.solve(T, hint, seeds=0)
-            ends = np.array([hint[self.swivel], beside[self.swivel]])
-            ends -= math.tau * np.round((ends - 0.5 * (low + high)) / math.tau)
+            ends = [hint[self.swivel], beside[self.swivel]]
             swivels = np.append(swivels, np.clip(ends, low, high))
-        q = nearest_turn(chain, self.at_swivels(T, swivels), hint)
+        q = self.at_swivels(T, swivels)
         cost = self._cost(q, T, hint)
         first = q[cost.argmin(axis=0), np.arange(8)]
         least = cost.min(axis=0)
         offsets = np.linspace(-step, step, FINER)
-        finer = np.clip(swivels[cost.argmin(axis=0), None] + offsets, low, high).ravel()
-        q = nearest_turn(chain, self.at_swivels(T, finer), hint).reshape(8, FINER, 8, 7)
+        finer = np.clip(first[:, self.swivel, None] + offsets, low, high).ravel()
+        q = self.at_swivels(T, finer).reshape(8, FINER, 8, 7)
         q = q[np.arange(8), :, np.arange(8)].swapaxes(0, 1)
         cost = self._cost(q, T, hint)
         second = q[cost.argmin(axis=0), np.arange(8)]
@@ -220,8 +214,7 @@ class SevenAxes:
             branches = np.arange(8)
             return self.at_swivels(aimed, chosen[:, self.swivel])[branches, branches]
 
-        corrected = self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
-        return nearest_turn(chain, corrected, hint)
+        return self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
 
     def _cost(self, q: FloatArray, T: FloatArray, hint: FloatArray | None) -> FloatArray:
         """Return a number (N, 8) for each of `q` (N, 8, 7), least for the best.

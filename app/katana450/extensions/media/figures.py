@@ -14,7 +14,6 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.media.measures import PathTrace
 from katana450.extensions.media.pour_record import PourRecord
-from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -57,11 +56,8 @@ TIME = "time (s)"
 """Label of a time axis."""
 
 
-def path_figure(paths: Sequence[PathTrace], frame: ScriptFrame) -> bytes:
-    """Return a PNG of desired and traced path in 3D, and the error along it (paper's Fig. 7).
-
-    The path is drawn in ``frame``.
-    """
+def path_figure(paths: Sequence[PathTrace]) -> bytes:
+    """Return a PNG of desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
     plt = pyplot()
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(7.2, 3.9))
@@ -70,7 +66,7 @@ def path_figure(paths: Sequence[PathTrace], frame: ScriptFrame) -> bytes:
         worst = 1e3 * max(float(path.error.max()) for path in paths)
         power = math.floor(math.log10(worst)) if worst > 0.0 else 0
         for number, path in enumerate(paths):
-            desired, traced = frame.shown(path.desired), frame.shown(path.traced)
+            desired, traced = 1e3 * path.desired, 1e3 * path.traced
             label = {"label": "desired"} if number == 0 else {}
             space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, **label)
             label = {"label": "traced"} if number == 0 else {}
@@ -80,7 +76,7 @@ def path_figure(paths: Sequence[PathTrace], frame: ScriptFrame) -> bytes:
         errors = 1e3 * errors / 10.0**power
         panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
         panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
-        equal_axes(space, frame.shown(np.concatenate([path.desired for path in paths])))
+        equal_axes(space, 1e3 * np.concatenate([path.desired for path in paths]))
         space.set_xlabel("x (mm)")
         space.set_ylabel("y (mm)")
         space.set_zlabel("z (mm)", labelpad=9.0)

@@ -19,7 +19,6 @@ from katana450.extensions.media.figures import (
     to_png,
 )
 from katana450.extensions.programs.measured_run import Deviation, MeasuredRun
-from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.path import point_derivatives
 
@@ -36,18 +35,15 @@ SAMPLES = 400
 """Number of intervals of a drawn path."""
 
 
-def measured_figure(run: MeasuredRun, frame: ScriptFrame) -> bytes:
-    """Return a PNG of path, distances from it and errors of the joints; of these without paths.
-
-    The path is drawn in ``frame``.
-    """
+def measured_figure(run: MeasuredRun) -> bytes:
+    """Return a PNG of path, distances from it and errors of the joints; of these without paths."""
     plt = pyplot()
     deviations = run.deviations
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(7.2, 5.2 if deviations else 3.0))
         if deviations:
             space = figure.add_axes((-0.02, 0.06, 0.53, 0.9), projection="3d")
-            _draw_paths(plt, space, deviations, frame)
+            _draw_paths(plt, space, deviations)
             figure.text(0.02, 0.935, "Path of the tool", fontsize=10.0, fontweight="bold")
             upper = figure.add_axes((0.6, 0.57, 0.38, 0.35))
             _draw_distances(upper, deviations)
@@ -70,16 +66,13 @@ def magnification(deviations: tuple[Deviation, ...]) -> float:
     return power * max(each for each in (1.0, 2.0, 5.0) if power * each <= most)
 
 
-def _draw_paths(
-    plt: Any, space: Any, deviations: tuple[Deviation, ...], frame: ScriptFrame
-) -> None:
+def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None:
     times = magnification(deviations)
     by = f", distances × {times:g}" if times > 1.0 else ""
     drawn: list[FloatArray] = []
     for number, each in enumerate(deviations):
-        points = point_derivatives(each.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
-        desired = frame.shown(points)
-        seen = frame.shown(each.nearest + times * (each.measured - each.nearest))
+        desired = 1e3 * point_derivatives(each.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
+        seen = 1e3 * (each.nearest + times * (each.measured - each.nearest))
         names = ("desired", f"measured{by}") if number == 0 else (None, None)
         space.plot(*desired.T, color=DESIRED, linewidth=3.0, alpha=0.7, label=names[0])
         space.plot(*seen.T, color=ERROR, linewidth=1.1, label=names[1])

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
 from katana450.caching import cached_property
 from katana450.errors import InputError
@@ -27,7 +27,6 @@ from katana450.extensions.programs.measured_run import MeasuredRun
 from katana450.extensions.programs.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -55,7 +54,7 @@ class Report:
 
     script: Script
     program: Program
-    arm: MountedArm
+    arm: ArmModel
     trace: Trace
     values: dict[str, float | None]
     bounds: tuple[Bound, ...]
@@ -67,7 +66,7 @@ class Report:
     def of(
         script: Script,
         program: Program,
-        arm: MountedArm,
+        arm: ArmModel,
         trace: Trace,
         facts: dict[str, Any],
         notes: tuple[str, ...] = (),
@@ -144,15 +143,11 @@ class Report:
     def _pour(self) -> PourRecord | None:
         return PourRecord.of(self.trace)
 
-    @property
-    def _frame(self) -> ScriptFrame:
-        return ScriptFrame.of(self.arm.T_base_shoulder, in_base=self.script.in_base)
-
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
 
-        Points of the tool are in the frame of the script. With water also COLUMNS; with a measured
-        arm its joints and tool. Each number has all its digits, so that reading gives the same.
+        With water also COLUMNS; with a measured arm its joints and tool. Each number has all its
+        digits, so that reading gives the same.
         """
         n = self.arm.chain.n
         file = io.StringIO()
@@ -175,7 +170,7 @@ class Report:
             fingers = trace.fingers[tick]
             numbers.append(float(1e3 * fingers if slides else np.degrees(fingers)))
             chain = self.arm.chain_to(trace.tools[tick])
-            point = self._frame.shown(forward(chain, trace.q[tick])[:3, 3])
+            point = 1e3 * forward(chain, trace.q[tick])[:3, 3]
             rows.writerow(
                 [
                     repr(float(trace.t[tick])),
@@ -187,14 +182,10 @@ class Report:
                     *(repr(float(value)) for value in point),
                     repr(float(trace.sigma[tick])),
                     *(() if pour is None else pour.cells(tick)),
-                    *(() if measured is None else self._measured_cells(chain, measured[tick])),
+                    *(() if measured is None else _measured_cells(chain, measured[tick])),
                 ]
             )
         return file.getvalue()
-
-    def _measured_cells(self, chain: Chain, q: FloatArray) -> list[str]:
-        numbers = [*np.degrees(q), *self._frame.shown(forward(chain, q)[:3, 3])]
-        return [repr(float(number)) for number in numbers]
 
     def write(
         self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
@@ -212,9 +203,9 @@ class Report:
         paths = alongs(self.program, self.trace)
         images = dict(pictures)
         if paths:
-            images["path.png"] = figures.path_figure(paths, self._frame)
+            images["path.png"] = figures.path_figure(paths)
         if self.measured is not None:
-            images["measured.png"] = measured_figure(self.measured, self._frame)
+            images["measured.png"] = measured_figure(self.measured)
         images["joints.png"] = figures.joints_figure(self.arm, self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
         if self._pour is not None:
@@ -360,6 +351,11 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 </html>
 """
 """Template of the HTML page."""
+
+
+def _measured_cells(chain: Chain, q: FloatArray) -> list[str]:
+    numbers = [*np.degrees(q), *(1e3 * forward(chain, q)[:3, 3])]
+    return [repr(float(number)) for number in numbers]
 
 
 def _rows(values: Mapping[str, float | None]) -> str:

@@ -31,8 +31,8 @@ class ScriptFrame:
         return cls("base", T_base_shoulder) if in_base else cls("shoulder", np.eye(4))
 
     def shown(self, p: FloatArray) -> FloatArray:
-        """Return points (..., 3) [m] of {S} in this frame [mm]."""
-        return 1e3 * (p @ self.T[:3, :3].T + self.T[:3, 3])
+        """Return the point (3,) [m] of {S} in this frame [mm]."""
+        return 1e3 * (self.T[:3, :3] @ p + self.T[:3, 3])
 
     def point(self, shown: FloatArray) -> FloatArray:
         """Return the point (3,) [m] in {S} that is ``shown`` (3,) [mm] in this frame."""

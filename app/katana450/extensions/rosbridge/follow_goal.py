@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -42,19 +41,11 @@ _numbers = itertools.count(1)
 
 
 class FollowGoal(Goal):
-    """One trajectory. The program that moves along it drives, and this client owns it.
+    """One trajectory. The program that moves along it drives, and this client owns it."""
 
-    A goal replaces the ``earlier`` ones of its client: they brake the arm, and it begins from where
-    the arm comes to rest.
-    """
-
-    def __init__(
-        self, host: GoalHost, op: SendActionGoal, earlier: Sequence[FollowGoal] = ()
-    ) -> None:
+    def __init__(self, host: GoalHost, op: SendActionGoal) -> None:
         """Create the goal. Raises InputError if it does not have the fields of its type."""
         super().__init__(host, op)
-        self._replaces = bool(earlier)
-        self._awaited = list(earlier)
         self._goal = read(op.args, FollowJointTrajectory, "a goal of FollowJointTrajectory")
         self._name = f"ROS trajectory {next(_numbers)}"
         self._runs = False
@@ -63,34 +54,18 @@ class FollowGoal(Goal):
         self._checked: CheckedTrajectory | None = None
 
     def start(self) -> Result | None:
-        """Check the goal, and begin to plan it or cancel the goals that it replaces."""
-        gate = self.host.hub.gate
-        self._revocations = gate.revocations
-        gate.check_not_stopped()
-        self._check()
-        for goal in self._awaited:
-            goal.cancel("A newer trajectory replaces it.")
-        return None if self._awaited else self._plan()
-
-    def _check(self) -> CheckedTrajectory:
-        """Return the checked trajectory from where the arm is. Raises GoalError."""
-        arm = self.host.arm
-        self._checked = CheckedTrajectory.of(
-            self._goal,
-            arm.arm.chain.names,
-            arm.state.setpoint,
-            time.time(),
-            anywhere=self._replaces,
-        )
-        return self._checked
-
-    def _plan(self) -> Result | None:
-        """Begin to plan; return the result if the arm is at the end already."""
-        if self.host.arm.state.moving:
+        """Check the goal and begin to plan it."""
+        hub, arm = self.host.hub, self.host.arm
+        self._revocations = hub.gate.revocations
+        hub.gate.check_not_stopped()
+        if arm.state.moving:
             raise GoalError(
                 ErrorCode.INVALID_GOAL, "The arm is moving. Send a trajectory when it is at rest."
             )
-        checked = self._check()
+        chain = arm.arm.chain
+        self._checked = checked = CheckedTrajectory.of(
+            self._goal, chain.names, arm.state.setpoint, time.time()
+        )
         if not checked.moves:
             return self._succeeded("The arm is there already.")
         script = checked.script(self._name)
@@ -99,11 +74,6 @@ class FollowGoal(Goal):
 
     def follow(self) -> Result | None:
         """Continue with the progress of the program; see `Goal.follow`."""
-        if self._awaited:
-            # Raises if the arm was stopped, or the driver changed, since the goal was received.
-            self.host.hub.gate.check_current(self._actor)
-            self._awaited = [goal for goal in self._awaited if not goal.ended]
-            return None if self._awaited else self._plan()
         now = self._progress()
         if now is None:
             return self._canceled("Another program was sent.")
@@ -130,14 +100,6 @@ class FollowGoal(Goal):
         if self._runs:
             self._check_path()
         return None
-
-    def cancel(self, why: str) -> None:
-        """Cancel the goal because of ``why``, at once if it still waits for earlier goals."""
-        if self._awaited:
-            self._awaited = []
-            self._finish(self._canceled(why))
-        else:
-            super().cancel(why)
 
     def end(self, why: str) -> Result:
         """End the program, which brakes the arm."""

@@ -85,18 +85,11 @@ class CheckedTrajectory:
 
     @classmethod
     def of(
-        cls,
-        goal: FollowJointTrajectory,
-        joints: Sequence[str],
-        q: FloatArray,
-        now: float,
-        *,
-        anywhere: bool = False,
+        cls, goal: FollowJointTrajectory, joints: Sequence[str], q: FloatArray, now: float
     ) -> CheckedTrajectory:
         """Return ``goal`` for an arm with ``joints`` at rest at ``q`` (n,) [rad].
 
-        ``now`` is the time [s since the epoch]. ``anywhere``: a first point at time 0 may be away
-        from ``q``. Raises GoalError with the reason for a refusal.
+        ``now`` is the time [s since the epoch]. Raises GoalError with the reason for a refusal.
         """
         given = goal.trajectory
         if sorted(given.joint_names) != sorted(joints):
@@ -126,7 +119,7 @@ class CheckedTrajectory:
         postures = np.array(rows)
         if times[0] < MIN_INTERVAL:
             away = float(np.abs(postures[0] - q).max())
-            if away > START_TOLERANCE and not anywhere:
+            if away > START_TOLERANCE:
                 raise _invalid(
                     f"The first point is at time 0 and {away:.3g} rad from where the arm stands. "
                     "Begin where it stands, or give the first point a later time."

@@ -38,14 +38,11 @@ def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:
-    """Return `q` (..., n), each angle in the turn nearest to `hint` (n,) inside its limits.
+    """Return `q` (n,), each angle in the turn nearest to `hint` (n,) inside its limits.
 
     Only limits wider than a turn leave this choice.
     """
     if hint is None or not (chain.upper - chain.lower > math.tau).any():
         return q
-    slack = tolerances.LIMIT_SLACK
-    first = np.ceil((chain.lower - slack - q) / math.tau)
-    last = np.floor((chain.upper + slack - q) / math.tau)
-    turns = np.clip(np.round((hint - q) / math.tau), first, last)
-    return np.where(first <= last, q + math.tau * turns, q)
+    other = q + math.tau * np.round((hint - q) / math.tau)
+    return np.where((other >= chain.lower) & (other <= chain.upper), other, q)

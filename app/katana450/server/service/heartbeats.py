@@ -67,6 +67,11 @@ class LastHeartbeat:
         return delay
 
     @property
+    def delay(self) -> float:
+        """Delay of the messages [s] beyond the least; 0 without times of their making."""
+        return min(self._delays, default=0.0)
+
+    @property
     def newest(self) -> float:
         """Time of the newest heartbeat [s], on the clock."""
         return self._clock() if self.open and self._is_connected() else self._newest
@@ -98,7 +103,7 @@ class Arrival(LastHeartbeat):
     def newest(self) -> float:
         """Time of the newest heartbeat [s], including a message that is not read yet."""
         if self._line is not None and readable(self._line.fileno()):
-            unread = self._clock() - self._age() - min(self._delays, default=0.0)
+            unread = self._clock() - self._age() - self.delay
             self._newest = max(self._newest, unread)
         return super().newest
 

@@ -371,17 +371,17 @@ class Hub:
             self.gate.protect(f"The arm's process did not answer for {age:.1f} s.")
 
     def _check_driver(self, t: float) -> bool:
-        """Brake a moving arm if the driver is silent; return whether the driver is silent."""
+        """Brake a moving arm if the driver is silent or late; return whether it is silent."""
         self._driver_watch.follow(self.lease.holder, self._heard, t)
         holder = self.lease.holder
         if holder is None or self.arm is None:
             return False
-        silence = self.lease.silence(t)
-        silent = silence >= self._hold_after
-        if silent and self.stopped is None and self.gate.moves():
-            self._driver_watch.brake(holder, silence, t, connected=holder.key in self._participants)
+        driver, silence = self._participants.get(holder.key), self.lease.silence(t)
+        if silence >= self._hold_after and self.stopped is None and self.gate.moves():
+            self._driver_watch.brake(holder, silence, t, connected=driver is not None)
         self.gate.change(lambda lease, t: lease.expire(t))
-        return silent and self.lease.holder is not None
+        silence -= 0.0 if driver is None else driver.heartbeat.delay
+        return silence >= self._hold_after and self.lease.holder is not None
 
     def _heard(self, person: Person) -> float:
         """Return the time of the newest heartbeat of ``person`` [s]."""
