@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 from playwright.sync_api import Route
 
+from katana450.client import connect
+from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, set_speed, take
 from tests.browser.test_app import Robot
+from tests.gateway.delayed_link import DelayedLink
 from tests.gateway.slow_link import SlowLink
 
 
@@ -274,3 +277,39 @@ def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, pro
         page.page.wait_for_timeout(500)
         assert truth.status()["q"] == rest
     print(f"{process}: noticed after {noticed:.2f} s, back after {back:.2f} s")
+
+
+def test_page_whose_line_has_become_slow_moves_nothing_after_letting_go(
+    open_page: OpenPage,
+) -> None:
+    with AppServer(APP) as server, DelayedLink(server.port) as line, connect(server.url) as watcher:
+        page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+
+        def height() -> float:
+            return float(np.array(watcher.query(answers.State).T)[2, 3])
+
+        def rested() -> float:
+            page.wait_until(lambda: not watcher.query(answers.State).moving, "the arm to rest")
+            return height()
+
+        start = rested()
+        with page.grip_arrow(MOVE, "z") as grip:
+            grip.to(0.02)
+            page.wait_until(lambda: abs(height() - start) > 0.015, "the arm to follow")
+            line.delay = 0.6
+            grip.to(0.08)
+            page.wait_until(lambda: "s late" in bar(page, "toast"), "the reason")
+        page.page.wait_for_timeout(1000)
+        assert abs(rested() - start) < 0.03
+        page.page.evaluate("document.querySelector('#toast').textContent = ''")
+        page.page.click("#jog-button")
+        low = height()
+        page.page.keyboard.down("KeyR")
+        page.wait_until(lambda: "s late" in bar(page, "toast"), "the reason")
+        page.page.keyboard.up("KeyR")
+        assert abs(rested() - low) < 0.005
+        line.delay = 0.0
+        page.page.wait_for_timeout(1000)
+        page.page.keyboard.down("KeyR")
+        page.wait_until(lambda: height() - low > 0.01, "the arm to move")
+        page.page.keyboard.up("KeyR")

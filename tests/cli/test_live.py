@@ -6,10 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
-from katana450.cli.main import main
-from katana450.extensions.experiments import live, simulate
 from tests.browser.server import free_port
 
 KATANA450 = str(Path(sys.executable).parent / "katana450")
@@ -42,15 +38,3 @@ def test_server_of_another_machine_is_never_started(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
     assert "localhost.invalid" in done.stderr
-
-
-def test_report_without_headless_says_that_it_drives_a_server(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    script = tmp_path / "script.yaml"
-    script.write_text(SCRIPT, encoding="utf-8")
-    monkeypatch.setattr(simulate, "simulate", lambda *_: simulate.Simulated(0))
-    monkeypatch.setattr(live, "run_live", lambda *_: 0)
-    for options, drives in (((), True), (("--headless",), False)):
-        assert main(["run", str(script), "--report", str(tmp_path / "out"), *options]) == 0
-        assert ("runs on the server at http://127.0.0.1" in capsys.readouterr().out) == drives

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from time import sleep
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,6 @@ import pytest
 import katana450
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_session import describe_robot
-from katana450.library import loading
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
@@ -136,22 +133,6 @@ def test_tool_is_chosen_when_the_arm_is_loaded(mounted: MountedArm) -> None:
     flange = katana450.load(tool="flange")
     assert flange.tool == "flange"
     np.testing.assert_array_equal(flange.fk(Q), forward(mounted.chain_to("flange"), Q))
-
-
-def test_file_that_takes_long_reports_its_progress(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    katana450.load()
-    assert capsys.readouterr().err == ""
-
-    def slowly(*arguments: Any) -> Any:
-        sleep(0.05)
-        return describe_robot(*arguments)
-
-    monkeypatch.setattr(loading, "describe_robot", slowly)
-    monkeypatch.setattr(loading, "REPORT_INTERVAL", 0.01)
-    katana450.load()
-    assert "preparing the shapes of katana450.urdf for contacts, 0 s" in capsys.readouterr().err
 
 
 def test_reachability_map_is_in_the_base_frame(shoulder_arm: katana450.Arm) -> None:

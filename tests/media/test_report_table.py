@@ -23,7 +23,6 @@ from katana450.extensions.programs.measured_run import MeasuredRun
 from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script import parse
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from tests.programs.lagging_driver import LaggingDriver
 
@@ -91,14 +90,6 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     for row, q, tick in zip(rows, simulation.states, range(len(rows)), strict=True):
         assert float(row["measured_theta1_deg"]) == pytest.approx(np.degrees(q.q[0]), rel=1e-15)
         assert float(row["theta1_deg"]) == np.degrees(report.trace.q[tick, 0])
-    # Points are in the frame of the script.
-    for column, posture in (
-        ("{}_mm", report.trace.q[-1]),
-        ("measured_{}_mm", simulation.states[len(rows) - 1].q),
-    ):
-        tool = arm.T_base_shoulder @ forward(arm.chain_to(report.trace.tools[-1]), posture)
-        shown = [float(rows[-1][column.format(name)]) for name in "xyz"]
-        assert shown == pytest.approx(1e3 * tool[:3, 3], abs=1e-9)
     pytest.importorskip("matplotlib")
     files = report.write(tmp_path, WRITTEN)
     assert tmp_path / "measured.png" in files
