@@ -1,14 +1,20 @@
-"""The recipes of CONTRIBUTING.md name only files and traits that exist."""
+"""Statements of CONTRIBUTING.md, the map and the list of extensions agree with the code."""
 
 from __future__ import annotations
 
 import dataclasses
 import re
+import tomllib
 from pathlib import Path
 
+import katana450
 from katana450.arm.control.traits import CommandTraits
+from katana450.cli.core_commands import CORE_COMMANDS
+from katana450.extension import extensions
 
 ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = Path(katana450.__file__).parent
+MAP = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
@@ -28,3 +34,49 @@ def test_files_that_the_recipes_name_exist() -> None:
 def test_every_trait_of_a_command_is_explained() -> None:
     for field in dataclasses.fields(CommandTraits):
         assert f"| `{field.name}" in TEXT, field.name
+
+
+def test_lists_of_command_classes_are_those_that_the_recipe_names() -> None:
+    """The calls of `match` name single classes; a list of classes is a tuple."""
+    lists = {
+        path.name
+        for folder in ("arm", "server", "extensions")
+        for path in (PACKAGE / folder).rglob("*.py")
+        if re.search(r"\(cmd\.\w+, cmd\.\w+", path.read_text(encoding="utf-8"))
+    }
+    assert lists == {"session.py", "history.py"}
+    assert all(name in TEXT for name in lists)
+
+
+def test_map_names_the_commands_of_the_core() -> None:
+    (row,) = re.findall(r"^ cli +(.*);", MAP, re.MULTILINE)
+    assert row.split(", ") == [command.name for command in CORE_COMMANDS]
+
+
+def test_map_has_the_layers_of_the_contract_from_top_to_bottom() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    rows = project["tool"]["importlinter"]["contracts"][0]["layers"]
+    layers = [set(re.findall(r"\w+", row)) - {"__main__"} for row in rows]
+    table = MAP.partition("## Layers")[2].partition("```text")[2].partition("```")[0]
+    drawn = [
+        {name for name in re.findall(r"\w+", row) if any(name in layer for layer in layers)}
+        for row in re.findall(r"^ (\w+(?: \| \w+)*)", table, re.MULTILINE)
+    ]
+    assert drawn == layers
+
+
+def test_path_of_a_drag_names_files_that_exist_and_their_number() -> None:
+    path = MAP.partition("## A gizmo drag")[2].partition("## More")[0]
+    files = re.findall(r"^\d+\. `([\w/]+\.py)`", path, re.MULTILINE)
+    assert f"{len(files)} files below" in path
+    assert len(set(files)) == len(files)
+    assert all((PACKAGE / file).is_file() for file in re.findall(r"`([\w/]+\.py)`", path))
+
+
+def test_every_part_of_the_extensions_folder_is_described() -> None:
+    listed = (ROOT / "docs" / "extensions.md").read_text(encoding="utf-8")
+    used = listed.partition("The packages `batch`")[2].partition("add nothing by themselves")[0]
+    parts = {path.stem for path in (PACKAGE / "extensions").iterdir() if path.name[0] != "_"}
+    registered = {extension.name for extension in extensions()}
+    assert {"batch", *re.findall(r"`(\w+)`", used)} == parts - registered
+    assert all(f"| `{name}` |" in listed for name in registered)

@@ -1,6 +1,7 @@
 """Traits of the commands: the properties of a command's class that other modules need.
 
-A command declares them where it is defined. There is no other list of command classes.
+A command declares them where it is defined. No other list decides who may give a
+command, and when.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """A URDF with its meshes as a zip of a ROS package, to be unpacked into a workspace.
 
 Programs differ in the files that they find and read. `package://` names are for ROS, yourdfpy and
-PyBullet. MuJoCo drops folders from names, so the URDF names the folder for it. PyBullet, RViz and
-Drake have trouble with glTF, so such meshes become OBJ, one file per material, and the URDF names
-the colours. Drake refuses the STL of a collision, so collisions become OBJ too. It drives the
-joints that have a <transmission>.
+PyBullet. MuJoCo drops folders from names, so the URDF names the folder for it. PyBullet does not
+read glTF, so such meshes become OBJ, one file per material, and the URDF names the colours. Drake
+refuses the STL of a collision, so collisions become OBJ too. It drives the joints that have a
+<transmission>.
 """
 
 from __future__ import annotations
