@@ -29,7 +29,6 @@ from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 from tests.exchange.test_lines import lines_of_gltf
 from tests.exchange.test_several_files import ARTICULATED
 from tests.exchange.test_vrml_prototypes import JOINT
-from tests.exchange.test_x3d_xml import PROTOTYPES, document
 from tests.exchange.test_x3dv import SETS
 
 resource = pytest.importorskip("resource")
@@ -45,15 +44,9 @@ SEEDS = {
 } | {
     "colours.obj": OBJ,
     "colours.ply": PAINTED,
-    "gmsh.wrl": (FOREIGN / "gmsh.wrl").read_bytes(),
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
     "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
     "sets.x3dv": SETS.encode(),
-    "plate.x3d": document(f"{PROTOTYPES}<ProtoInstance name='Plate'/>"),
-    "text.wrl": (
-        f'{HEADER}\nShape {{ geometry Text {{ string [ "a\\"b", "c" ] length [ 2, 3 ] fontStyle '
-        'FontStyle { justify [ "MIDDLE", "END" ] horizontal FALSE style "BOLD" } } }'
-    ).encode(),
     "lines.glb": lines_of_gltf(3, [0, 2, 1], paint=True),
     "lines.wrl": (
         f"{HEADER}\nShape {{ geometry IndexedLineSet {{ coordIndex [ 0 1 2 -1 1 0 ] color Color {{ "

@@ -84,22 +84,6 @@ def test_lines_have_their_colours() -> None:
     assert "colours that do not match" in wrong.text
 
 
-def test_lines_of_version_1() -> None:
-    points = "Coordinate3 { point [ 0 0 0, 100 0 0, 0 100 0, 0 0 100 ] }"
-    lines = read(
-        f"{points} Material {{ emissiveColor 0 0 1 }} IndexedLineSet {{ coordIndex [ 0, 1, -1 ] }}",
-        "#VRML V1.0 ascii",
-    )
-    assert (len(lines.faces), sides(lines)[0]) == (8, 100.0)
-    assert lines.colours is not None
-    assert lines.colours[0].tolist() == [0, 0, 255, 255]
-    dots = read(
-        f"{points} PointSet {{ startIndex 1 numPoints 2 }} PointSet {{ startIndex 3 }}",
-        "#VRML V1.0 ascii",
-    )
-    assert len(dots.faces) == 3 * 8
-
-
 def lines_of_gltf(mode: int, indices: list[int] | None = None, paint: bool = False) -> bytes:
     """Return a primitive over the corners of a square of 1 m."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4").tobytes()

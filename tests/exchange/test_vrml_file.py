@@ -237,7 +237,7 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         ("", "has no triangles"),
         (
             "Shape { geometry Text { } }",
-            "has no triangles. It has Text without letters. An object needs a surface: save it",
+            "has no triangles. It has Text. An object needs a surface: save it",
         ),
         (chain(40, 2), "more than 40000 nodes"),
         (chain(40, 2, "Group { }"), "more than 40000 nodes"),
@@ -277,10 +277,8 @@ def test_invalid_worlds_are_refused(text: str, said: str) -> None:
     [
         (b"", "must begin"),
         (b"Wobbler { }", "must begin"),
-        (b"#VRML V1.0 ascii\nCube {", "line 2: the file ends too early"),
-        (b"#VRML V1.0 ascii\nUSE a", "has a node that is used, but not defined"),
-        (b"#VRML V1.0 ascii\nSeparator { 1 }", "expected a value, not '}'"),
-        (b"#VRML V1.0 ascii\n" + b"Group { " * 300, "nested more than 200 deep"),
+        (b"#VRML V1.0 ascii\nCube { }", "is VRML 1.0 or X3D in XML, which is not read. Export it"),
+        (b'<?xml version="1.0"?><X3D/>', "is VRML 1.0 or X3D in XML, which is not read. Export"),
         (b"#X3D V3.2 utf8\n", "has no triangles"),
         (gzip.compress(bytes(10), mtime=0)[:-6], "ends too early"),  # without its time
         (b"\x1f\x8b" + bytes(40), "corrupt"),

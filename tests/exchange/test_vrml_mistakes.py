@@ -68,15 +68,6 @@ def test_a_solid_without_a_height_is_a_plate(geometry: str, size: list[float]) -
     assert sides(read(f"Shape {{ geometry {geometry} }}")) == pytest.approx(size)
 
 
-def test_mistakes_of_version_1() -> None:
-    shape = read(
-        "NavigationInfo { headlightNode DirectionalLight { color 1 1 1 } speed 20 } Cube { } USE b",
-        "#VRML V1.0 ascii",
-    )
-    assert volume(shape) == pytest.approx(8e-9)
-    assert "Left out: a node that is used, but not defined." in shape.text
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -36,6 +36,7 @@ PROTO Joint [
 }
 """
 
+SQUARE = "geometry Box { }"
 BOX = f"{HEADER}\nShape {{ geometry Box {{ size 1 1 1 }} }}"
 
 
@@ -120,7 +121,7 @@ def test_other_worlds_of_the_upload_are_shown_at_their_place() -> None:
         ' Inline { url "B.WRL" } Inline { url "parts/a.wrl" }',
         parts_a_wrl=f'{HEADER}\nInline {{ url "c.wrl" }}',
         parts_c_wrl=BOX,
-        b_wrl="#VRML V1.0 ascii\nTranslation { translation 0 7 0 } Cube { }",
+        b_wrl=f"{HEADER}\nTransform {{ translation 0 7 0 children Shape {{ {SQUARE} }} }}",
     )
     assert sides(shape) == pytest.approx([5.5, 8.5, 2.0])
     assert "not there" not in shape.text

@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.gltf1_document import chunks1, upgraded
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -214,18 +213,9 @@ class Document(msgspec.Struct, rename="camel"):
 
 
 class Outline(msgspec.Struct):
-    """The parts of a document from which its version is seen."""
+    """The part of a document from which its version is seen."""
 
-    asset: Asset = msgspec.field(default_factory=lambda: Asset(""))
-    nodes: msgspec.Raw = msgspec.Raw(b"[]")
-    scenes: msgspec.Raw = msgspec.Raw(b"[]")
-    meshes: msgspec.Raw = msgspec.Raw(b"[]")
-
-    def version(self) -> str:
-        """Return the version that is given, or the one whose parts have names, or lists."""
-        parts = (self.nodes, self.scenes, self.meshes)
-        named = any(bytes(each).lstrip().startswith(b"{") for each in parts)
-        return str(self.asset.version)[:20] or ("1.0" if named else "2.0")
+    asset: Asset = msgspec.field(default_factory=lambda: Asset("2.0"))
 
 
 def decoded(data: bytes, name: str) -> tuple[Document, bytes | None]:
@@ -235,13 +225,10 @@ def decoded(data: bytes, name: str) -> tuple[Document, bytes | None]:
     """
     content, binary = _chunks(data, name) if data.startswith(b"glTF") else (data, None)
     try:
-        version = msgspec.json.decode(content, type=Outline).version()
-        if version.startswith("1"):
-            document = msgspec.convert(upgraded(msgspec.json.decode(content), name), Document)
-        elif version.startswith("2"):
-            document = msgspec.json.decode(content, type=Document)
-        else:
-            raise InputError(f"{name} is glTF {version}; glTF 1.0 and 2.0 are read.")
+        version = str(msgspec.json.decode(content, type=Outline).asset.version)[:20]
+        if not version.startswith("2"):
+            raise InputError(_other_version(version, name))
+        document = msgspec.json.decode(content, type=Document)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{name} is corrupt or not glTF: {error}.") from error
     return document, binary
@@ -252,10 +239,8 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
     found: dict[bytes, bytes] = {}
     at = 12
     version, length = struct.unpack_from("<II", data, 4) if len(data) >= at else (2, at)
-    if version == 1:
-        return chunks1(data, name)
     if version != 2:
-        raise InputError(f"{name} is glTF {version}; glTF 1.0 and 2.0 are read.")
+        raise InputError(_other_version(str(version), name))
     if length > len(data):
         raise InputError(f"{name} is corrupt or not GLB 2.0: it is shorter than its header says.")
     data = data[:length]
@@ -268,3 +253,7 @@ def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
     if b"JSON" not in found:
         raise InputError(f"{name} is corrupt: it has no JSON chunk.")
     return found[b"JSON"], found.get(b"BIN\0")
+
+
+def _other_version(version: str, name: str) -> str:
+    return f"{name} is glTF {version}, which is not read. Export it as glTF 2.0."

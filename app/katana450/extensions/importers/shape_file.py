@@ -76,10 +76,10 @@ class Format(Enum):
     def of(cls, file: str) -> Format:
         """Return the format of a file by its name. Raises InputError.
 
-        .wrz is a compressed .wrl, .x3dv and .x3d are X3D, .zae is a .zip with a .dae.
+        .wrz is a compressed .wrl, .x3dv is X3D in its encoding, .zae is a .zip with a .dae.
         """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        others = {"wrz": cls.WRL, "x3dv": cls.WRL, "x3d": cls.WRL, "zae": cls.ZIP}
+        others = {"wrz": cls.WRL, "x3dv": cls.WRL, "zae": cls.ZIP}
         known = {each.value: each for each in cls} | others
         if suffix not in known:
             raise InputError(
@@ -89,7 +89,7 @@ class Format(Enum):
         return known[suffix]
 
 
-SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz", "x3dv", "x3d")
+SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz", "x3dv")
 """Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)

@@ -1,9 +1,8 @@
 """VRML worlds of other programs, flattened to one surface.
 
-Sources: ISO/IEC 14772-1:1997; ISO/IEC 19776-2 (X3D in the same encoding); The Virtual Reality
-Modeling Language, version 1.0 (1996). These readers are more tolerant than the one for our own
-files: nodes that are not of the standard are left out and reported. A world shows other files of
-the same upload, and no script is executed.
+Sources: ISO/IEC 14772-1:1997; ISO/IEC 19776-2 (X3D in the same encoding). This reader is more
+tolerant than the one for our own files: nodes that are not of the standard are left out and
+reported. A world shows other files of the same upload, and no script is executed.
 """
 
 from __future__ import annotations
@@ -22,8 +21,6 @@ from katana450.extensions.export.vrml_node import Node
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.surface import MeshReading, MeshSurface
-from katana450.extensions.importers.vrml1_reader import parsed_vrml1
-from katana450.extensions.importers.vrml1_traversal import Traversal
 from katana450.extensions.importers.vrml_flattening import Flattening, nodes
 from katana450.extensions.importers.vrml_foreign import BUILT_IN, ForeignReader, parsed
 from katana450.extensions.importers.vrml_prototypes import Instance, Prototype, PrototypeExpansion
@@ -32,10 +29,10 @@ from katana450.extensions.importers.vrml_standard import STANDARD
 GZIP = b"\x1f\x8b"
 """First bytes of a gzip file."""
 
-XML = re.compile(rb"(\xef\xbb\xbf)?\s*<")
-"""Beginning of a file in XML."""
+OTHER_WORLDS = re.compile(r"\s*<|#VRML V1\.0")
+"""Beginning of X3D in XML, and of VRML 1.0."""
 
-SUFFIXES = (".wrl", ".wrz", ".x3dv", ".x3d")
+SUFFIXES = (".wrl", ".wrz", ".x3dv")
 """Suffixes of worlds."""
 
 BODY = "humanoidBody"
@@ -85,9 +82,6 @@ class _Worlds:
         text = self._text(data, name)
         self._open.append(path)
         try:
-            if re.match("#VRML V1.0", text):
-                parts = parsed_vrml1(text, name)
-                return Traversal(name, self.left_out, self._shown).surface(parts)
             found, reader = self._parsed(text, name)
             self.left_out += reader.left_out
             if reader.length is not None:
@@ -185,16 +179,15 @@ class _Worlds:
     def _text(self, data: bytes, name: str) -> str:
         if data.startswith(GZIP):
             data = _unpacked(data, name, self._maximum)
-        if XML.match(data):
-            # The library for XML is imported when a file needs it.
-            from katana450.extensions.importers.x3d_file import classic
-
-            return classic(data, name)
         return data.decode("utf-8", "replace").removeprefix("\ufeff")
 
     def _parsed(self, text: str, name: str) -> tuple[tuple[Node, ...], ForeignReader]:
         if re.match("#(VRML V2.0|X3D V[34])", text):
             return parsed(text, name)
+        if OTHER_WORLDS.match(text):
+            raise InputError(
+                f"{name} is VRML 1.0 or X3D in XML, which is not read. Export it as VRML97 or GLB."
+            )
         # Parts of robots are often saved without the first line.
         with suppress(InputError):
             found = parsed(f"{HEADER}\n{text}", name)

@@ -9,11 +9,10 @@ import numpy as np
 from katana450.extensions.export.vrml_node import Node
 from katana450.extensions.importers.surface import MeshSurface
 from katana450.extensions.importers.vrml_flat import FLAT
-from katana450.extensions.importers.vrml_letters import text
 from katana450.extensions.importers.vrml_lines import LINES
 from katana450.extensions.importers.vrml_solids import SOLIDS, numbers
 
-MAKERS = {**SOLIDS, **FLAT, **LINES, "Text": text}
+MAKERS = {**SOLIDS, **FLAT, **LINES}
 """The function that builds the surface or lines, by the kind of a node."""
 
 LENGTHS = {
