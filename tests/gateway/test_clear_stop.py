@@ -276,6 +276,16 @@ def test_stop_during_the_start_is_confirmed_if_the_arm_was_stopped_on_another_pa
     assert table.hub.stopped is None
 
 
+def test_full_disk_is_reported(table: ClearingTable) -> None:
+    table.hub.recorder.problem = "The event log is not written: No space left on device."
+    assert status.health(table.hub) == table.hub.recorder.problem
+    table.hub.recorder.problem = ""
+    table.hub.shown = {"episodes": {"problem": "Nothing is recorded now: No space left on device."}}
+    assert status.health(table.hub) == "Nothing is recorded now: No space left on device."
+    table.hub.shown = {"episodes": {"problem": ""}}
+    assert status.health(table.hub) is None
+
+
 def test_missing_path_of_stop_is_reported(table: ClearingTable) -> None:
     assert status.health(table.hub) is None
     table.hub.stop_path.problem = "STOP is not served on port 8081 now."

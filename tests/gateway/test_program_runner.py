@@ -111,8 +111,9 @@ def test_others_may_steer_a_program_only_if_they_may_take_the_lease(table: Stage
     owner, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     viewer, admin = table.join("third", Role.VIEWER), table.join("fourth", Role.ADMIN)
     program_runner = table.programs
-    with pytest.raises(LeaseError, match="watch"):
-        program_runner.script(viewer, SCRIPT, more=False, speed=1.0)
+    for more in (False, True):
+        with pytest.raises(LeaseError, match="watch"):
+            program_runner.script(viewer, SCRIPT, more=more, speed=1.0)
     table.plan(owner)
     program_runner.steer(owner, ProgramOrder.RUN)
     for participant, reason in ((viewer, "watch"), (other, "belongs to Window 1")):

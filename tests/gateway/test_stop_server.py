@@ -88,6 +88,19 @@ def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Port]:
         yield Port(tmp_path, listening)
 
 
+@pytest.mark.parametrize(
+    "more",
+    [
+        [("host", "127.0.0.1:notaport")],
+        [("host", "localhost"), ("content-length", "2"), ("transfer-encoding", "chunked")],
+    ],
+)
+def test_invalid_requests_are_refused(port: Port, more: list[tuple[str, str]]) -> None:
+    request = h11.Request(method="POST", target="/api/v1/stop", headers=more)
+    assert asyncio.run(port.server.reply(request, CLIENT)).status == 400
+    assert port.sent == []
+
+
 async def exhaust(port: Port, token: str) -> None:
     """Send STOP as ``token`` until an answer is delayed."""
     for _ in range(10 * round(BURST)):

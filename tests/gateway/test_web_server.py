@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import subprocess
 import sys
 import time
@@ -53,6 +54,40 @@ def test_pages_are_served_before_the_application_is_complete(web: WebServer) -> 
     note = web.recorder.notes.get_nowait()
     assert note is not None
     assert (note.kind, note.outcome) == ("sign-in", "accepted")
+
+
+def _first_line(url: str, head: str) -> str:
+    """Return the first line of the answer to a request with ``head``, and hang up."""
+    with socket.create_connection(("127.0.0.1", int(url.rpartition(":")[2])), 2.0) as connection:
+        connection.sendall(head.replace("\n", "\r\n").encode() + b"\r\n\r\n")
+        return connection.recv(200).partition(b"\r\n")[0].decode()
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "GET / HTTP/1.1\nHost: 127.0.0.1:notaport",
+        "GET / HTTP/1.1\nHost: 127.0.0.1:99999",
+        "GET / HTTP/1.1\nHost: [::1",
+        "POST /enter HTTP/1.1\nHost: 127.0.0.1\nContent-Length: 2\nTransfer-Encoding: chunked",
+    ],
+)
+def test_invalid_requests_are_refused(web: WebServer, head: str) -> None:
+    assert _first_line(url_of(web), head) == "HTTP/1.1 400 Bad Request"
+
+
+def test_client_that_hangs_up_in_its_body_leaves_no_traceback(
+    web: WebServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    url = url_of(web)
+    head = (
+        f"POST /enter HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: {url}\r\nContent-Length: 99\r\n\r\n{{"
+    )
+    with socket.create_connection(("127.0.0.1", int(url.rpartition(":")[2])), 2.0) as connection:
+        connection.sendall(head.encode())
+    assert ask(f"{url}/")[0] == 200
+    web.stop()
+    assert [record.getMessage() for record in caplog.records] == []
 
 
 def test_other_requests_wait_for_the_application(web: WebServer) -> None:

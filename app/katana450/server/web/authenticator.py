@@ -93,6 +93,19 @@ class Address:
         return origin in (f"{scheme}://{host}", self.public)
 
 
+def framing_fault(headers: Mapping[str, str]) -> str | None:
+    """Return what makes a request with ``headers``, named in lower case, invalid; None if nothing.
+
+    A proxy in front could take another part of an ambiguous request for the next one.
+    """
+    if "content-length" in headers and "transfer-encoding" in headers:
+        return "Send either Content-Length or Transfer-Encoding, not both."
+    with suppress(ValueError):
+        if urlsplit(f"//{headers.get('host', '')}").port != 0:
+            return None
+    return "The header Host is no host name with a port."
+
+
 def public_origin(url: str) -> str:
     """Return the origin of ``url``. Raises ConfigurationError if it has none or has a path."""
     parts = urlsplit(url)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from katana450.server.web.authenticator import UNKNOWN_HOST, Address
+from katana450.server.web.authenticator import UNKNOWN_HOST, Address, framing_fault
 
 SAFE_METHODS = ("GET", "HEAD")
 
@@ -75,19 +77,24 @@ class SecurityMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request on with security headers added, or refuse it."""
-        objection = self._objection(scope)
+        headers = Headers(scope=scope)
+        fault = framing_fault(headers)
+        objection = fault or self._objection(scope, headers)
         if objection is None:
-            await self._app(scope, receive, self._with_headers(send))
+            # A client that hangs up in its body needs no answer.
+            with suppress(ClientDisconnect):
+                await self._app(scope, receive, self._with_headers(send))
         elif scope["type"] == "websocket":
             # The websocket is not accepted yet, so the response is 403.
             await receive()
             await send({"type": "websocket.close", "code": 1008})
         else:
-            refusal = PlainTextResponse(objection, status_code=403)
+            # What follows an ambiguous body is no request.
+            close = {"Connection": "close"} if fault else None
+            refusal = PlainTextResponse(objection, 400 if fault else 403, close)
             await refusal(scope, receive, self._with_headers(send))
 
-    def _objection(self, scope: Scope) -> str | None:
-        headers = Headers(scope=scope)
+    def _objection(self, scope: Scope, headers: Headers) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")
         if not self._address.is_ours(host):
             return UNKNOWN_HOST

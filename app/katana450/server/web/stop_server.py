@@ -33,7 +33,13 @@ from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import TOKEN_REQUIRED, UNKNOWN_HOST, Address, Authenticator
+from katana450.server.web.authenticator import (
+    TOKEN_REQUIRED,
+    UNKNOWN_HOST,
+    Address,
+    Authenticator,
+    framing_fault,
+)
 from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -114,6 +120,8 @@ class StopServer:
         headers = {name.decode("latin-1"): text.decode("latin-1") for name, text in request.headers}
         path, _, query = request.target.decode("latin-1").partition("?")
         origin = headers.get("origin")
+        if fault := framing_fault(headers):
+            return await self.delayed(Reply(HTTPStatus.BAD_REQUEST, fault.encode()), client)
         refusal = self._refusal(request.method, path, headers.get("host", ""), origin)
         if refusal is not None:
             return await self.delayed(refusal, client)

@@ -59,15 +59,15 @@ class ProgramPlanner:
         """Take a part of a script; after the last part, plan it from the present state of the arm.
 
         The last plan is kept if it is of the same script and nothing has changed since. Returns
-        whether the script is complete. Raises LeaseError while another program is planned, and
-        InputError for too long a script.
+        whether the script is complete. Raises LeaseError if ``participant`` may only watch, or
+        while another program is planned, and InputError for too long a script.
         """
+        check_may_drive(participant.person)
         script = self._parts.add(participant.person.key, text, more=more)
         if script is None:
             return False
         arm = self._hub.present()
         self.check_at_rest()
-        check_may_drive(participant.person)
         before = self.planning
         if not self._owner.is_person(participant.person):
             self._breakpoints = "", frozenset()
