@@ -31,6 +31,9 @@ log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
 
+PROTOCOL = "foxglove.sdk.v1"
+"""The only protocol that the SDK accepts."""
+
 INTERVAL = 1.0 / 30.0
 """[s] Interval of the messages."""
 
@@ -72,7 +75,7 @@ class FoxgloveServer:
         )
         self._thread = threading.Thread(target=self._run, name="foxglove", daemon=True)
         self._thread.start()
-        log.info("Foxglove can connect to ws://%s:%d.", HOST, port)
+        log.info("Foxglove (protocol %s) can connect to ws://%s:%d.", PROTOCOL, HOST, port)
 
     def _run(self) -> None:
         problem = ""
