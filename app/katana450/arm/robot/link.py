@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,12 +87,17 @@ class Link:
         return self.T_parent_link @ self.joint.motion(value)
 
     @cached_property
-    def shapes(self) -> tuple[VisualMesh, ...]:
-        """Surfaces of the link's visuals, read on first use.
+    def shapes_by_visual(self) -> tuple[Sequence[VisualMesh], ...]:
+        """Surfaces of each of the link's visuals, read on first use.
 
         Raises RobotDescriptionError for a mesh file that cannot be read.
         """
-        return tuple(shape for visual in self.visuals for shape in shapes_of(visual))
+        return tuple(map(shapes_of, self.visuals))
+
+    @property
+    def shapes(self) -> tuple[VisualMesh, ...]:
+        """All surfaces of the link's visuals; see `shapes_by_visual`."""
+        return tuple(itertools.chain.from_iterable(self.shapes_by_visual))
 
     @cached_property
     def colour(self) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import shapes_of
+from katana450.arm.robot.surfaces import VisualMesh
 from katana450.arm.robot.visual import Visual
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -147,18 +148,20 @@ class ArmNodes(FrameTree):
         super().__init__(server, "/arm", robot)
         self.shapes = {
             link.name: [
-                _as_made(server, f"{self.path[link.name]}/shape{number}", visual)
+                _as_made(server, f"{self.path[link.name]}/shape{number}", link, number)
                 for number, visual in enumerate(link.visuals)
-                if visual.glb is not None or shapes_of(visual)
+                if visual.glb is not None or link.shapes_by_visual[number]
             ]
             for link in robot.links
         }
         self.links = {link.name: link for link in robot.links}
 
 
-def _as_made(server: Window, name: str, visual: Visual) -> viser.GlbHandle:
+def _as_made(server: Window, name: str, link: Link, number: int) -> viser.GlbHandle:
+    """Draw the visual of this ``number`` of ``link`` as the node ``name``."""
+    visual = link.visuals[number]
     if visual.glb is None:
-        return server.scene.add_glb(name, _glb(visual))
+        return server.scene.add_glb(name, _glb(link.shapes_by_visual[number]))
     return server.scene.add_glb(
         name,
         visual.glb.read_bytes(),
@@ -167,15 +170,15 @@ def _as_made(server: Window, name: str, visual: Visual) -> viser.GlbHandle:
     )
 
 
-def _glb(visual: Visual) -> bytes:
-    """Return a binary glTF file of a shape with its normals and materials, in its link's frame."""
+def _glb(shapes: Sequence[VisualMesh]) -> bytes:
+    """Return a binary glTF file of ``shapes`` with their normals and materials."""
     # Imported here, because the import takes longer than the rest of the start.
     import trimesh
 
     # It has no types for materials.
     looks: Any = trimesh.visual
     scene: Any = trimesh.Scene()
-    for shape in shapes_of(visual):
+    for shape in shapes:
         name, colour, metallic, rough = shape.material
         material = looks.material.PBRMaterial(name, metallicFactor=metallic, roughnessFactor=rough)
         material.baseColorFactor = [*to_light(colour), 1.0]
