@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.settings import Settings
@@ -17,17 +16,14 @@ def home_of(robot: Robot) -> Mapping[str, float]:
     arm = robot.arm
     if arm is None:
         return robot.every({})
-    return robot.every(arm.joint_values(*_start(arm)))
+    *q, gripper = home_vector(robot).tolist()
+    return robot.every(arm.joint_values(np.array(q), gripper))
 
 
 def home_vector(robot: Robot) -> FloatArray:
     """Return `home_of` as the joint values (k,) [rad or m] of a collision world of ``robot``."""
-    if robot.arm is None:
-        home = home_of(robot)
+    arm = robot.arm
+    if arm is None:
+        home = robot.every({})
         return np.array([*(home[name] for name in robot.driven), 0.0])
-    return np.append(*_start(robot.arm))
-
-
-def _start(arm: MountedArm) -> tuple[FloatArray, float]:
-    """Return the angles (n,) [rad] and the value of the finger joint [rad or m] of ``arm``."""
-    return arm.ready(Settings.ready), arm.gripper.clamp(0.0)
+    return np.append(arm.ready(Settings.ready), arm.gripper.clamp(0.0))
