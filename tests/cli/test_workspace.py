@@ -15,6 +15,8 @@ import pytest
 
 from katana450.cli.main import main
 from katana450.errors import InputError
+from katana450.extensions.reachability import map as map_module
+from katana450.extensions.reachability import workspace as workspace_module
 from katana450.extensions.reachability.reachability_file import load_map
 from tests.general_arms.links_of_arms import ur5e
 
@@ -78,6 +80,18 @@ def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
     assert one.read_bytes() == two.read_bytes()
 
 
+def test_all_cores_write_the_same_bytes_as_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(map_module, "POSES", 4000)
+    paths = [tmp_path / name for name in ("one.npz", "all.npz")]
+    for path, minimum in zip(paths, (10**6, 2), strict=True):
+        monkeypatch.setattr(workspace_module, "MIN_SHARED_CHUNKS", minimum)
+        assert main(["workspace", *COARSE, "--out", str(path)]) == 0
+    one, shared = (path.read_bytes() for path in paths)
+    assert one == shared
+
+
 def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
     out = tmp_path / "map.npz"
     assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
@@ -103,9 +117,6 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
         (["--out", "map.txt"], "must end in .npz"),
         (["--ply", "map.npz"], "must end in .ply"),
         (["--out", "/nowhere/at/all/map.npz"], "no directory"),
-        (["--scheduler", "127.0.0.1:1"], "No Dask scheduler answers at '127.0.0.1:1'"),
-        (["--scheduler", "nonsense://x"], "unknown address scheme"),
-        (["--scheduler", ""], "missing port"),
     ],
 )
 def test_impossible_options_are_refused_before_the_work(

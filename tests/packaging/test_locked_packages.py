@@ -1,20 +1,17 @@
-"""Reports, films and a Dask cluster work with only the packages that ``make run`` installs."""
+"""Reports and films work with only the packages that ``make run`` installs."""
 
 from __future__ import annotations
 
 import re
 import subprocess
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-LOADED_ON_USE = ("distributed", "imageio_ffmpeg", "matplotlib", "xacro")
+LOADED_ON_USE = ("imageio_ffmpeg", "matplotlib", "xacro")
 NOT_LOCKED = ("hypothesis", "mypy", "playwright", "pyarrow", "pytest")
 MOTION = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
-MAP = ("--voxel", "150", "--pitches", "4", "--rolls", "4", "--samples", "30", "--seed", "2")
 
 
 def run(folder: Path, *command: str | Path, seconds: float = 120.0) -> str:
@@ -27,24 +24,9 @@ def run(folder: Path, *command: str | Path, seconds: float = 120.0) -> str:
     return done.stdout
 
 
-@contextmanager
-def dask(python: Path, folder: Path, *words: str, until: str) -> Iterator[str]:
-    """Run a Dask process; yield the first group of the pattern ``until`` in its output."""
-    command = [str(python), "-m", *words, "--host", "127.0.0.1", "--no-dashboard"]
-    with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        try:
-            found = (re.search(until, line) for line in process.stderr)
-            yield next(match for match in found if match).group(1)
-        finally:
-            process.terminate()
-            process.wait(timeout=60)
-            process.stderr.read()
-
-
 def test_libraries_are_installed_without_those_of_the_tests(python: Path, tmp_path: Path) -> None:
     words = (
-        "import distributed, embreex.rtcore_scene, imageio_ffmpeg, matplotlib.pyplot, PIL.Image; "
+        "import embreex.rtcore_scene, imageio_ffmpeg, matplotlib.pyplot, PIL.Image; "
         f"from importlib.util import find_spec; print(*filter(find_spec, {NOT_LOCKED})); "
         "imageio_ffmpeg.get_ffmpeg_exe()"
     )
@@ -77,24 +59,10 @@ def test_film_of_a_motion(python: Path, tmp_path: Path) -> None:
     assert (tmp_path / "m.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-@pytest.mark.long
-def test_map_on_a_dask_cluster(python: Path, tmp_path: Path) -> None:
-    with ExitStack() as stack:
-        scheduler = ("distributed.cli.dask_scheduler", "--port", "0")
-        address = stack.enter_context(
-            dask(python, tmp_path, *scheduler, until=r"Scheduler at:\s+(tcp\S+)")
-        )
-        worker = ("distributed.cli.dask_worker", address, "--nthreads", "1")
-        stack.enter_context(dask(python, tmp_path, *worker, until=r"Registered to:\s+(tcp\S+)"))
-        words = (*MAP, "--scheduler", address, "--out", "reach.npz")
-        run(tmp_path, python.parent / "katana450", "workspace", *words)
-    assert (tmp_path / "reach.npz").stat().st_size > 0
-
-
 def test_documents_name_no_further_installation() -> None:
     for page in (
         ROOT / "README.md",
         ROOT / "examples" / "README.md",
         *(ROOT / "docs").glob("*.md"),
     ):
-        assert not re.search(r"\[(report|dask)\]", page.read_text(encoding="utf-8")), page
+        assert not re.search(r"\[report\]", page.read_text(encoding="utf-8")), page

@@ -56,11 +56,6 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ply", type=Path, metavar="FILE.ply", help="file for the map as coloured points"
     )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="use the Dask cluster of this scheduler, such as tcp://10.0.0.1:8786",
-    )
     add_arm_options(parser)
 
 

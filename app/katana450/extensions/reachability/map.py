@@ -16,7 +16,7 @@ from katana450.extensions.reachability.reachability import BoolArray, Reachabili
 from katana450.maths.geometry.arrays import FloatArray
 
 POSES = 65536
-"""Poses per chunk: 50 MB each, and enough chunks for a progress bar and a cluster."""
+"""Poses per chunk: 50 MB each, and enough chunks for a progress bar and all cores."""
 
 MAX_MAP_SAMPLES = 1_000_000
 """Maximum number of random postures; their poses take 170 MB."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import os
+import signal
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +17,14 @@ from katana450.assembly.robot_session import find_arm
 from katana450.atomic import Writer, check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
-from katana450.extensions.reachability.cluster import connect_cluster
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability_file import write_npz, write_ply
 from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.settings import Settings
+
+MIN_SHARED_CHUNKS = 8
+"""Number of chunks from which on starting further processes saves time."""
 
 
 def workspace(options: argparse.Namespace) -> int:
@@ -44,7 +48,7 @@ def workspace(options: argparse.Namespace) -> int:
             options.seed,
         ),
     )
-    found = survey.map(_counts(survey, options.scheduler))
+    found = survey.map(_counts(survey))
     files: dict[Path, Writer] = {}
     if options.out:
         files[options.out] = lambda file: write_npz(file, survey, found, robot.name, tool)
@@ -65,17 +69,27 @@ def _check_files(out: Path | None, ply: Path | None) -> None:
             check_writable(path)
 
 
-def _counts(survey: Survey, scheduler: str | None) -> list[IntArray]:
-    """Return the counts of all chunks in their order, computed here or on a cluster."""
+def _counts(survey: Survey) -> list[IntArray]:
+    """Return the counts of all chunks in their order, computed by all cores."""
     chunks = survey.chunks()
-    with ExitStack() as stack:
-        arriving: Iterator[tuple[int, IntArray]]
-        if scheduler is None:
-            arriving = ((number, survey.count(chunk)) for number, chunk in enumerate(chunks))
-        else:
-            arriving = stack.enter_context(connect_cluster(scheduler)).counts(survey, chunks)
-        found = dict(progress(arriving, len(chunks), "Mapping the workspace"))
-    return [found[number] for number in range(len(chunks))]
+    label = "Mapping the workspace"
+    if len(chunks) < MIN_SHARED_CHUNKS:
+        return [survey.count(chunk) for chunk in progress(chunks, len(chunks), label)]
+    # The same code computes each chunk, so the number of processes changes no bit.
+    context = multiprocessing.get_context("spawn")
+    workers = min(os.cpu_count() or 1, len(chunks))
+    with ProcessPoolExecutor(workers, context, _ignore_interrupts) as pool:
+        futures = [pool.submit(survey.count, chunk) for chunk in chunks]
+        try:
+            return [future.result() for future in progress(futures, len(futures), label)]
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+def _ignore_interrupts() -> None:
+    # Ctrl-C is handled by the process that writes the files.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:

@@ -25,30 +25,20 @@ def emulate(options: Namespace) -> int:
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
     script = FaultScript() if options.faults is None else read_fault_script(options.faults)
-    robot = load()
     arm = EmulatedArm(
         profile_named(options.plant),
-        loads_of_robot(robot),
+        loads_of_robot(load()),
         calibrated=options.calibrated,
         calibration_scale=options.calibration_scale,
         object_width=script.object_mm if options.object is None else options.object,
     )
     raise_priority()
     emulator = EmulatorServer(arm, options.host, options.port, script)
-    window = None
-    if options.view is not None:
-        from katana450.extensions.real_arm.emulator.window import ArmWindow
-
-        window = ArmWindow(emulator, robot, options.host, options.view)
     emulator.start()
     say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
-    if window is not None:
-        say(f"The arm behind the wire: {window.url}")
     try:
         while not ending.wait(CHECK_INTERVAL) and emulator.is_running:
             pass
     finally:
-        if window is not None:
-            window.close()
         emulator.stop()
     return 0 if ending.is_set() else 1

@@ -52,12 +52,6 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
         "--faults", type=Path, metavar="FILE", help="script of faults (docs/arm-emulator.md)"
     )
     parser.add_argument(
-        "--view",
-        type=_between("a port", int, 0, 65535),
-        metavar="PORT",
-        help="serve a page there that shows the emulated arm where it really is",
-    )
-    parser.add_argument(
         "--object",
         type=_between("a width in mm", float, 1.0, WIDEST_OBJECT),
         metavar="MM",
