@@ -133,6 +133,8 @@ def test_the_limit_of_the_roll_is_named_where_it_binds(priority: Priority) -> No
         p = project(chain, T, priority=priority)
         wide = project(widened(chain, roll, 1e-3), T, priority=priority, branch=p.branch)  # type: ignore[arg-type]
         beyond = not chain.lower[4] - 1e-9 <= wide.q[4] <= chain.upper[4] + 1e-9
+        # A roll that is lost beside a pitch that gives way is not missed.
+        beyond = beyond and (priority is Priority.POSE or p.pitch_error <= SAME)
         assert (4 in p.limits) == beyond
         named += beyond
     # With the pitch kept the tool faces the other way instead.

@@ -204,7 +204,11 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
         ('<axis xyz="1 0 0"/>', '<axis xyz="0 1 0"/>', "axis 5 must be perpendicular to axis 4"),
         ('<origin xyz="0.05 0 0.15"/>', '<origin rpy="0.1 0 0"/>', "axis 3 must be parallel"),
         ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="fixed">', "five turn"),
-        ('<joint name="elbow" type="revolute">', '<joint name="elbow" type="prismatic">', "five"),
+        (
+            '<joint name="elbow" type="revolute">',
+            '<joint name="elbow" type="prismatic">',
+            "only by turning axes",
+        ),
         (
             '<joint name="elbow" type="revolute">',
             '<joint name="elbow" type="floating">',

@@ -216,19 +216,19 @@ def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
             f"{path.name} has no series of joints that carries a tool. "
             f"Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
+    number = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
+    if not all(joint.type in TURNING for joint in axes):
+        raise RobotDescriptionError(
+            f"{path.name} has {number} ({_listed(axes)}); a tool is driven only by turning axes. "
+            "Name a link that only these carry with --tool, or drive it joint by joint."
+        )
     if count is not None and len(axes) != count:
         hint = ""
         if len(axes) == ARM_JOINTS + 1 and last is not None and not WRIST.search(last.name):
             hint = f" If {last.name} only opens a gripper, add --tool {last.parent}."
-        number = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
         raise RobotDescriptionError(
             f"{path.name} has {number} ({_listed(axes)}); the closed-form kinematics need five "
             f"turning axes.{hint}"
-        )
-    if not all(joint.type in TURNING for joint in axes):
-        raise RobotDescriptionError(
-            f"The axes of {path.name} are {_listed(axes)}; the closed-form kinematics need five "
-            "turning axes."
         )
     return axes
 

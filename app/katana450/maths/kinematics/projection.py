@@ -126,10 +126,9 @@ def measured(
     `canonical` is the same target. `q` (5,) [rad] are the joint angles if limits do not count.
     """
     arm, in_plane = arm_of(chain), found_posture.in_plane
-    limits: tuple[int, ...] = ()
+    limited = q is None
     if q is None:
         q = np.minimum(np.maximum(arm.joints(found_posture.alpha), chain.lower), chain.upper)
-        limits = tuple(_binding(chain, q, found_posture))
     reached = forward(chain, q)
     position_error = math.dist(reached[:3, 3], T[:3, 3])
     theta1 = found_posture.alpha[0]
@@ -143,6 +142,9 @@ def measured(
             turned = math.pi - canonical.pitch(theta1)
             pitch_error = min(pitch_error, abs(wrapped(pitch - turned)))
     pitch_kept = canonical.priority is not Priority.POSE and pitch_error <= tolerances.SAME_ROTATION
+    # Roll that is lost beside a pitch that gives way is not missed.
+    roll_counts = canonical.priority is Priority.POSE or pitch_kept
+    limits = tuple(_binding(chain, q, found_posture, roll_counts)) if limited else ()
     axis1 = position_error > tolerances.SAME_POSITION and _axis_1_binds(
         arm, canonical, found_posture
     )
@@ -184,10 +186,12 @@ def _axis_1_binds(
     return ends or beside
 
 
-def _binding(chain: Chain, q: FloatArray, found_posture: NearestPosture) -> Iterator[int]:
+def _binding(
+    chain: Chain, q: FloatArray, found_posture: NearestPosture, roll_counts: bool
+) -> Iterator[int]:
     """Yield the indices (from 0) of the axes whose limit binds."""
-    held = found_posture.in_plane.posture_bound
-    may_bind = (found_posture.theta1_bound, held, held, held, found_posture.in_plane.roll_bound)
+    held, rolled = found_posture.in_plane.posture_bound, found_posture.in_plane.roll_bound
+    may_bind = (found_posture.theta1_bound, held, held, held, rolled and roll_counts)
     if any(may_bind):
         at_end = np.minimum(abs(q - chain.lower), abs(q - chain.upper)) <= tolerances.LIMIT_SLACK
         yield from (i for i, bound in enumerate(may_bind) if bound and at_end[i])
