@@ -56,6 +56,7 @@ def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str,
     """
     shapes: list[Any] = [Union[asked], answers.AnyAnswer]  # noqa: UP007
     (request, answer), components = msgspec.json.schema_components(shapes, ref_template=REFERENCE)
+    components = {name: _portable(schema) for name, schema in components.items()}
     messages = {each.__name__: each for each in (*asked, *kinds(answers.AnyAnswer))}
     for name, schema in components.items():
         text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
@@ -66,6 +67,25 @@ def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str,
             if field in schema.get("properties", ()):
                 schema["properties"][field]["description"] = about
     return request, answer, components
+
+
+def _portable(schema: Any) -> Any:
+    """Return an equal of ``schema`` from which programs can generate clients.
+
+    They cannot read the ``"items": false`` after the items of a tuple, so items that are alike get
+    one schema. Of an enumeration with one value they would make a class.
+    """
+    if isinstance(schema, list):
+        return [_portable(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    first, *others = schema.get("prefixItems", (None,))
+    if first is not None and all(item == first for item in others):
+        schema = {name: part for name, part in schema.items() if name != "prefixItems"}
+        schema["items"] = first
+    if len(schema.get("enum", ())) == 1:
+        schema = {"const": schema["enum"][0]}
+    return {name: _portable(part) for name, part in schema.items()}
 
 
 def _divided(doc: str) -> tuple[str, dict[str, str]]:
