@@ -63,7 +63,9 @@ def clear_stop(server: AppServer) -> None:
         assert time.monotonic() < end
         time.sleep(0.02)
     assert post(server, do="clear_stop")[0] == 200
-    assert post(server, do="release_lease")[0] == 200
+    # The lease stays free for the owner of a program that was stopped.
+    if state_of(server)["holder"] is not None:
+        assert post(server, do="release_lease")[0] == 200
 
 
 def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:

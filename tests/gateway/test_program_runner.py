@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Grounds
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
@@ -156,6 +157,26 @@ def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
     table.wait(1.0)
     assert table.status == "stopped"
     assert table.arm.holds > 0
+
+
+def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: Staged) -> None:
+    owner, other = (table.join(page) for page in PAGES[:2])
+    table.plan(owner)
+    table.programs.steer(owner, ProgramOrder.RUN)
+    table.stop("Somebody")
+    table.wait(0.1, owner)
+    table.hub.move(other, cmd.ClearStop())
+    assert table.arm.actors[-1].grounds is Grounds.NO_DRIVER
+    assert table.hub.lease.holder is None
+    table.programs.steer(owner, ProgramOrder.RUN)
+    assert table.status == "running"
+    # Without an interrupted program the lease is for the person who clears the stop.
+    table.stop("Somebody")
+    table.wait(0.1, owner)
+    table.hub.acquire(other)
+    table.hub.release_lease(other)
+    table.hub.move(other, cmd.ClearStop())
+    assert table.hub.lease.holder == other.person
 
 
 def test_panel_request_is_executed_after_planning(table: Staged) -> None:

@@ -34,6 +34,7 @@ class Grounds(Enum):
     FREE_LEASE = "took the free lease"
     PROGRAM_OWNER = "owns the program that holds the lease"
     SAFETY = "anybody may stop the arm"
+    NO_DRIVER = "may clear a stop while nobody drives"
     PRESSER = "pressed STOP, or is an admin"
     SERVER = "protection by the server"
 

@@ -63,6 +63,8 @@ class CommandGate:
         """The arm; None until it is ready."""
         self.program: RunningProgram | None = None
         """The running program; None without one."""
+        self.ended: RunningProgram | None = None
+        """The program that was interrupted last, until a participant gets the lease."""
         self.last_pause: LastPause | None = None
         self.revocations = self.motions = 0
         """Number of stops and losses of the lease; of commands that superseded a motion."""
@@ -178,6 +180,7 @@ class CommandGate:
                 # That holder has closed its window.
                 self._revoke()
             self.lease = lease
+            self.ended = None
             self.recorder.lease(before, lease, actor)
 
     def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
@@ -196,6 +199,7 @@ class CommandGate:
                         self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
             self.recorder.lease(self.lease, lease, by)
             self.lease = lease
+            self.ended = self.ended if lease.holder is None else None
 
     # Stop
 
@@ -365,12 +369,17 @@ class CommandGate:
         may = rights.allow(actor.person)
         if may and self.clear_refusal:
             raise LeaseError(self.clear_refusal)
-        if not rights.by_presser:
-            granted = self._granted(actor, pacing=False)
-        elif may:
+        if rights.by_presser:
+            if not may:
+                raise LeaseError(f"Only {rights.names} may clear this stop.")
             granted = replace(actor, grounds=Grounds.PRESSER)
+        elif self.ended is None or self.ended.owner == actor.key:
+            granted = self._granted(actor, pacing=False)
         else:
-            raise LeaseError(f"Only {rights.names} may clear this stop.")
+            # The lease stays free, so that the owner can continue the program.
+            self.check_current(actor)
+            self.lease.acquire(actor.person, self._clock())
+            granted = replace(actor, grounds=Grounds.NO_DRIVER)
         ticket = 0
         if self.arm is not None:
             # A stop that has not come back from the arm yet is not cleared.

@@ -114,6 +114,8 @@ class ProgramParticipant:
             with suppress(InputError, LeaseError):
                 self.send(cmd.SetTool(tool))
                 left = None
+        stopped = hub.gate.stopped or hub.present().state.stopped
+        hub.gate.ended = hub.gate.program if self.drives and stopped is not None else None
         hub.gate.program = None
         with suppress(InputError):
             hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
