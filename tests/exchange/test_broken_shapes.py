@@ -147,7 +147,6 @@ def test_statements_of_obj() -> None:
         (ply().replace(b"format ascii 1.0\n", b""), "has no format"),
         (ply().replace(b"float z", b"float w"), "no vertices with x, y and z"),
         (ply(faces=0), "has no triangles"),
-        (ply(faces=2**31), "ends too early|no length"),
         (ply(vertices=2**31), "ends too early"),
         (ply("3 0 1 3\n"), "vertex 3, counted from 0, but only 3 vertices"),
         (ply("3 0 1 -1\n"), "vertex -1"),

@@ -78,6 +78,21 @@ def off(header: str = "OFF") -> bytes:
     return f"{header} # an L\n\n12 8 0\n{chr(10).join(rows)}\n".encode()
 
 
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"\t   OFF" + off()[off().index(b"\n12") + 1 :],
+        off().replace(b"12 8 0", b"12\n8 # faces\n\n0"),
+        off().replace(b"OFF # an L", b"# first\n OFF\t12").replace(b"12 8 0", b"8 0"),
+        b"OFF " + b"  ".join(off().split(b"\n", 2)[2].replace(b"\n", b" \t").split(b" ")),
+        off().replace(b" ", b"\r\n").replace(b"#\r\nan\r\nL", b"# an L"),
+    ],
+)
+def test_off_may_be_divided_in_any_way(data: bytes) -> None:
+    plain, shape = (read_shape(each, Format.OFF, "l") for each in (off(), data))
+    np.testing.assert_array_equal(shape.vertices[shape.faces], plain.vertices[plain.faces])
+
+
 MODEL = (
     '<model unit="{unit}" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
     '<resources><object id="1"><mesh><vertices>{vertices}</vertices>'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 
@@ -95,3 +97,18 @@ def test_degenerate_triangles_are_reported() -> None:
     shape = read_shape(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\nf 3 3 3", Format.OBJ, "a.obj")
     assert len(shape.faces) == 1
     assert shape.text.endswith("Left out: 2 degenerate triangles.")
+
+
+@pytest.mark.parametrize("order", ["ascii", "binary_little_endian"])
+def test_ply_that_ends_among_its_faces_shows_those_before(order: str) -> None:
+    """The lists of the faces have further properties behind them."""
+    head = ply("", faces=5).replace(b"vertex_indices\n", b"vertex_indices\nproperty uchar part\n")
+    data = head + b"3 0 1 2 7\n3 0 2 1 7\n3 0 1"
+    if order != "ascii":
+        header = head[: head.index(b"0 0 0")].replace(b"ascii", order.encode())
+        rows = [struct.pack("<B3iB", 3, *corners, 7) for corners in ((0, 1, 2), (0, 2, 1))]
+        points = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0)
+        data = header + points + b"".join(rows) + rows[0][:7]
+    shape = read_shape(data, Format.PLY, "half.ply")
+    assert len(shape.faces) == 2
+    assert "The file ends after 2 of 5 faces." in shape.text

@@ -15,9 +15,8 @@ from katana450.errors import InputError
 from katana450.extensions.importers.surface import MeshReading, of_polygons
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 
-HEADERS = ("OFF", "COFF", "NOFF", "CNOFF")
-"""First words of a file: C stands for colours, N for normals."""
-
+HEADER = re.compile(r"(C?N?OFF)(?![A-Za-z])\s*(.*)")
+"""First word of a file, and what follows: C stands for colours, N for normals."""
 
 Rows = list[tuple[int, str]]
 """Lines of a file with their numbers."""
@@ -30,28 +29,59 @@ def read_off(data: bytes, name: str) -> MeshReading:
     """Return all polygons. Raises InputError with the line of an error."""
     lines = enumerate(data.decode("utf-8", "replace").splitlines(), 1)
     rows = [(number, row) for number, line in lines if (row := line.partition("#")[0].strip())]
-    header, _, after = rows[0][1].partition(" ") if rows else ("", "", "")
-    if header not in HEADERS or "BINARY" in after:
-        raise InputError(f"{name} is not OFF text: it must begin with {' or '.join(HEADERS)}.")
-    rows[:1] = [(rows[0][0], after)] if after.strip() else []
-    counts = re.match(r"([0-9]{1,9})\s+([0-9]{1,9})\b", rows[0][1].strip()) if rows else None
+    header = HEADER.match(rows[0][1]) if rows else None
+    if header is None or "BINARY" in header[2]:
+        raise InputError(f"{name} is not OFF text: it must begin with OFF, COFF, NOFF or CNOFF.")
+    rows[:1] = [(rows[0][0], header[2])] if header[2] else []
+    # The third number, of the edges, may be left out.
+    if rows and len(rows[0][1].split()) not in (2, 3):
+        words = _words(rows)
+        rows = [(rows[0][0], " ".join(word for _, word in words[:3])), *words[3:]]
+    counts = re.match(r"([0-9]{1,9})\s+([0-9]{1,9})\b", rows[0][1]) if rows else None
     if counts is None:
         raise InputError(f"{name} is corrupt: the numbers of vertices and faces are missing.")
     count, polygons = int(counts[1]), int(counts[2])
-    if count + polygons > len(rows) - 1:
-        raise InputError(f"{name} is corrupt: it ends too early.")
+    width = 3 + 3 * ("N" in header[1])
+    if count + polygons > len(rows) - 1 or any(
+        len(row.split()) < width for _, row in rows[1 : 1 + count]
+    ):
+        rows[1:] = _rearranged(rows[1:], count, polygons, width, name)
     table = _numbers(rows[1 : 1 + count], name)
-    corners, sizes = _faces(rows[1 + count : 1 + count + polygons], name)
-    width = 3 + 3 * ("N" in header)
     if table.shape[1] < width:
-        raise InputError(f"{name} has vertices with fewer than {width} numbers.")
+        raise InputError(f"{name} has no vertices of {width} numbers.")
+    corners, sizes = _faces(rows[1 + count : 1 + count + polygons], name)
     colours = None
-    if header.startswith("C") and table.shape[1] >= width + 3:
+    if header[1].startswith("C") and table.shape[1] >= width + 3:
         colours = table[:, width : width + 4]
         maximum = 255.0 if (colours > 1.0).any() else 1.0
         colours = np.column_stack((colours / maximum, np.ones(count)))[:, :4]
     surface = of_polygons(table[:, :3], corners, sizes, name, vertex_colours=colours)
     return MeshReading(surface)
+
+
+def _rearranged(rows: Rows, count: int, polygons: int, width: int, name: str) -> Rows:
+    """Return one row for each vertex and each face, of rows that are divided in another way.
+
+    width: numbers of a vertex. Such a file has no colours.
+    """
+    words = _words(rows)
+    arranged: Rows = []
+    start = 0
+    for item in range(count + polygons):
+        length = width
+        if item >= count:
+            size = words[start][1] if start < len(words) else ""
+            length = 1 + int(size) if size.isdecimal() and len(size) < 10 else 1
+        if start + length > len(words):
+            raise InputError(f"{name} is corrupt: it ends too early.")
+        row = words[start : start + length]
+        arranged.append((row[0][0], " ".join(word for _, word in row)))
+        start += length
+    return arranged
+
+
+def _words(rows: Rows) -> Rows:
+    return [(number, word) for number, row in rows for word in row.split()]
 
 
 def _numbers(rows: Rows, name: str) -> FloatArray:

@@ -7,6 +7,7 @@ programs.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -119,8 +120,12 @@ def read_ply(data: bytes, name: str) -> MeshReading:
         None if colours is None else as_bytes(colours),
         vertex_colours=of_vertices if colours is None else None,
     )
+    declared = next((each.rows for each in elements if each.name == "face"), 0)
+    count, note = len(listed.sizes), ""
+    if faces and count < declared:
+        note = f"The file ends after {count} of {declared} faces."
     others = [f"{e.rows} {e.name}" for e in elements if e.name not in ("vertex", "face") and e.rows]
-    return MeshReading(surface, tuple(others))
+    return MeshReading(surface, tuple(others), note=note)
 
 
 def _of_strips(
@@ -206,7 +211,7 @@ class _Text:
         plain = all(each.counts is None for each in element.properties)
         lengths = [1] * len(element.properties) if plain else self._lengths(element)
         if lengths is None:
-            return self._row_by_row(element)
+            return _row_by_row(element, self._list)
         widths = [
             length + (each.counts is not None)
             for each, length in zip(element.properties, lengths, strict=True)
@@ -241,17 +246,11 @@ class _Text:
             at += length + (each.counts is not None)
         return lengths
 
-    def _row_by_row(self, element: Element) -> dict[str, Column]:
-        values: list[list[FloatArray]] = [[] for _ in element.properties]
-        for _ in range(element.rows):
-            for each, rows in zip(element.properties, values, strict=True):
-                count = 1 if each.counts is None else self._count(self._at)
-                self._at += each.counts is not None
-                rows.append(self._take(count))
-        return {
-            each.name: _column(each, rows)
-            for each, rows in zip(element.properties, values, strict=True)
-        }
+    def _list(self, each: Property) -> FloatArray:
+        """Return the next value or list of values."""
+        count = 1 if each.counts is None else self._count(self._at)
+        self._at += each.counts is not None
+        return self._take(count)
 
     def _count(self, at: int) -> int:
         count = float(self._numbers[at]) if at < len(self._numbers) else -1.0
@@ -299,17 +298,7 @@ class _Binary:
                     )
                     for n, each in enumerate(element.properties)
                 }
-        return self._row_by_row(element)
-
-    def _row_by_row(self, element: Element) -> dict[str, Column]:
-        values: list[list[npt.NDArray[Any]]] = [[] for _ in element.properties]
-        for _ in range(element.rows):
-            for each, rows in zip(element.properties, values, strict=True):
-                rows.append(self._list(each))
-        return {
-            each.name: _column(each, rows)
-            for each, rows in zip(element.properties, values, strict=True)
-        }
+        return _row_by_row(element, self._list)
 
     def _list(self, each: Property) -> npt.NDArray[Any]:
         """Return the next value or list of values."""
@@ -322,6 +311,29 @@ class _Binary:
             raise InputError(f"{self._name} is corrupt: it ends too early.")
         self._at += count * kind.itemsize
         return np.frombuffer(self._body, kind, count, self._at - count * kind.itemsize)
+
+
+def _row_by_row(
+    element: Element, take: Callable[[Property], npt.NDArray[Any]]
+) -> dict[str, Column]:
+    """Return the columns of ``element``; ``take`` returns the next value or list of values.
+
+    Of a file that ends among its faces, those before are returned.
+    """
+    values: list[list[npt.NDArray[Any]]] = [[] for _ in element.properties]
+    for number in range(element.rows):
+        try:
+            row = [take(each) for each in element.properties]
+        except InputError:
+            if element.name != "face" or not number:
+                raise
+            break
+        for value, rows in zip(row, values, strict=True):
+            rows.append(value)
+    return {
+        each.name: _column(each, rows)
+        for each, rows in zip(element.properties, values, strict=True)
+    }
 
 
 def _column(each: Property, rows: list[npt.NDArray[Any]]) -> Column:
