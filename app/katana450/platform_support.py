@@ -125,6 +125,14 @@ def limit_resources(memory: int, seconds: int) -> None:
                     resource.setrlimit(kind, (soft, hard))
 
 
+def hanging_time(seconds: float) -> float:
+    """Return the time [s] after which a process limited to ``seconds`` of processor time hangs.
+
+    On a busy machine it takes longer than its processor time. On Windows nothing else limits it.
+    """
+    return seconds if sys.platform == "win32" else 8.0 * seconds
+
+
 def stop_signals() -> list[signal.Signals]:
     """Return the signals that ask a process to end, from the terminal and from other programs."""
     names = ("SIGINT", "SIGTERM", "SIGBREAK")

@@ -31,6 +31,7 @@ from katana450.extensions.importers.shape_file import (
 )
 from katana450.maths.geometry.arrays import frozen
 from katana450.maths.planning.checkpoint import checkpoint
+from katana450.platform_support import hanging_time
 
 CHECK_EVERY = 0.1
 """[s] Interval at which a cancellation is checked."""
@@ -59,10 +60,11 @@ def read_shape_guarded(
 ) -> tuple[ShapeFile, ConvexBody]:
     """Return the result of `read_shape`, and its convex body, from a subprocess.
 
-    The subprocess has `SECONDS` and, where the system supports it, `MAX_MEMORY_BYTES`. ``beside``
-    is asked for the files that the file names; their paths never lead out of its folder. Then the
-    file is read again with them. Raises InputError as `read_shape`, at these limits, and after a
-    crash; and the error of a `checkpoint`, which ends the subprocess.
+    The subprocess has `SECONDS` of processor time and, where the system supports it,
+    `MAX_MEMORY_BYTES`. ``beside`` is asked for the files that the file names; their paths never
+    lead out of its folder. Then the file is read again with them. Raises InputError as
+    `read_shape`, at these limits, and after a crash; and the error of a `checkpoint`, which ends
+    the subprocess.
     """
     file = label(name)
     check_file(data, file, unit, format)
@@ -149,19 +151,20 @@ def _parsed(data: bytes, words: list[str], file: str) -> dict[str, Any]:
             raise
     if process.returncode:
         raise InputError(
-            f"{file} cannot be read: it needs more than {SECONDS:g} s or {MAX_MEMORY_BYTES >> 20} "
-            "MiB, or the file is corrupt. Try a simpler export."
+            f"{file} cannot be read: it needs more than {SECONDS:g} s of processor time or "
+            f"{MAX_MEMORY_BYTES >> 20} MiB, or the file is corrupt. Try a simpler export."
         )
     with np.load(io.BytesIO(output), allow_pickle=False) as found:
         return dict(found)
 
 
 def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
-    """Return the output of ``process`` for ``data``. Raises InputError after `SECONDS`."""
+    """Return the output of ``process`` for ``data``. Raises InputError if it hangs."""
     # communicate() sends no further input after a timeout, so a separate thread sends all of it.
     threading.Thread(target=_send, args=(process.stdin, data), daemon=True).start()
     process.stdin = None
-    due = time.monotonic() + SECONDS
+    limit = hanging_time(SECONDS)
+    due = time.monotonic() + limit
     while True:
         checkpoint()
         try:
@@ -169,7 +172,7 @@ def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:
         except subprocess.TimeoutExpired as error:
             if time.monotonic() > due:
                 raise InputError(
-                    f"{file} takes longer than {SECONDS:g} s to read. Try a simpler export."
+                    f"{file} takes longer than {limit:g} s to read. Try a simpler export."
                 ) from error
 
 

@@ -49,7 +49,7 @@ LONGEST_NAME = 40
 """Maximum number of characters of a name, of objects too."""
 
 SECONDS = 15.0
-"""[s] Timeout of reading a file."""
+"""[s] Maximum processor time of reading a file."""
 
 MAX_MEMORY_BYTES = 1 << 30
 """[bytes] Maximum memory for reading a file."""

@@ -14,9 +14,10 @@ from xml.etree.ElementTree import fromstring
 from katana450.arm.robot.description import checked
 from katana450.errors import ConfigurationError, RobotDescriptionError
 from katana450.extensions.derived_urdf import derived_urdf
+from katana450.platform_support import hanging_time
 
 SECONDS = 10.0
-"""[s] Timeout of expanding a file."""
+"""[s] Maximum processor time of expanding a file."""
 
 MAX_MEMORY_BYTES = 1 << 30
 """[bytes] Maximum memory for expanding a file."""
@@ -62,7 +63,7 @@ def expanded(path: Path, arguments: Mapping[str, str] | None = None) -> bytes:
             env=environment,
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            timeout=SECONDS,
+            timeout=hanging_time(SECONDS),
             check=False,
         )
     except subprocess.TimeoutExpired as error:
@@ -97,6 +98,6 @@ def expanded_file(path: Path, arguments: Mapping[str, str]) -> Path:
 
 def _too_large(path: Path) -> RobotDescriptionError:
     return RobotDescriptionError(
-        f"{path} cannot be expanded: xacro needs more than {SECONDS:g} s or "
+        f"{path} cannot be expanded: xacro needs more than {SECONDS:g} s of processor time or "
         f"{MAX_MEMORY_BYTES >> 20} MiB for it. Look for a macro, list or number without end in it."
     )
