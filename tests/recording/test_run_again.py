@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -72,6 +73,27 @@ def test_drag_runs_again_within_a_tenth_of_a_milliradian(dragged: Path) -> None:
     assert (np.abs(np.diff(trace.q, 2, axis=0)) / 1e-4 <= 1.001 * limits.acceleration).all()
 
 
+@pytest.mark.parametrize(("axis", "angle", "speed"), [(0, 0.6, 1.0), (2, 0.05, 1.0), (0, 0.5, 0.3)])
+def test_straight_motion_takes_its_recorded_time(
+    tmp_path: Path, axis: int, angle: float, speed: float
+) -> None:
+    goal = np.array(described().session.ready)
+    goal[axis] += angle
+
+    def commands(tick: int, _: State) -> Iterator[cmd.Command]:
+        if tick == 5:
+            yield cmd.SpeedScale(speed)
+        elif tick == 10:
+            yield cmd.SetJoints(goal)
+
+    path = record_session(tmp_path / "straight.mcap", 600, commands)
+    part, text = read(path)
+    trace = run_by_clock(planned(text)).trace
+    found = path_difference(part.setpoint, trace.t, trace.q)
+    assert found.joints < 1e-7
+    assert 0.9 * part.duration < found.duration <= 1.1 * part.duration
+
+
 def test_rests_are_kept(dragged: Path) -> None:
     part, text = read(dragged)
     waits = [float(each) for each in re.findall(r"wait: ([\d.]+)", text)]
@@ -120,7 +142,8 @@ def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: st
     found = path_difference(part.setpoint, trace.t, trace.q)
     assert found.joints < TOLERANCE
     assert sum(float(each) for each in re.findall(r"wait: ([\d.]+)", text)) < 0.3
-    assert text.count("trajectory:") == 2
+    # The second one is a straight line, after the motion to the start.
+    assert (text.count("trajectory:"), text.count("- joints:")) == (1, 2)
     # The time of the pause is not in the recorded time either.
     assert part.duration + part.waited == pytest.approx(part.t[-1], abs=0.1)
     assert found.duration < 2.0 * part.duration
@@ -276,10 +299,9 @@ def test_motions_below_the_rounding_are_left_out() -> None:
     up, rest = np.linspace(0.0, 0.1, 50), np.full(30, 0.1)
     tiny = 0.1 + np.linspace(1e-9, 4e-6, 20)
     part = moved(up, rest, tiny, np.full(30, tiny[-1]), tiny[-1] - up)
-    text = again_script(part, described().session.require_arm().gripper)
-    assert text.count("trajectory:") == 2
-    assert [step for step in re.findall(r"- (\w+):", text) if step != "trajectory"] == [
-        "joints", "gripper", "wait", "wait",
+    text = again_script(part, described().session.require_arm())
+    assert re.findall(r"- (\w+):", text) == [
+        "joints", "gripper", "joints", "wait", "wait", "joints",
     ]  # fmt: skip
     program_ = planned(text).program
     assert not any("approach" in task.name for task in program_.tasks)
@@ -287,12 +309,12 @@ def test_motions_below_the_rounding_are_left_out() -> None:
 
 def test_part_with_too_much_motion_is_refused_and_a_long_one_is_coarser() -> None:
     t = np.arange(0.0, 60.0, 0.01)
-    gripper = described().session.require_arm().gripper
+    arm = described().session.require_arm()
     slow = 0.05 * np.sin(4.4 * t)
     with pytest.raises(InputError, match="60 s with too much motion for one script"):
-        again_script(moved(slow + 0.02 * np.sin(31.0 * t)), gripper)
+        again_script(moved(slow + 0.02 * np.sin(31.0 * t)), arm)
     part = moved(slow + 0.02 * np.sin(18.0 * t))
-    text = again_script(part, gripper).split("through:")[1]
+    text = again_script(part, arm).split("through:")[1]
     rows = np.array(re.findall(r"\[([\d.]+), (\S+),", text), dtype=float)
     spline = CubicSpline(rows[:, 0], np.radians(rows[:, 1:]))
     off = np.abs(spline.values_at(part.t)[:, 0] - part.setpoint[:, 0]).max()

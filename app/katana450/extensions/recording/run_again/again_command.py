@@ -68,9 +68,8 @@ def part_and_script(
     None: see ``shown_part``. Raises InputError as ``read_part`` and ``again_script``.
     """
     part = read_part(file, *shown_part(file, start, end), name=file.path.name)
-    gripper = found.session.require_arm().gripper
     bare = bool(json.loads(file.metadata["settings"])["bare"])
-    return part, again_script(part, gripper, bare=bare)
+    return part, again_script(part, found.session.require_arm(), bare=bare)
 
 
 def _left_out(part: RecordedPart) -> str:

@@ -10,15 +10,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from katana450.arm.control.gripper_model import GripperModel
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
 from katana450.extensions.programs.blocks import MAX_STEPS
+from katana450.extensions.programs.requests import SLOWEST_SPEED
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.source import MAX_BYTES, MAX_VALUES
 from katana450.extensions.programs.trajectory import MAX_POSTURES, TRAJECTORY
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+from katana450.maths.planning.joint_path import JointPath
+from katana450.maths.planning.pacing import fastest
+from katana450.maths.planning.scaling import Bounds
 
 TOLERANCES = (1e-4, 3e-4, 1e-3)
 """[rad] Largest distances of the trajectory from the recorded setpoints; a larger one if the script
@@ -42,6 +47,12 @@ FIRST_SPACING = 0.2
 
 TIME_DIGITS, ANGLE_DIGITS, EXACT_DIGITS = 5, 6, 8
 """Decimals of times [s] and angles [deg] in a trajectory, and of single numbers."""
+
+SIMILAR = 0.9
+"""[1] Fraction of a time from which on a motion takes about that time."""
+
+HALVINGS = 40
+"""Number of halvings that find a speed."""
 
 EVENTS_OF_ROW = 3
 """YAML events of a posture, beside those of its angles."""
@@ -76,7 +87,7 @@ class ToolFrame(NamedTuple):
 Piece = Motion | FingerMotion | Rest | ToolFrame
 
 
-def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = False) -> str:
+def again_script(part: RecordedPart, arm: ArmModel, *, bare: bool = False) -> str:
     """Return the script that moves to the start of ``part`` and then as recorded.
 
     Rests are kept, except those in which the arm was paused or stopped. Where the fingers moved
@@ -84,7 +95,7 @@ def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = Fals
 
     Args:
         part: the recorded motion.
-        gripper: the finger joint of the arm.
+        arm: the arm.
         bare: whether the gripper was taken off the arm.
 
     Raises:
@@ -98,7 +109,7 @@ def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = Fals
     pieces = tuple(pieces_of(part))
     of_row = EVENTS_OF_ROW + part.setpoint.shape[1]
     for tolerance in TOLERANCES:
-        steps = list(_steps(part, pieces, tolerance, gripper))
+        steps = list(_steps(part, pieces, tolerance, arm))
         counts = [len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each]
         events = of_row * (sum(counts) + len(steps) + 5)
         text = _text(part, steps, bare=bare)
@@ -119,7 +130,8 @@ def pieces_of(part: RecordedPart) -> Iterator[Piece]:
     """Yield motions of the arm, motions of the fingers and rests, in their order."""
     moves = np.abs(np.diff(part.setpoint, axis=0)).max(axis=1) > 0.0
     for first, last in _runs(~moves):
-        if part.t[last] - part.t[first] < MIN_REST:
+        inside = first > 0 and last < len(moves)
+        if inside and part.t[last] - part.t[first] < MIN_REST:
             moves[first:last] = True
     runs = _merged(part.t, list(_runs(np.diff(part.fingers) != 0.0)))
     begins = dict(runs)
@@ -178,10 +190,11 @@ def _merged(t: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]
 
 
 def _steps(
-    part: RecordedPart, pieces: tuple[Piece, ...], tolerance: float, gripper: GripperModel
+    part: RecordedPart, pieces: tuple[Piece, ...], tolerance: float, arm: ArmModel
 ) -> Iterator[dict[str, Any]]:
     """Yield the steps of the script."""
     end: list[float] = []
+    gripper = arm.gripper
     scale = 1e3 if gripper.slides else math.degrees(1.0)
     yield {"joints": _degrees(part.setpoint[0], EXACT_DIGITS)}
     if gripper.moves:
@@ -198,6 +211,15 @@ def _steps(
                 yield {"gripper": round(scale * angle, EXACT_DIGITS)}
             case Motion(first=first, last=last):
                 t, q = part.t[first : last + 1], part.setpoint[first : last + 1]
+                if is_straight(q, tolerance):
+                    end = _degrees(q[-1], ANGLE_DIGITS)
+                    speed = round(straight_speed(q, t[-1] - t[0], arm), TIME_DIGITS)
+                    if speed < 1.0:
+                        yield {"speed": speed}
+                    yield {"joints": end}
+                    if speed < 1.0:
+                        yield {"speed": 1.0}
+                    continue
                 chosen = postures(t, q, tolerance)
                 rows = [
                     [round(float(at), TIME_DIGITS), *_degrees(each, ANGLE_DIGITS)]
@@ -207,6 +229,30 @@ def _steps(
                 rows[0][1:] = end or rows[0][1:]
                 end = rows[-1][1:]
                 yield {TRAJECTORY: {"through": rows}}
+
+
+def is_straight(q: FloatArray, tolerance: float) -> bool:
+    """Return whether the setpoints ``q`` (N, n) [rad] are a straight line that never turns back."""
+    line = q[-1] - q[0]
+    along = (q - q[0]) @ line / (line @ line) if line.any() else np.zeros(len(q))
+    off = np.abs(q - q[0] - np.outer(along, line)).max()
+    return bool(line.any() and off <= tolerance and np.diff(along).min() >= -REST_TOLERANCE)
+
+
+def straight_speed(q: FloatArray, seconds: float, arm: ArmModel) -> float:
+    """Return the fraction of full speed at which a straight motion takes ``seconds`` [s].
+
+    ``q``: (N, n) its setpoints [rad]. 1 for about the shortest time.
+    """
+    path = JointPath(arm.chain, np.stack((q[0], q[-1])), np.zeros(0))
+    scaling = fastest(path, Bounds(arm.limits, TOOL_SPEED))
+    if scaling.duration > SIMILAR * seconds:
+        return 1.0
+    low, high = SLOWEST_SPEED, 1.0
+    for _ in range(HALVINGS):
+        speed = 0.5 * (low + high)
+        low, high = (speed, high) if scaling.duration_at(speed) > seconds else (low, speed)
+    return high
 
 
 def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
