@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import ClearStop, Command, Servo
+from katana450.arm.control.commands import JOG_TIME, ClearStop, Command, Servo
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
+    IDLE,
     Intent,
     JointTarget,
     Leaving,
@@ -19,6 +20,7 @@ from katana450.arm.control.modes import (
 )
 from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.motion.limiter import Limits
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
 
@@ -119,6 +121,17 @@ def with_stream_sample(
         return with_mode(aimed, Servoing(Stream.begin(t, aimed.goal, command.qd)))
     stream = state.servo.followed_by(t, aimed.goal, command.qd, acceleration)
     return with_mode(aimed, Servoing(stream))
+
+
+def end_stream(state: State, rest: FloatArray, limits: Limits) -> State:
+    """Return ``state`` that comes to rest at the last sample of its stream.
+
+    An arm that has not followed it, because of a contact or of its ``limits``, comes to rest at
+    ``rest`` (n,) [rad or m], the end of a brake begun now.
+    """
+    near = np.abs(state.goal - rest) <= JOG_TIME * limits.speed
+    goal = state.goal if near.all() and not state.blocked else rest
+    return with_goal(state, goal, mode=IDLE)
 
 
 def with_time(command: Command, t: float) -> Command:

@@ -18,6 +18,7 @@ from katana450.arm.control.checks import check, check_joints
 from katana450.arm.control.findings import of_joints
 from katana450.arm.control.goals import (
     end_drag,
+    end_stream,
     follow_plan,
     move_along_plan,
     paused,
@@ -207,7 +208,7 @@ class Session:
         if outcomes or state.outcomes:
             state = replace(state, outcomes=tuple(outcomes))
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
-            state = self._at_rest_soon(state)
+            state = end_stream(state, self._stepper(state).stopping_point(state)[0], self._limits)
         dt = min(t - state.t, MAX_STEP_TIME)
         state = self._stepper(state).step(replace(state, t=max(t, state.t)), dt)
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:

@@ -49,7 +49,11 @@ SPACING = 2e-3
 """Samples nearer to each other than this [s] count as one, the later."""
 
 AVERAGING = 0.1
-"""Weight [1] of the newest interval in the mean interval; half of it in the mean deviation."""
+"""Weight [1] of the newest interval in the mean interval; half of it in the mean deviation, and
+more in a slow stream, so that both are learnt in the same time."""
+
+MAX_JITTER_WEIGHT = 0.5
+"""Maximum of that weight [1]."""
 
 RATES_WEIGHT = 0.05
 """Position error per rate error of equal weight [s]."""
@@ -105,16 +109,15 @@ class Stream:
 
     @property
     def _lag(self) -> float:
-        return (
-            READ_DELAY
-            if self.qd is not None
-            else READ_DELAY + min(LAG_PER_JITTER * self.jitter, MAX_ADDED_LAG)
-        )
+        # A slow stream is read between its samples: beyond the newest one it would be guessed.
+        slow = max(self.period - READ_DELAY, 0.0)
+        longest = slow if self.qd is not None else max(slow, MAX_ADDED_LAG)
+        return READ_DELAY + slow + min(LAG_PER_JITTER * self.jitter, longest)
 
     @property
     def sure_until(self) -> float:
         """The time [s] after which the stream is unknown unless another sample arrives."""
-        return self.t + self._lag + max(CURVE_HORIZON, 2.0 * self.period)
+        return self.t + self._lag + max(CURVE_HORIZON, self.period)
 
     def followed_by(
         self, t: float, q: FloatArray, qd: FloatArray | None, acceleration: FloatArray
@@ -133,7 +136,8 @@ class Stream:
             kept, period, jitter = slice(0, -1), self.period, self.jitter
         else:
             period = self.period + AVERAGING * (interval - self.period) if self.period else interval
-            jitter = self.jitter + AVERAGING / 2.0 * (abs(interval - period) - self.jitter)
+            weight = min(AVERAGING / 2.0 * max(period / READ_DELAY, 1.0), MAX_JITTER_WEIGHT)
+            jitter = self.jitter + weight * (abs(interval - period) - self.jitter)
             window = (
                 WINDOW
                 if qd is not None
