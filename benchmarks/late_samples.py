@@ -1,4 +1,4 @@
-"""Travel of the tool after a hand lets go on a slow connection, and executed late samples.
+"""Travel of the tool after a hand on a slow connection lets go, and executed late samples.
 
 A client streams jogs, samples of joint angles or steps by a connection that delays all data. It is
 slow from the beginning, or becomes slow during the motion without any silence. Then the hand lets

@@ -19,6 +19,7 @@ same samples at the same times. The columns of each stream are:
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
+from katana450.arm.control.joint_commands import JOG_TIME
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
@@ -116,7 +118,9 @@ def ours(limiter: Limiter, feed: Feed) -> FloatArray:
                 if stream is None
                 else stream.followed_by(t, *sample, limiter.limits.acceleration)
             )
-        if stream is not None:
+        if stream is not None and number * TICK - stream.t >= JOG_TIME:
+            now = limiter.towards(now, stream.q[-1], TICK)
+        elif stream is not None:
             now = stream_step(limiter, now, stream, number * TICK, TICK)
         found.append((now.q[0], now.qd[0], now.qdd[0]))
     return np.array(found)
@@ -242,6 +246,13 @@ def hand(t: float) -> float:
 
 def cases() -> Iterator[Case]:
     """Yield all streams of the table."""
+    for rates, jitter in itertools.product((False, True), (0.0, 0.02)):
+        how = 10.0, rates, jitter
+        for amplitude, period in ((0.17, 2.0), (0.4, 3.0), (0.9, 5.0)):
+            signal = sine(amplitude, period)
+            name = f"sine of {amplitude:g} rad, {period:g} s"
+            yield Case(name, signal, period, 3.0 * period, *how)
+        yield Case("hand", hand, 3.0, 20.0, *how)
     for hz in (50.0, 100.0):
         for rates in (False, True):
             for jitter in (0.0, 0.003):
@@ -266,6 +277,14 @@ PEERS: dict[str, Follower] = {
     "smoothed": smoothed,
     "servo": servo_filtered,
 }
+
+
+def unreached(limiter: Limiter, case: Case, t: float) -> float:
+    """Return the distance from the last sample [rad], 4 s after a stream that ends at ``t`` [s]."""
+    ticks = Feed.of(case).ticks[: round(t / TICK)]
+    last = next(samples[-1][1] for samples in reversed(ticks) if samples)
+    rest: list[list[tuple[float, float, float | None]]] = [[] for _ in range(round(4.0 / TICK))]
+    return abs(float(ours(limiter, Feed([*ticks, *rest]))[-1, 0]) - last)
 
 
 def axis_1() -> Limiter:
@@ -307,6 +326,13 @@ def main() -> None:
             f"| {100 * low.beyond:.1f} | {100 * low.peak:.1f} | {1e3 * low.lag:.0f} "
             f"| {100 * servo.peak:.1f} | {1e3 * servo.lag:.0f} | {pushed:.1f} |"
         )
+    ends = [
+        unreached(limiter, case, t)
+        for case in cases()
+        if not case.name.startswith("too fast")
+        for t in (2.3, 3.1, 4.4)
+    ]
+    print(f"Maximum distance from the last sample of an ended stream: {max(ends):.1e} rad")
 
 
 if __name__ == "__main__":
