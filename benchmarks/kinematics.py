@@ -51,6 +51,7 @@ class Entry:
 
 ONE_BY_ONE = (
     Entry(OWN, "katana450 `inverse`"),
+    Entry("katana450-public", "katana450 `Arm.ik`, angles read"),
     Entry("katana450-bare", "katana450 `Solver`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("roboticstoolbox", "roboticstoolbox `ik_LM`, limits kept", "roboticstoolbox-python"),

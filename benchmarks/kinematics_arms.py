@@ -32,6 +32,7 @@ END = "<!-- kinematics of arms: end -->"
 OWN = "katana450-general"
 CLOSED = (
     Entry(OWN, "katana450 `inverse`"),
+    Entry("katana450-public", "katana450 `Arm.ik`, angles read"),
     Entry("katana450-general-bare", "katana450 `solve`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("ik-geo", "ik-geo", "ik-geo"),

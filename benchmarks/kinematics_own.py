@@ -19,6 +19,7 @@ from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
+from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
@@ -68,6 +69,25 @@ class Katana450:
     def joints_batch(self, found: Any) -> list[FloatArray]:
         """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
         return list(found.q)
+
+
+class Public:
+    """The work of `Arm.ik` for poses in {S}, whose joint angles are then read."""
+
+    package = "katana450"
+
+    def __init__(self, task: Task) -> None:
+        self._kinematics = kinematics_of(chain_of(task))
+
+    def solve(self, T: FloatArray) -> Any:
+        """Return all solutions for the pose ``T`` (4, 4)."""
+        solutions = IKSolutions.of_one(self._kinematics, T)
+        return solutions, solutions.q
+
+    def joints(self, found: Any) -> FloatArray:
+        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
+        solutions, q = found
+        return np.array(q[[each.exact for each in solutions]])
 
 
 class Bare:

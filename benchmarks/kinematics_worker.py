@@ -42,6 +42,7 @@ def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
 
 SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
     "katana450": lambda: _own("Katana450"),
+    "katana450-public": lambda: _own("Public"),
     "katana450-bare": lambda: _own("Bare"),
     "katana450-general": lambda: _own("General"),
     "katana450-general-bare": lambda: _own("GeneralBare"),
