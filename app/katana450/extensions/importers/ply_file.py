@@ -123,6 +123,7 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     declared = next((each.rows for each in elements if each.name == "face"), 0)
     count, note = len(listed.sizes), ""
     if faces and count < declared:
+        check_triangles(declared, name)
         note = f"The file ends after {count} of {declared} faces."
     others = [f"{e.rows} {e.name}" for e in elements if e.name not in ("vertex", "face") and e.rows]
     return MeshReading(surface, tuple(others), note=note)
