@@ -95,27 +95,17 @@ class RecordEnd:
                     self._wait_for_any(pipe)
                 while self._waiting:
                     count = min(len(self._waiting), BATCH)
-                    records = [self._waiting[place] for place in range(count)]
+                    records = [self._waiting.popleft() for _ in range(count)]
                     try:
                         pipe.send_bytes(serializer.dumped(records))
                     except PIPE_ERRORS:
-                        # The records go by the next pipe.
+                        # They go by the next pipe. After another error they would end that too.
+                        self._waiting.extendleft(reversed(records))
                         raise
-                    except Exception:
-                        # By the next pipe they would meet the same error.
-                        with self._losing:
-                            self._lost, self._lost_until = self._lost + count, records[-1].t
-                        self._remove(count)
-                        raise
-                    self._remove(count)
                 if self._lost:
                     self._report_lost(pipe)
         with suppress(OSError):
             pipe.close()
-
-    def _remove(self, count: int) -> None:
-        for _ in range(count):
-            self._waiting.popleft()
 
     def _wait_for_any(self, pipe: Connection) -> None:
         """Wait until the arm moves, or until there is no more to wait for."""

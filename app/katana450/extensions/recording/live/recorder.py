@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import threading
 import time
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -31,6 +32,9 @@ START_DELAY = 3.0
 SYNC_INTERVAL = 0.6
 """[s] Time between two syncs of the file. With ``COLLECTING`` of the arm's process it is the
 maximum age of what a crash of the machine loses."""
+
+END_NOTICE_TIME = 1.0
+"""[s] Time within which this process notices that the server ends."""
 
 SWITCH_INTERVAL = 0.001
 """[s] Time after which a busy thread lets another one run."""
@@ -66,7 +70,7 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
         supervisor.ended.wait(START_DELAY)
         ring, header = _ring(config)
-        keeper, listener = _episodes(config, ring, header)
+        keeper, listener = _episodes(config, ring, header, supervisor.ended)
         try:
             while True:
                 _receive(pipe, ring)
@@ -99,9 +103,14 @@ def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
 
 
 def _episodes(
-    config: RecorderConfig, ring: Ring, header: RecordingHeader
+    config: RecorderConfig, ring: Ring, header: RecordingHeader, ended: threading.Event
 ) -> tuple[EpisodeKeeper, EpisodeListener] | tuple[None, None]:
-    """Return the keeper of the episodes, and what takes requests; None if the folder forbids it."""
+    """Return the keeper of the episodes, and what takes requests.
+
+    None if the folder forbids it, or the server ends.
+    """
+    if ended.is_set():
+        return None, None
     from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
     from katana450.extensions.recording.episodes.link import EpisodeListener
@@ -113,7 +122,9 @@ def _episodes(
         address = f"{config.facts.address.name}-episodes"
         listener = EpisodeListener(keeper, config.episodes, address, config.facts.port, header.salt)
     except (InputError, OSError) as error:
-        log.error("Episodes cannot be recorded: %s", error)
+        # A server that ends removes the folder of the address.
+        if not ended.wait(END_NOTICE_TIME):
+            log.error("Episodes cannot be recorded: %s", error)
         return None, None
     return keeper, listener
 
