@@ -12,7 +12,8 @@ import socket
 import stat
 import subprocess
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,29 @@ def stop_signals() -> list[signal.Signals]:
     """Return the signals that ask a process to end, from the terminal and from other programs."""
     names = ("SIGINT", "SIGTERM", "SIGBREAK")
     return [getattr(signal, name) for name in names if hasattr(signal, name)]
+
+
+@contextmanager
+def stop_signals_blocked() -> Iterator[None]:
+    """Keep ``stop_signals`` from the processes that are started in the block.
+
+    They take effect there after ``unblock_stop_signals``, and here after the block. Windows has no
+    such call.
+    """
+    if sys.platform == "win32":
+        yield
+    else:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, stop_signals())
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def unblock_stop_signals() -> None:
+    """Let ``stop_signals`` take effect in this process."""
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, stop_signals())
 
 
 def without_interrupts() -> dict[str, Any]:

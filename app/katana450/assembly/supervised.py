@@ -17,12 +17,12 @@ from multiprocessing.connection import Connection
 from katana450.arm.runtime.readiness import writable
 from katana450.assembly.log_lines import start_log
 from katana450.errors import KatanaError
-from katana450.platform_support import name_process, stop_signals
+from katana450.platform_support import name_process, stop_signals, unblock_stop_signals
 
 HEARTBEAT, REPORT, KEPT, SCENE, UNHEARD = b".", b"r", b"k", b"s", b"u"
-"""First bytes of the messages to the supervisor: a heartbeat; a status word or an error; the last
-known state of the arm, without and with its scene, which only the arm's process reads; and the name
-of a process from which this one hears nothing."""
+"""First bytes of the messages to the supervisor: a heartbeat with the processor time that was used
+so far [s]; a status word or an error; the last known state of the arm, without and with its scene,
+which only the arm's process reads; and the name of a process from which this one hears nothing."""
 
 END, NOTICE = b"e", b"n"
 """First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
@@ -142,7 +142,7 @@ class SupervisorPipe:
                 due = time.monotonic() + 1.5 * self._interval
                 # A supervisor that hangs reads nothing, and the pipe fills.
                 if self._alive() and writable(self._pipe.fileno()):
-                    self._send(HEARTBEAT)
+                    self._send(HEARTBEAT + b"%.2f" % time.process_time())
                 quiet = self._report_silence(quiet)
 
     def _report_silence(self, reported: bool) -> bool:
@@ -170,6 +170,7 @@ def run_supervised(
     # Ctrl-C reaches all processes of a terminal; the supervisor ends this one.
     for number in stop_signals():
         signal.signal(number, signal.SIG_IGN)
+    unblock_stop_signals()
     name_process(name)
     start_log()
     supervisor = SupervisorPipe(pipe, interval)
@@ -179,7 +180,14 @@ def run_supervised(
         work(supervisor)
     except KatanaError as error:
         supervisor.report(error)
-        raise SystemExit(1) from None
+    except SystemExit:
+        log.debug("The process ends early, for a reason that was logged.")
+    except Exception:
+        log.critical("This process met an error.", exc_info=True)
+    else:
+        return
+    # At once: Python would list all objects that the error still holds.
+    os._exit(1)
 
 
 def _end_after(supervisor: SupervisorPipe, failure: threading.ExceptHookArgs) -> None:

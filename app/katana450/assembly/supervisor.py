@@ -35,6 +35,7 @@ from katana450.assembly.supervised import (
     run_supervised,
 )
 from katana450.errors import ConfigurationError, KatanaError
+from katana450.platform_support import stop_signals_blocked
 from katana450.portable_rounding import starting_portable_processes
 
 BEATS_BEFORE_DEADLINE = 4
@@ -46,9 +47,16 @@ TURN = HEARTBEAT_INTERVAL
 """[s] Interval at which signals and silence are checked; the end of a process wakes earlier."""
 
 START_SECONDS = 60.0
-"""[s] Timeout for a process to be ready."""
+"""[s] Time in which the processes that start must use MIN_PROGRESS, and processor time in which
+each one must be ready. On a busy machine a start takes as long as it needs."""
 
-START_SILENCE = 10.0
+MIN_PROGRESS = 0.5
+"""[s] Processor time that shows progress: more than heartbeats take in START_SECONDS."""
+
+BUSY_NOTICE_INTERVAL = 20.0
+"""[s] Interval at which a long start is reported."""
+
+START_SILENCE = 30.0
 """[s] Maximum silence of a process that is not ready yet: imports delay its heartbeats."""
 
 GOODBYE_SECONDS = 5.0
@@ -119,6 +127,8 @@ class Child:
         self.kept: Kept = {}
         self.due: float | None = 0.0
         """Time of the next start [s]; None while a process runs."""
+        self.used = 0.0
+        """Processor time that the process has used [s], by its newest heartbeat."""
         self._early_ends = 0
         self._ready_at: float | None = None
         self._started = self._heard = self._beaten = 0.0
@@ -138,11 +148,11 @@ class Child:
             name=self.spec.name,
             daemon=True,
         )
-        with starting_portable_processes():
+        with starting_portable_processes(), stop_signals_blocked():
             self.process.start()
         # Closed here, so that each side notices when the other is gone.
         theirs.close()
-        self._first, self._ready_at, self.error = False, None, None
+        self._first, self._ready_at, self.error, self.used = False, None, None, 0.0
         self._started = self._heard = time.monotonic()
         self.statuses.clear()
         self._reader = threading.Thread(target=self._read, args=(self._pipe,), daemon=True)
@@ -163,6 +173,8 @@ class Child:
                 kind, content = message[:1], message[1:]
                 if kind in (KEPT, SCENE):
                     self.kept[kind] = content
+                elif kind == HEARTBEAT:
+                    self.used = float(content)
                 elif kind == UNHEARD:
                     self.unheard = content.decode()
                 elif kind == REPORT:
@@ -180,6 +192,15 @@ class Child:
         if report == READY:
             self._ready_at = time.monotonic()
 
+    @property
+    def starts(self) -> bool:
+        """True while a process runs that is not ready."""
+        return self.due is None and self._ready_at is None
+
+    def note_progress(self) -> None:
+        """Count the time of the start from now on: it, or what it may wait for, makes progress."""
+        self._started = time.monotonic()
+
     def excuse(self, late: float) -> None:
         """Do not count the time ``late`` [s], in which the supervisor itself was held up."""
         # What arrived meanwhile is newer.
@@ -192,8 +213,10 @@ class Child:
         """Why the process counts as hung, in words; None if it does not."""
         now = time.monotonic()
         ready = self._ready_at is not None
+        if not ready and self.used > START_SECONDS:
+            return f"was not ready after {START_SECONDS:g} s of processor time"
         if not ready and now - self._started > START_SECONDS:
-            return f"was not ready after {START_SECONDS:g} s"
+            return f"made no progress for {START_SECONDS:g} s"
         silent = now - self._heard
         if silent > (self.spec.deadline if ready else START_SILENCE):
             return f"has not answered for {silent:.1f} s"
@@ -253,7 +276,8 @@ class Supervisor:
         self._on_restart = on_restart
         self._children = {spec.name: Child(spec) for spec in specs}
         self._stopping = stopping
-        self._turned = time.monotonic()
+        self._turned = self._notice_at = time.monotonic()
+        self._used = 0.0
 
     def start(self) -> None:
         """Start all processes, in the given order."""
@@ -272,6 +296,9 @@ class Supervisor:
         """
         while word not in self._children[name].statuses and not self._stopping.is_set():
             self._wait(TURN / 4)
+            if self._turned - self._notice_at > BUSY_NOTICE_INTERVAL:
+                self._notice_at = self._turned
+                log.warning("This machine is busy: katana450 is still starting. Ctrl-C ends it.")
             for child in [each for each in self._children.values() if each.due is None]:
                 alive = child.running
                 if not alive:
@@ -307,6 +334,16 @@ class Supervisor:
                 if late > TURN / 2:
                     child.excuse(late)
                 child.beat()
+        self.note_progress()
+
+    def note_progress(self) -> None:
+        """Let processes that start take their time while any of them uses the processor."""
+        starting = [child for child in self._children.values() if child.starts]
+        used = sum(child.used for child in starting)
+        if abs(used - self._used) > MIN_PROGRESS:
+            self._used = used
+            for child in starting:
+                child.note_progress()
 
     def _watch(self, child: Child) -> None:
         if child.due is not None:

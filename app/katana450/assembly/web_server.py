@@ -39,7 +39,6 @@ PAGES, FILES = ("/", "/enter"), ("/static/", "/viser/")
 SOCKETS = ("/viser", "/control")
 """Paths of the websockets of our page, which are opened when the scene is complete."""
 
-START_SECONDS = 10.0
 GOODBYE_SECONDS = 1
 
 
@@ -115,7 +114,8 @@ class WebServer:
     def start(self) -> None:
         """Start answering. Raises ConfigurationError if the server does not start."""
         self._thread.start()
-        if not self._server.begun.wait(START_SECONDS) or not self._thread.is_alive():
+        self._server.begun.wait()
+        if not self._thread.is_alive():
             raise ConfigurationError("The gateway did not start; see the log above.")
 
     def show(self, app: ASGIApp) -> None:

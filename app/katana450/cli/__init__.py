@@ -3,7 +3,10 @@
 
 def main() -> int:
     """Run one command and return the exit status."""
-    # Here, because each process of a server imports this file again, and needs nothing of it.
-    from katana450.cli.main import main as run
+    try:
+        # Here, because each process of a server imports this file again, and needs nothing of it.
+        from katana450.cli.main import main as run
 
-    return run()
+        return run()
+    except KeyboardInterrupt:
+        return 130

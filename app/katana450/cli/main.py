@@ -50,8 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         drop_output(error)
         return 1
-    except KeyboardInterrupt:
-        return 130
 
 
 def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:

@@ -9,6 +9,7 @@ import signal
 import tempfile
 import threading
 from argparse import Namespace
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from multiprocessing.connection import Connection
@@ -27,7 +28,14 @@ from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.errors import ConfigurationError
 from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
-from katana450.platform_support import pipe_address, stop_signals
+from katana450.platform_support import (
+    claim_file,
+    create_file,
+    only_this_user_writes,
+    open_bytes,
+    pipe_address,
+    stop_signals,
+)
 from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
@@ -35,6 +43,9 @@ from katana450.settings import Settings
 
 FRONT_END, STOP = "katana450 front", "katana450 stop"
 """Names of the processes beside that of the arm."""
+
+FOLDER_PREFIX, CLAIM = "katana450-", "claim"
+"""Begin of the name of a server's private folder, and the file in it that the server locks."""
 
 ARM_DEADLINE = 1.0
 """[s] Time without a tick of the control loop after which the arm's process is ended."""
@@ -102,7 +113,7 @@ def serve(
     settings = replace(settings, stop_port=stop_port)
     url = settings.public_url or _address(settings, listening.getsockname()[1])
     event_log = _server_log(options, listening.getsockname()[1])
-    folder = _private_folder()
+    folder, claimed = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
     front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
     arm = ArmConfig(settings, urdf, tool, options, address, folder)
@@ -144,6 +155,7 @@ def serve(
         listening.close()
         stopping_socket.close()
         event_log.close(requested=stopping.is_set())
+        os.close(claimed)
         shutil.rmtree(folder, ignore_errors=True)
     return 0
 
@@ -196,14 +208,39 @@ def _extra_processes(options: Namespace | None, facts: ServerFacts) -> list[Extr
     return [found for make in makes if options and (found := make(options, facts))]
 
 
-def _private_folder() -> Path:
-    """Return a new folder that only this user can open. Raises ConfigurationError."""
+def _private_folder() -> tuple[Path, int]:
+    """Return a new folder that only this user can open, and the open file that claims it.
+
+    Removes the folders of servers that were killed. Raises ConfigurationError.
+    """
+    for claim in Path(tempfile.gettempdir()).glob(f"{FOLDER_PREFIX}*/{CLAIM}"):
+        _remove_unclaimed(claim)
     try:
-        return Path(tempfile.mkdtemp(prefix="katana450-"))
+        folder = Path(tempfile.mkdtemp(prefix=FOLDER_PREFIX))
+        claimed = create_file(folder / CLAIM, 0o600)
+        claim_file(claimed)
+        # Until now another server that starts leaves it alone.
+        os.write(claimed, b"claimed")
+        return folder, claimed
     except OSError as error:
         raise ConfigurationError(
             f"No private folder can be created: {error}. Set TMPDIR to a writable folder."
         ) from error
+
+
+def _remove_unclaimed(claim: Path) -> None:
+    """Remove the folder of ``claim`` if it is this user's, and its server has ended."""
+    # The claim is held for as long as its server lives; then OSError is raised here.
+    with suppress(OSError):
+        if only_this_user_writes(claim.parent):
+            opened = open_bytes(claim, os.O_RDWR, 0o600)
+            try:
+                claim_file(opened)
+                unclaimed = os.fstat(opened).st_size > 0
+            finally:
+                os.close(opened)
+            if unclaimed:
+                shutil.rmtree(claim.parent)
 
 
 def _address(settings: Settings, port: int) -> str:

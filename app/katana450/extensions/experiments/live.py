@@ -34,9 +34,6 @@ PART_CHARACTERS = 150
 STATE_RATE = 10.0
 """[Hz] Rate of the states that are requested."""
 
-START_TIMEOUT = 60.0
-"""[s] Timeout for the start of a server."""
-
 UNPLANNED_STATUSES = ("refused", "cancelled")
 """Statuses of a program whose planning has failed."""
 
@@ -235,10 +232,7 @@ def _may_start_at(url: str) -> bool:
 
 def _wait_for(server: subprocess.Popen[str]) -> None:
     assert server.stdout is not None
-    due = time.monotonic() + START_TIMEOUT
     for line in server.stdout:
         if "is ready" in line:
             return
-        if time.monotonic() > due:
-            break
     raise ConfigurationError("The server did not start. See its messages above.")

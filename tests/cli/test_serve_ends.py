@@ -1,0 +1,136 @@
+"""A server that is ended early, that fails to start, or that was killed leaves nothing behind."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
+
+import pytest
+
+from katana450.assembly import supervisor as supervisor_module
+from katana450.assembly.robot_session import find_robot
+from katana450.assembly.supervised import SupervisorPipe
+from katana450.assembly.supervisor import (
+    MIN_PROGRESS,
+    START_SECONDS,
+    ChildSpec,
+    Supervisor,
+    Work,
+    child_spec,
+)
+from katana450.cli import serve
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
+from katana450.extensions.recording.live import recorder
+from katana450.platform_support import claim_file
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
+from tests.browser.server import ROOT, free_port
+
+COMMAND = (sys.executable, "-m", "katana450", "serve", "--no-record", "--port")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends Ctrl-C to a group of processes")
+@pytest.mark.parametrize("delay", [0.15, 0.4])
+def test_interrupt_during_the_start_leaves_no_traceback(delay: float) -> None:
+    with subprocess.Popen(
+        (*COMMAND, str(free_port())),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=ROOT,
+        start_new_session=True,
+    ) as server:
+        time.sleep(delay)
+        os.killpg(server.pid, signal.SIGINT)
+        output = server.communicate(timeout=60.0)[0]
+    assert "Traceback" not in output
+
+
+def failing(_config: object, _supervisor: SupervisorPipe) -> None:
+    # As any arm does, it loads a library that lists at exit what an error still holds.
+    robot = find_robot(Settings(), URDF_PATH, None)
+    raise OSError(f"It fails with {robot.session}.")
+
+
+def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
+    supervisor = Supervisor([child_spec("it", "It", failing, None, 5.0)], threading.Event())
+    supervisor.start()
+    supervisor._children["it"].process.join(60.0)
+    supervisor.stop()
+    errors = capfd.readouterr().err
+    assert "It fails with" in errors
+    assert "leaked" not in errors
+
+
+def never(_kept: object) -> Work:
+    raise AssertionError("It is not started.")
+
+
+def test_start_takes_its_time_while_any_process_makes_progress(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 100.0
+    monkeypatch.setattr(supervisor_module, "time", SimpleNamespace(monotonic=lambda: now))
+    specs = [ChildSpec(name, name, never, 1.0) for name in ("arm", "front")]
+    supervisor = Supervisor(specs, threading.Event())
+    arm, front = supervisor._children.values()
+    for child in (arm, front):
+        child.due = None
+        child.excuse(now)
+    for _ in range(10):
+        now += 0.9 * START_SECONDS
+        # The front end waits for the arm.
+        arm.used += 1.1 * MIN_PROGRESS
+        supervisor.note_progress()
+        arm._heard = front._heard = now
+        assert (arm.hangs, front.hangs) == (None, None)
+    now += 1.1 * START_SECONDS
+    supervisor.note_progress()
+    arm._heard = front._heard = now
+    assert arm.hangs == front.hangs == "made no progress for 60 s"
+    arm.used = START_SECONDS + 1.0
+    assert arm.hangs == "was not ready after 60 s of processor time"
+
+
+def test_folder_of_a_killed_server_is_removed_at_the_next_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    killed, claimed = serve._private_folder()
+    (killed / "mesh").touch()
+    os.close(claimed)
+    other = tmp_path / "katana450-of-something-else"
+    other.mkdir()
+    running, claimed = serve._private_folder()
+    newest, also = serve._private_folder()
+    assert set(tmp_path.iterdir()) == {other, running, newest}
+    for each in (claimed, also):
+        os.close(each)
+    with (running / serve.CLAIM).open("r+b") as file:
+        claim_file(file.fileno())
+    shutil.rmtree(running)
+
+
+def test_server_that_ends_early_reports_no_lost_episodes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def claim(_folder: EpisodeFolder) -> None:
+        # As for the address, whose folder the server removes when it ends.
+        ended.set()
+        raise FileNotFoundError(2, "No such file or directory")
+
+    monkeypatch.setattr(EpisodeFolder, "claim", claim)
+    config, ended = SimpleNamespace(episodes=tmp_path), threading.Event()
+    for _ in range(2):
+        found = recorder._episodes(config, Mock(), Mock(), ended)  # type: ignore[arg-type]
+        assert found == (None, None)
+    assert not caplog.text
