@@ -45,7 +45,7 @@ NUMERICAL = (
     Entry("mink", "mink, limits kept", "mink"),
 )
 SIX = (*CLOSED, *NUMERICAL)
-SEVEN = (CLOSED[0], *NUMERICAL)
+SEVEN = (*CLOSED[:2], *NUMERICAL)
 
 LETTERS = {letter: np.eye(3)["xyz".index(letter)] for letter in "xyz"}
 
