@@ -24,6 +24,24 @@ from tests.gateway.lines import Lines, post, speaking
 from tests.gateway.postures import READY, THERE
 
 
+@pytest.mark.parametrize(
+    ("path", "headers", "status", "code"),
+    [
+        ("nowhere", {}, 404, "not_found"),
+        ("stop", {}, 405, "method_not_allowed"),
+        ("state", {"Origin": "http://evil.test"}, 403, "forbidden"),
+        ("scripts/nowhere.yaml", {}, 404, "not_found"),
+    ],
+)
+def test_refusals_have_one_form(
+    server: AppServer, path: str, headers: dict[str, Any], status: int, code: str
+) -> None:
+    answered, _, body = ask(f"{server.url}/api/v1/{path}", **headers)
+    refused = json.loads(body)
+    assert (answered, refused["is"], refused["code"]) == (status, "refused", code)
+    assert refused["why"]
+
+
 def test_every_query_is_answered(program: Client) -> None:
     asked: list[requests.Request] = [
         requests.Heartbeat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),

@@ -19,8 +19,9 @@ from typing import Any
 
 import viser
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import Response
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.routes import control_routes
@@ -38,7 +39,7 @@ from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.admission import Admission
-from katana450.server.web.bodies import TOO_MANY
+from katana450.server.web.bodies import TOO_MANY, refusal
 from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
@@ -84,7 +85,7 @@ class Gateway:
         proxy = Proxy(self.hub, web.authenticator, guard, self.viser.get_port(), key)
         self._budgets = Budgets(self.hub.clock)
         own = control_routes(self.hub, self._budgets, web, proxy)
-        self._app = Starlette(routes=[*web.routes, *own], exception_handlers={MutedError: _muted})
+        self._app = Starlette(routes=[*web.routes, *own], exception_handlers=REFUSALS)
         self._moves = asyncio.Event()
         self._close_until = -math.inf
 
@@ -197,8 +198,17 @@ class Gateway:
                     await self._moves.wait()
 
 
-async def _muted(_request: Request, error: Exception) -> Response:
+async def _muted(request: Request, error: Exception) -> Response:
     """Answer a STOP that does not count, because its sender is muted."""
     assert isinstance(error, MutedError)
     retry = {"Retry-After": str(math.ceil(error.retry))}
-    return PlainTextResponse(str(error), TOO_MANY, retry)
+    return refusal(request.url.path, str(error), TOO_MANY, retry)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    """Answer a request that is refused with an HTTP status."""
+    assert isinstance(error, HTTPException)
+    return refusal(request.url.path, error.detail, error.status_code, error.headers)
+
+
+REFUSALS = {MutedError: _muted, HTTPException: _refused}

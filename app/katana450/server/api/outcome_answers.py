@@ -96,10 +96,12 @@ class Refused(Answer, frozen=True, kw_only=True):
 
     Attributes:
         why: Reason, and what to do.
+        code: Kind of the refusal, for programs: `refused`, or over HTTP the one of its status.
         retry: Time [s] after which the request can be repeated.
         choices: Files of an upload, one of which must be chosen as ``main``.
     """
 
     why: str
+    code: str = "refused"
     retry: float | None = None
     choices: list[str] | None = None

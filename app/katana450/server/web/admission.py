@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from starlette.requests import HTTPConnection
-from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
@@ -21,6 +20,7 @@ from katana450.server.service.identity import Identity
 from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
+from katana450.server.web.bodies import TOO_MANY, refusal
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.security import FOR_PROGRAMS
 
@@ -34,8 +34,6 @@ for each admin. A page has two, a program one."""
 REQUESTS, REQUESTS_EACH, RESERVED_REQUESTS = 128, 16, 8
 """Maximum of concurrent HTTP requests, in total and of one identity, and number reserved for the
 driver and for each admin."""
-
-TOO_MANY = 429
 
 TOO_MANY_SOCKETS = "You have too many open connections. Close some windows or programs."
 TOO_MANY_REQUESTS = "You sent too many requests at once. Wait for their answers."
@@ -146,4 +144,4 @@ class Admission:
             if socket:
                 await refuse(WebSocket(scope, receive, send), error)
             else:
-                await PlainTextResponse(error, TOO_MANY, RETRY)(scope, receive, send)
+                await refusal(scope["path"], error, TOO_MANY, RETRY)(scope, receive, send)

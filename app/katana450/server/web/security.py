@@ -7,10 +7,11 @@ from contextlib import suppress
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from katana450.server.web.authenticator import UNKNOWN_HOST, Address, framing_fault
+from katana450.server.web.bodies import refusal
 
 SAFE_METHODS = ("GET", "HEAD")
 
@@ -91,8 +92,8 @@ class SecurityMiddleware:
         else:
             # What follows an ambiguous body is no request.
             close = {"Connection": "close"} if fault else None
-            refusal = PlainTextResponse(objection, 400 if fault else 403, close)
-            await refusal(scope, receive, self._with_headers(send))
+            refused = refusal(scope["path"], objection, 400 if fault else 403, close)
+            await refused(scope, receive, self._with_headers(send))
 
     def _objection(self, scope: Scope, headers: Headers) -> str | None:
         host, origin = headers.get("host", ""), headers.get("origin")

@@ -64,7 +64,7 @@ class ScriptRoutes:
         try:
             text = await asyncio.to_thread(self._scripts.text, request.path_params["name"])
         except InputError as error:
-            return PlainTextResponse(str(error), status_code=404)
+            raise HTTPException(404, str(error)) from error
         return PlainTextResponse(text)
 
     async def _read(self, request: Request) -> Response:
@@ -88,11 +88,11 @@ class ScriptRoutes:
             try:
                 parse(text)
             except InputError as error:
-                return PlainTextResponse(str(error), status_code=NOT_UNDERSTOOD)
+                raise HTTPException(NOT_UNDERSTOOD, str(error)) from error
             try:
                 self._scripts.save(name, text)
             except InputError as error:
-                return PlainTextResponse(str(error), status_code=NOT_NOW)
+                raise HTTPException(NOT_NOW, str(error)) from error
             return Response(status_code=204)
 
         answer = await self._with_text(request, save)
