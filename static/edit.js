@@ -1,18 +1,19 @@
-// Direct changes to the scene: a dropped file, Delete, and Ctrl-Z.
+// Direct changes to the scene: a dropped file, Delete, undo and redo.
 "use strict";
 const Edit = (() => {
   /** @type {(id: string) => any} */
   const byId = (id) => document.getElementById(id);
   const scene = byId("scene");
   let page = null; // {say, toast, connected, scene}
-  let undoable = []; // names of the changes that can be undone, the newest first
+  let changes = { undo: [], redo: [] }; // names of what can be undone and redone, the newest first
   let revocations = 0; // number of stops and changes of driver: an undo from before the next one is refused
   let leaving = null;
 
-  function undo() {
+  // what: undo or redo.
+  function step(what) {
     if (!page.connected()) return page.toast("No connection to the arm.");
-    if (undoable.length) page.toast(`Undo: ${undoable[0]}`);
-    page.say({ do: "undo", revocations, id: "undo" });
+    if (changes[what].length) page.toast(`${what === "undo" ? "Undo" : "Redo"}: ${changes[what][0]}`);
+    page.say({ do: what, revocations, id: "undo" });
   }
 
   // Return whether the key was handled.
@@ -20,22 +21,22 @@ const Edit = (() => {
     // Teach undoes its own changes.
     if (event.type !== "keydown" || event.altKey || event.target?.closest?.("#teach")) return false;
     // The letter on the key, which is elsewhere on other keyboards; the place of the key if it has no such letter.
-    const isZ = /^[a-z]$/i.test(event.key) ? event.key.toLowerCase() === "z" : event.code === "KeyZ";
-    if (isZ && (event.ctrlKey || event.metaKey) && !event.shiftKey) {
-      if (!event.repeat) undo();
+    const letter = (/^[a-z]$/i.test(event.key) ? event.key : event.code.slice(3)).toLowerCase();
+    if ((letter === "z" || letter === "y") && (event.ctrlKey || event.metaKey)) {
+      if (!event.repeat) step(letter === "y" || event.shiftKey ? "redo" : "undo");
       return true;
     }
     return !event.repeat && event.key === "Delete" && Boolean(page.scene()?.remove());
   }
 
   function note({ detail: status }) {
-    undoable = status.undo ?? [];
+    changes = { undo: status.undo ?? [], redo: status.redo ?? [] };
     revocations = status.revocations;
-    const names = undoable.length ? undoable : ["nothing yet"];
+    const names = changes.undo.length ? changes.undo : ["nothing yet"];
     const list = byId("undoable");
     if ([...list.children].map((each) => each.textContent).join() !== names.join())
       list.replaceChildren(...names.map((name) => Object.assign(document.createElement("li"), { textContent: name })));
-    byId("undo").disabled = !undoable.length;
+    for (const what of ["undo", "redo"]) byId(what).disabled = !changes[what].length;
   }
 
   // Return the point [x, y] of the table below the pointer; null if it is over something else.
@@ -69,7 +70,7 @@ const Edit = (() => {
     page = options;
     listen(window);
     window.addEventListener("status", note);
-    byId("undo").addEventListener("click", undo);
+    for (const what of ["undo", "redo"]) byId(what).addEventListener("click", () => step(what));
     // A page that could not be loaded gives no access.
     const enter = () => scene.contentDocument && listen(scene.contentWindow);
     scene.addEventListener("load", enter);

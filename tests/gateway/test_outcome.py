@@ -126,6 +126,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Set: [requests.Set(node="cup_look", field="whichChoice", value=0)],
         requests.Remove: [requests.Remove(name="ball")],
         requests.Undo: [requests.Undo()],
+        requests.Redo: [requests.Redo()],
         requests.Load: [requests.Load(scene=key)],
         Program: [Program(text="steps:\n  - wait: 20\n")],
         Steer: [

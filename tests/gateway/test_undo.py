@@ -35,6 +35,28 @@ def test_goals_are_undone_in_order(program: Client) -> None:
     np.testing.assert_allclose(undo(program).q, start.q, atol=1e-6)
 
 
+def test_undone_changes_are_redone_until_the_next_change(program: Client) -> None:
+    start = program.go(requests.Home())
+    nudged = program.nudge(1, 0.2)
+    program.ask(requests.Remove(name="basin"))
+    there = names(program)
+    program.ask(requests.Undo())
+    undo(program)
+    np.testing.assert_allclose(state(program).q, start.q, atol=1e-6)
+    np.testing.assert_allclose(program.go(requests.Redo()).q, nudged.q, atol=1e-6)
+    program.ask(requests.Redo())
+    assert names(program) == there
+    with pytest.raises(RefusedError, match="nothing to redo"):
+        program.ask(requests.Redo())
+    # What was redone is undone again, and a new change ends what can be redone.
+    program.ask(requests.Undo())
+    assert names(program) == there | {"basin"}
+    np.testing.assert_allclose(undo(program).q, start.q, atol=1e-6)
+    program.nudge(2, 0.05)
+    with pytest.raises(RefusedError, match="nothing to redo"):
+        program.ask(requests.Redo())
+
+
 def test_settings_are_undone(program: Client) -> None:
     before = state(program)
     program.ask(requests.Speed(value=0.5))

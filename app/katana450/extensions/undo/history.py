@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -80,6 +81,8 @@ class UndoHistory:
         """Begin without changes. ``clock`` is in seconds."""
         self._clock = clock
         self._changes: tuple[Change, ...] = ()
+        # What was undone since the last change, with the inverses of the undoing.
+        self._undone: tuple[Change, ...] = ()
         # Number of commands so far.
         self._count = 0
         # Outcomes are reported in the thread of the pipe.
@@ -96,13 +99,14 @@ class UndoHistory:
     def _note(self, state: State, command: cmd.Command, actor: Actor, *, caught_up: bool) -> None:
         self._count += 1
         if isinstance(command, cmd.ReplaceScene):
-            self._changes = ()
+            self._changes = self._undone = ()
         found = _inverse(state, command)
         if found is None:
             if any(each.traits.supersedes and not each.traits.protective for each in command.parts):
                 # Whatever came before this motion, its undoing would be another leap.
-                self._changes = ()
+                self._changes = self._undone = ()
             return
+        self._undone = ()
         change = Change(*found, actor, self._clock())
         last = self._changes[-1] if self._changes else None
         one_gesture = command.traits.stream or isinstance(command, GESTURES)
@@ -114,24 +118,34 @@ class UndoHistory:
         elif not isinstance(command, cmd.EndDrag):
             self._changes = (*self._changes, change)[-MAX_CHANGES:]
 
-    def changes(self, key: str, revocations: int) -> tuple[Change, ...]:
-        """Return the changes that the participant of ``key`` can undo, the newest first."""
+    @property
+    def stacks(self) -> tuple[tuple[Change, ...], tuple[Change, ...]]:
+        """The changes that can be undone, and those that were undone."""
+        return self._changes, self._undone
+
+    def changes(self, key: str, revocations: int, *, redo: bool = False) -> tuple[Change, ...]:
+        """Return the changes that the participant of ``key`` can undo or redo, the newest first."""
         found = []
-        for change in reversed(self._changes):
+        for change in reversed(self._undone if redo else self._changes):
             if (change.actor.key, change.actor.seen) != (key, revocations):
                 break
             found.append(change)
         return tuple(found)
 
-    def inverse(self, key: str, revocations: int, state: State) -> tuple[Change, cmd.Command]:
+    def inverse(
+        self, key: str, revocations: int, state: State, *, redo: bool
+    ) -> tuple[Change, cmd.Command]:
         """Return the newest change of the participant of ``key``, and the command that undoes it.
+
+        ``redo``: the newest one that was undone, and the command that repeats it.
 
         Raises InputError if there is none, if the hand holds the object, or if the hand would open
         on the way.
         """
-        changes = self.changes(key, revocations)
+        changes = self.changes(key, revocations, redo=redo)
         if not changes:
-            raise InputError("There is nothing to undo since the last stop or change of driver.")
+            what = "redo since the last change," if redo else "undo since the last"
+            raise InputError(f"There is nothing to {what} stop or change of driver.")
         command = changes[0].inverse
         name = _object_of(command)
         now = None if name is None else named(state.objects, name)
@@ -148,25 +162,42 @@ class UndoHistory:
                 command = cmd.PlaceObject(replace(before, appearance=now.appearance))
         return changes[0], command
 
-    def forget(self, change: Change, outcome: Future[Outcome]) -> None:
-        """Remove ``change`` and everything after it: its inverse was delivered.
+    def back(self, change: Change, command: cmd.Command, state: State) -> Change | None:
+        """Return the change by which ``command``, which undoes ``change``, is undone in ``state``.
 
-        It returns if the arm refuses the inverse, unless another command was given meanwhile.
-        ``outcome``: that of the inverse.
+        No later command continues it.
+        """
+        found = _inverse(state, command)
+        return None if found is None else replace(change, inverse=found[1], at=-math.inf)
+
+    def move(
+        self,
+        change: Change,
+        back: Change | None,
+        before: tuple[tuple[Change, ...], tuple[Change, ...]],
+        outcome: Future[Outcome],
+        *,
+        redo: bool,
+    ) -> None:
+        """Remove ``change`` from the stacks ``before``, and add ``back`` to the other one.
+
+        Its inverse was delivered. The stacks return if the arm refuses it, unless another command
+        was given meanwhile. ``outcome``: that of the inverse.
         """
         with self._lock:
-            # The inverse itself may have continued the change.
-            earlier = [each.inverse is not change.inverse for each in self._changes]
-            if all(earlier):
-                return
-            count, place = self._count, earlier.index(False)
-            undone, self._changes = self._changes[: place + 1], self._changes[:place]
+            changes, undone = (tuple(c for c in stack if c is not change) for stack in before)
+            more = () if back is None else (back,)
+            if redo:
+                changes = (*changes, *more)[-MAX_CHANGES:]
+            else:
+                undone = (*undone, *more)
+            count, self._changes, self._undone = self._count, changes, undone
 
         def restore(outcome: Future[Outcome]) -> None:
             refused = not outcome.cancelled() and outcome.result().verdict is Verdict.REFUSED
             with self._lock:
                 if refused and self._count == count:
-                    self._changes = undone
+                    self._changes, self._undone = before
 
         outcome.add_done_callback(restore)
 

@@ -221,6 +221,12 @@ class Undo(MotionRequest, frozen=True):
     traits: ClassVar[RequestTraits] = COMMAND
 
 
+class Redo(MotionRequest, frozen=True):
+    """Repeat the change by this client that was undone last, if no other change followed."""
+
+    traits: ClassVar[RequestTraits] = COMMAND
+
+
 class EndDrag(MotionRequest, frozen=True):
     """End a drag: the nearest pose that the arm can reach becomes the target."""
 
