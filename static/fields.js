@@ -16,6 +16,9 @@ const Fields = (() => {
 
   const changed = (field) => field.value !== Viser.shownIn(field);
 
+  // Return the draft of a box with a point for the comma of a number, such as 12,5.
+  const draft = (field) => field.value.trim().replace(/^([-+]?\d*),(\d*)$/, "$1.$2");
+
   function range(field) {
     const { id, label, index } = Viser.controlOf(field);
     const { min = null, max = null, step = 1 } = controls.get(id) ?? {};
@@ -26,7 +29,7 @@ const Fields = (() => {
   // Return why the draft cannot be sent; empty if it can.
   function objection(field) {
     const { low, high } = range(field);
-    const value = field.value.trim() === "" ? NaN : Number(field.value);
+    const value = draft(field) === "" ? NaN : Number(draft(field));
     if (!Number.isFinite(value)) return "is not a number";
     return value < low || value > high ? `is not between ${low} and ${high}` : "";
   }
@@ -47,7 +50,7 @@ const Fields = (() => {
     mark(field, why);
     if (why) return tell(`${range(field).label}: ${field.value || "nothing"} ${why}. It was not sent.`);
     sending = true;
-    Viser.type(field, field.value);
+    Viser.type(field, draft(field));
     sending = false;
   }
 
@@ -60,7 +63,7 @@ const Fields = (() => {
 
   function step(field, sign) {
     const { low, high, step } = range(field);
-    const from = Number(field.value.trim() === "" || objection(field) ? Viser.shownIn(field) : field.value);
+    const from = Number(objection(field) ? Viser.shownIn(field) : draft(field));
     const decimals = Math.max(...[from, step].map((x) => String(x).split(".")[1]?.length ?? 0));
     const next = Math.min(high, Math.max(low, from + sign * step));
     Viser.fill(field, String(Number(next.toFixed(decimals))));
@@ -72,7 +75,7 @@ const Fields = (() => {
   on("input", (event) => {
     if (sending || !isBox(event.target)) return;
     event.stopImmediatePropagation();
-    mark(event.target, !UNFINISHED.test(event.target.value) && objection(event.target));
+    mark(event.target, !UNFINISHED.test(draft(event.target)) && objection(event.target));
   });
   on("change", (event) => {
     if (!isBox(event.target)) return;

@@ -22,6 +22,7 @@
   const sheet = new CSSStyleSheet();
   sheet.replaceSync(`${Viser.STEADY} ${Viser.HELD}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
+    @media ${Viser.NARROW}, (max-height: 500px) { ${Viser.SOFTWARE_NOTICE} { display: none } }
     html[data-used] ${Viser.HINT} { visibility: hidden !important }
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
   document.adoptedStyleSheets.push(sheet);

@@ -140,6 +140,8 @@
       // A key that stays pressed is one click.
     } else if (event.key === "Enter" && event.type === "keydown" && mayGo() && !event.target?.closest?.(PRESSED)) {
       if (!event.repeat) say({ do: "go" });
+    } else if (event.key === "?" && event.type === "keydown" && !typing(event.target)) {
+      if (!event.repeat) helpButton.click();
     } else if (typing(event.target) || !(Jog.key(event) || Edit.key(event) || episodes?.key(event))) return;
     event.preventDefault();
     event.stopImmediatePropagation();
@@ -153,6 +155,14 @@
   function typing(target) {
     return target?.matches?.("input:not([type=range], [type=radio], [type=checkbox]), textarea, select");
   }
+
+  // A comma in a number is its point, in every language of the browser.
+  window.addEventListener("beforeinput", (event) => {
+    const { target, data } = event;
+    if (!(target instanceof HTMLInputElement && target.type === "number" && data?.includes(","))) return;
+    event.preventDefault();
+    document.execCommand("insertText", false, data.replace(",", "."));
+  });
 
   function blur() {
     // The focus may only have moved between the two documents.
@@ -571,10 +581,12 @@
 
   // The first steps: at each visit until they are dismissed, and from the help.
   let welcome = null;
+  let loadingWelcome = null; // one card, also after two requests
   async function showWelcome() {
-    const { Welcome } = await import("./welcome/welcome.js");
-    if (welcome) welcome.show();
-    else welcome = new Welcome({ say, kept, scene, name: () => status?.name });
+    const options = { say, kept, scene, status: () => status };
+    loadingWelcome ??= import("./welcome/welcome.js").then(({ Welcome }) => Welcome.on(options));
+    welcome = await loadingWelcome;
+    welcome.show();
   }
   byId("welcome-button").addEventListener("click", () => {
     help.close();

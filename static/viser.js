@@ -16,6 +16,8 @@ const Viser = (() => {
   const [TAB, TABS] = ["[role=tab]", "[role=tablist]"];
   // The hint of a control, which lies over other ones.
   const HINT = "[role=tooltip]";
+  // Its notice that it draws by software, which on a phone would cover the robot, and which nobody can change there.
+  const SOFTWARE_NOTICE = ".mantine-Notification-root[style*=orange]";
   // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
   // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
   // the server, as before each connection, its panel shows settings for developers.
@@ -303,7 +305,7 @@ const Viser = (() => {
   }
 
   return {
-    PARAMETER, NUMBER_BOX, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
+    PARAMETER, NUMBER_BOX, SOFTWARE_NOTICE, NARROW, PANEL, PANEL_HANDLE, PANEL_CONTENT, PANEL_GROUND, TAB, TABS, HINT, STEADY,
     HELD, start, hold, missing, keepFocus, forgoCode, tap, viewOf, choiceOf, viewsIn, viewing, replayed, controlsIn, paint, keepControls, rowOf, controlOf, fill, type, picture, pick, press, reveal, thumbnail, veil, controls, handles,
     // Return whether the scene has been drawn.
     isDrawn: () => !held,

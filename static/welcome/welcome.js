@@ -3,14 +3,18 @@ import { html, write } from "../instruments/shape.js";
 import { parts } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
+const DONE = "katana450.welcome.done"; // the names of the steps that were done
 const STYLE = new URL("welcome.css", import.meta.url).href;
 const SCRIPT = "api/v1/scripts/Pour";
 const LOOK_EVERY = 400; // ms
 const PULSE_EVERY = 50; // ms
 const BEGINS = 5000; // ms within which the server takes up a program
 const READY_LOOKS = 5; // until a planned program counts as not run
-const ID = "pour"; // id of the requests of "Watch it pour"
-const POUR = "Pour"; // name of its program
+const ID = "pour"; // id of the requests of the program
+const POUR = { name: "Pour", title: "Watch it pour", about: "The arm grasps the cup and empties it", did: "Poured. The cup is back in its place.", not: "It did not pour." };
+const WAVE = { name: "Wave", title: "Watch it move", about: "A program turns one joint to and fro", did: "Done. That was a program of three steps.", not: "It did not move." };
+const SWING = 20; // degrees to either side, at most
+const RADIANS = Math.PI / 180;
 const ENDS = ["done", "stopped", "failed", "cancelled", "refused", "blocked"];
 const HANDLE = "/target/move";
 /** @type {(id: string) => any} */
@@ -23,43 +27,69 @@ export class Welcome {
   #says = html("p", { role: "status" });
   #bar = html("progress", { max: "1", "aria-label": "Progress of the program", hidden: "" });
   #pulse = html("i", { id: "pulse", hidden: "" });
+  #arm;
   #dragging = null; // timer, while the handle pulses
-  #pouring = false;
+  #program = null; // what the program of the card is, of an arm that can do it
+  #isRunning = false;
   #accepted = false; // whether the server has taken the script
   #refusal = ""; // why it has refused the script or the run
   #steps = {};
 
-  // page: {say, kept, scene, name}; `name` returns the name of the person. The card is shown at once.
-  constructor(page) {
-    this.#page = page;
+  // Return the card, which is shown, for the arm of the server. page: {say, kept, scene, status}; `status` returns
+  // the newest status of the server.
+  static async on(page) {
     const style = html("link", { rel: "stylesheet", href: STYLE });
-    this.#card.hidden = true;
-    for (const kind of ["load", "error"]) style.addEventListener(kind, () => this.show());
+    const styled = new Promise((resolve) => ["load", "error"].forEach((kind) => style.addEventListener(kind, resolve)));
     document.head.append(style);
+    const arm = await fetch("api/v1/arm").then((answer) => answer.json());
+    await styled;
+    return new Welcome(page, arm);
+  }
+
+  constructor(page, arm) {
+    this.#page = page;
+    this.#arm = arm;
+    if (page.status()?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
     const close = html("button", { type: "button", "aria-label": "Close for good" }, "×");
     close.addEventListener("click", () => this.#dismiss());
-    const list = html("ol", {},
-      this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()),
-      this.#step("pour", "Watch it pour", "The arm grasps the cup and empties it", () => this.#pour()),
-      this.#step("part", "Bring your own part", "Choose a file, or drop it on the scene", () => this.#part()),
-    );
+    const list = html("ol", {});
+    if (arm.default_tool) list.append(this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()));
+    else list.append(this.#step("drag", "Turn a joint", "Drag a link of the arm, or a slider of the panel", () => this.#turn()));
+    if (this.#program) list.append(this.#step(this.#program.name, this.#program.title, this.#program.about, () => this.#run()));
+    list.append(this.#step("part", "Bring your own part", "Choose a file, or drop it on the scene", () => this.#part()));
     this.#card.append(html("h2", {}, "First steps"), close, list, this.#says, this.#bar);
     byId("toast").before(this.#card, this.#pulse);
     window.addEventListener("status", ({ detail }) => this.#note(detail));
     window.addEventListener("placed", () => this.#done("part"));
+    for (const name of (page.kept?.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
+    this.#resume();
+  }
+
+  // Follow a program of this person that was begun before the page was loaded again.
+  async #resume() {
+    const { program } = (await this.#look()) ?? {};
+    if (this.#isOwn(program) && ["planning", "running", "paused"].includes(program.status)) this.#run(true);
+  }
+
+  #isOwn(program) {
+    return program?.name === this.#program?.name && program.by === this.#page.status()?.name;
   }
 
   show() {
     this.#card.hidden = false;
   }
 
-  // A browser may refuse to store anything; then the card returns with the next visit.
-  #dismiss() {
+  // A browser may refuse to store anything; then the card returns as new with the next visit.
+  #keep(key, value) {
     try {
-      this.#page.kept?.setItem(KEPT, "done");
+      this.#page.kept?.setItem(key, value);
     } catch {
       // Nothing to do.
     }
+  }
+
+  #dismiss() {
+    this.#keep(KEPT, "done");
     this.#still();
     this.#card.hidden = true;
     byId("help-button").focus();
@@ -74,6 +104,8 @@ export class Welcome {
   }
 
   #done(name) {
+    const done = (this.#page.kept?.getItem(DONE) ?? "").split(",").filter(Boolean);
+    if (!done.includes(name)) this.#keep(DONE, [...done, name].join());
     this.#steps[name].button.classList.add("done");
     write(this.#steps[name].mark, "✓ done: ");
   }
@@ -84,6 +116,10 @@ export class Welcome {
     clearInterval(this.#dragging);
     this.#dragging = setInterval(() => this.#place(), PULSE_EVERY);
     this.#place();
+  }
+
+  #turn() {
+    write(this.#says, "Drag a link of the arm in the scene, or a slider in the panel.");
   }
 
   // Put the ring where the camera shows the handle.
@@ -102,30 +138,51 @@ export class Welcome {
     this.#pulse.hidden = true;
   }
 
-  // The handle was dragged if the arm moves while this person drives.
+  // A drag is the newest change that this person can undo, or was asked for and moves the arm.
   #note(status) {
-    if (this.#dragging === null || !status.mine || status.mood !== "moving") return;
+    const wanted = this.#arm.default_tool ? "arm (drag)" : "arm (";
+    const isDrag = status.mine && (status.undo?.[0] ?? "").startsWith(wanted);
+    const moves = this.#dragging !== null && status.mine && status.mood === "moving";
+    if (this.#steps.drag.button.classList.contains("done") || !(isDrag || moves)) return;
     this.#still();
     this.#done("drag");
-    write(this.#says, "The arm follows. STOP is at the top left, and Space presses it.");
+    if (!this.#isRunning) write(this.#says, "The arm follows. STOP is at the top left, and Space presses it.");
   }
 
-  async #pour() {
-    if (this.#pouring) return;
+  // began: whether it was sent before the page was loaded again.
+  async #run(began = false) {
+    if (this.#isRunning) return;
     this.#still();
-    this.#pouring = true;
-    [this.#accepted, this.#refusal] = [false, ""];
+    this.#isRunning = true;
+    [this.#accepted, this.#refusal] = [began, ""];
     try {
-      const answer = await fetch(SCRIPT);
-      if (!answer.ok) throw new Error(await answer.text());
-      const text = await answer.text();
-      for (const part of parts(text)) this.#page.say(part.more ? part : { ...part, id: ID });
-      await this.#watch();
+      const text = began ? "" : await this.#script();
+      for (const part of began ? [] : parts(text)) this.#page.say(part.more ? part : { ...part, id: ID });
+      await this.#watch(began);
     } catch (error) {
       write(this.#says, `The program cannot be run: ${error.message}`);
     }
     this.#bar.hidden = true;
-    this.#pouring = false;
+    this.#isRunning = false;
+  }
+
+  // Return the text of the program.
+  async #script() {
+    if (this.#program === WAVE) return this.#wave((await this.#look())?.q);
+    const answer = await fetch(SCRIPT);
+    if (!answer.ok) throw new Error(await answer.text());
+    return answer.text();
+  }
+
+  // Turn the first joint that can turn to both sides of the posture q.
+  #wave(q) {
+    const { lower, upper, slides } = this.#arm;
+    const room = (q ?? []).map((at, i) => (slides[i] ? 0 : Math.min(SWING, (upper[i] - at) / RADIANS - 1, (at - lower[i]) / RADIANS - 1)));
+    const axis = room.findIndex((angle) => angle >= 5);
+    if (axis < 0) throw new Error("No joint has room to turn. Press Home first.");
+    const by = (angle) => `  - nudge: {axis: ${axis + 1}, by: ${angle}}\n`;
+    const angle = Math.floor(room[axis]);
+    return `name: ${WAVE.name}\nsteps:\n${by(angle)}${by(-2 * angle)}${by(angle)}`;
   }
 
   // Take an answer; return whether it was for the card.
@@ -147,25 +204,25 @@ export class Welcome {
   }
 
   // Run the program, which alone is our own, once it is planned, and follow it to its end.
-  async #watch() {
+  async #watch(resumed) {
     write(this.#says, "Planning …");
     const began = performance.now();
     let waits = 0; // looks in a row at which the program was planned and did not run
-    let ran = false;
+    let ran = resumed;
     for (; ; await pause(LOOK_EVERY)) {
       const accepted = this.#accepted;
       const state = await this.#look();
       if (!state && !this.#refusal) continue;
       const { program, stopped } = state ?? {};
-      const own = accepted && program?.name === POUR && program.by === this.#page.name();
+      const own = accepted && this.#isOwn(program);
       waits = own && program.status === "ready" ? waits + 1 : 0;
       const over = !own || stopped || waits > READY_LOOKS || ENDS.includes(program.status);
       if (over && !ran && !stopped && !this.#refusal && performance.now() - began < BEGINS) continue;
       if (over || this.#refusal) {
-        const poured = ran && own && program.status === "done";
-        if (poured) this.#done("pour");
+        const worked = ran && own && program.status === "done";
+        if (worked) this.#done(this.#program.name);
         const reason = this.#refusal || stopped || (own && (program.why || program.status)) || "";
-        return write(this.#says, poured ? "Poured. The cup is back in its place." : `It did not pour. ${reason}`);
+        return write(this.#says, worked ? this.#program.did : `${this.#program.not} ${reason}`);
       }
       const planning = program.status === "planning";
       if (!ran && (planning || program.status === "ready")) {

@@ -89,6 +89,29 @@ def test_typed_digits_are_sent_on_enter_only(page: ViserPage, truth: Truth) -> N
     assert watch.sent == [50]
 
 
+def test_comma_of_a_number_is_its_point(page: ViserPage, truth: Truth) -> None:
+    box = page.number_box("1 base turn")
+    watch = Watch(page)
+    type_slowly(page, box, "12,5")
+    assert not marked(box)
+    box.press("Enter")
+    assert watch.sent == [12.5]
+    wait_for_joint(page, truth, 12.5)
+    # In the boxes of our own sheets too.
+    scale = page.page.locator("#fit-scale")
+    page.page.evaluate(
+        "() => { document.getElementById('objects').hidden = false;"
+        " document.getElementById('fit').hidden = false; }"
+    )
+    scale.click()
+    page.page.keyboard.type("12,5")
+    assert scale.input_value() == "12.5"
+    page.page.evaluate(
+        "() => { document.getElementById('objects').hidden = true;"
+        " document.getElementById('fit').hidden = true; }"
+    )
+
+
 def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth) -> None:
     box = page.number_box("1 base turn")
     home, watch = first_joint(truth), Watch(page)

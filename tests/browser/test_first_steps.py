@@ -10,10 +10,11 @@ import trimesh
 
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
-from tests.browser.server import AppServer
+from tests.browser.server import APP, AppServer
 from tests.browser.session import MOVE, Truth, clear_stop, prepare, take
 from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, in_sizes_and_schemes
 from tests.gateway.slow_link import SlowLink
+from tests.general_arms.links_of_arms import ur5e
 
 WORKER = """
     if (window === top) window.Worker = class extends Worker {
@@ -91,7 +92,54 @@ def test_first_drag_is_asked_for_and_noticed(visit: ViserPage, artefacts: Path) 
     visit.drag_arrow(MOVE, "y", 0.1)
     visit.wait_until(lambda: done(visit, "Drag the arrows"), "the step to be done")
     assert not visit.page.locator("#pulse").is_visible()
+    # What was done stays done, and no other sheet is covered.
+    visit.page.reload()
+    visit.page.wait_for_selector("#welcome:not([hidden])")
+    assert done(visit, "Drag the arrows")
+    assert not done(visit, "Watch it pour")
+    card = visit.page.locator("#welcome")
+    for sheet in ("teach", "objects", "jog"):
+        visit.page.click(f"#{sheet}-button")
+        visit.page.wait_for_selector(f"#{sheet}:not([hidden])")
+        assert not card.is_visible()
+        visit.page.click(f"#{sheet}-button")
+    assert card.is_visible()
     assert visit.errors == []
+
+
+def test_unasked_drag_counts_and_question_mark_opens_the_help(
+    visit: ViserPage, server: AppServer
+) -> None:
+    visit.drag_arrow(MOVE, "y", 0.05)
+    visit.wait_until(lambda: done(visit, "Drag the arrows"), "the step to be done")
+    help_ = visit.page.locator("#help")
+    visit.page.keyboard.press("?")
+    assert help_.is_visible()
+    visit.page.keyboard.press("?")
+    assert not help_.is_visible()
+    # The drag is undone and done again by keys.
+    truth = Truth(server)
+    truth.wait(moving=False)
+    after = truth.status()["q"]
+    visit.page.keyboard.press("Control+z")
+    visit.wait_until(lambda: abs(truth.status()["q"][0] - after[0]) > 0.01, "the undoing")
+    truth.wait(moving=False)
+    visit.page.keyboard.press("Control+Shift+Z")
+    visit.wait_until(lambda: abs(truth.status()["q"][0] - after[0]) < 1e-6, "the redoing")
+    assert visit.errors == []
+
+
+@pytest.mark.long
+def test_other_arm_is_offered_what_it_can_do(open_page: OpenPage, tmp_path: Path) -> None:
+    path = tmp_path / "ur5e.urdf"
+    path.write_text(ur5e(), encoding="utf-8")
+    with AppServer((*APP, "--urdf", str(path))) as server:
+        page = open_page(server.url, script=FIRST_VISIT)
+        page.page.wait_for_selector("#welcome:not([hidden])")
+        assert page.page.locator("#welcome", has_text="pour").count() == 0
+        press(page, "Watch it move")
+        page.wait_until(lambda: done(page, "Watch it move"), "the end", seconds=60.0)
+        assert page.errors == []
 
 
 @pytest.mark.long

@@ -314,6 +314,9 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
     count = "document.querySelectorAll(Viser.{}).length"
     with part("NARROW"):
         assert ask(page, "matchMedia(Viser.NARROW).matches")
+    with part("SOFTWARE_NOTICE"):
+        # The browser of the tests draws by software.
+        page.wait_until(lambda: ask(page, count.format("SOFTWARE_NOTICE")) == 1, "the notice")
     with part("PANEL"):
         assert ask(page, count.format("PANEL")) == 1
     with part("PANEL_HANDLE"):
