@@ -97,19 +97,14 @@ def test_comma_of_a_number_is_its_point(page: ViserPage, truth: Truth) -> None:
     box.press("Enter")
     assert watch.sent == [12.5]
     wait_for_joint(page, truth, 12.5)
-    # In the boxes of our own sheets too.
-    scale = page.page.locator("#fit-scale")
-    page.page.evaluate(
-        "() => { document.getElementById('objects').hidden = false;"
-        " document.getElementById('fit').hidden = false; }"
-    )
-    scale.click()
+    # In the boxes of our own page too.
+    own = "{id: 'own', type: 'number', step: 'any', style: 'position: fixed; z-index: 9'}"
+    made = f"document.body.append(Object.assign(document.createElement('input'), {own}))"
+    page.page.evaluate(made)
+    page.page.locator("#own").focus()
     page.page.keyboard.type("12,5")
-    assert scale.input_value() == "12.5"
-    page.page.evaluate(
-        "() => { document.getElementById('objects').hidden = true;"
-        " document.getElementById('fit').hidden = true; }"
-    )
+    assert page.page.locator("#own").input_value() == "12.5"
+    page.page.evaluate("() => document.getElementById('own').remove()")
 
 
 def test_value_out_of_range_is_marked_and_not_sent(page: ViserPage, truth: Truth) -> None:

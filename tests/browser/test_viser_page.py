@@ -314,9 +314,6 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
     count = "document.querySelectorAll(Viser.{}).length"
     with part("NARROW"):
         assert ask(page, "matchMedia(Viser.NARROW).matches")
-    with part("SOFTWARE_NOTICE"):
-        # The browser of the tests draws by software.
-        page.wait_until(lambda: ask(page, count.format("SOFTWARE_NOTICE")) == 1, "the notice")
     with part("PANEL"):
         assert ask(page, count.format("PANEL")) == 1
     with part("PANEL_HANDLE"):
@@ -348,6 +345,16 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
         })()"""
         shown, ours = ask(page, colour)
         assert shown == ours != "rgba(0, 0, 0, 0)"
+    with part("SOFTWARE_NOTICE"):
+        page.frame.evaluate(
+            """() => tapped.line.show(["orange", "red"].map((color) => ({
+                type: "NotificationShowMessage", uuid: color, props: {
+                    title: color, body: "", loading: false, with_close_button: true,
+                    auto_close_seconds: null, color,
+                },
+            })))"""
+        )
+        page.wait_until(lambda: ask(page, count.format("SOFTWARE_NOTICE")) == 1, "the notice")
     page.page.set_viewport_size({"width": 1280, "height": 800})
     with part("NARROW"):
         page.wait_until(lambda: ask(page, count.format("PANEL")) == 0, "the docked panel")
