@@ -288,6 +288,20 @@ def test_number_boxes_are_found_and_filled(page: ViserPage) -> None:
         assert float(ask(page, f"Viser.shownIn({boxes}[0])")) == 1.2
 
 
+def test_notice_of_drawing_by_software_is_found_by_its_colour(page: ViserPage) -> None:
+    count = "document.querySelectorAll(Viser.SOFTWARE_NOTICE).length"
+    with part("SOFTWARE_NOTICE"):
+        page.frame.evaluate(
+            """() => tapped.line.show(["orange", "red"].map((color) => ({
+                type: "NotificationShowMessage", uuid: color, props: {
+                    title: color, body: "", loading: false, with_close_button: true,
+                    auto_close_seconds: null, color,
+                },
+            })))"""
+        )
+        page.wait_until(lambda: ask(page, count) == 1, "the notice")
+
+
 def test_hint_belongs_to_the_row_of_its_control(page: ViserPage) -> None:
     page.frame.get_by_role("button", name="Front", exact=True).hover()
     shown = "document.querySelectorAll(Viser.HINT).length"
@@ -345,16 +359,6 @@ def test_panel_of_a_narrow_page_is_found_and_folded(server: AppServer, open_page
         })()"""
         shown, ours = ask(page, colour)
         assert shown == ours != "rgba(0, 0, 0, 0)"
-    with part("SOFTWARE_NOTICE"):
-        page.frame.evaluate(
-            """() => tapped.line.show(["orange", "red"].map((color) => ({
-                type: "NotificationShowMessage", uuid: color, props: {
-                    title: color, body: "", loading: false, with_close_button: true,
-                    auto_close_seconds: null, color,
-                },
-            })))"""
-        )
-        page.wait_until(lambda: ask(page, count.format("SOFTWARE_NOTICE")) == 1, "the notice")
     page.page.set_viewport_size({"width": 1280, "height": 800})
     with part("NARROW"):
         page.wait_until(lambda: ask(page, count.format("PANEL")) == 0, "the docked panel")
