@@ -240,8 +240,8 @@ def _scripts() -> dict[str, Any]:
                 "requestBody": text,
                 "responses": {
                     "204": {"description": "The script is saved."},
-                    "409": _content("It cannot be saved, and why.", "text/plain"),
-                    "422": _content("It is not a valid script, and why.", "text/plain"),
+                    "409": _response("It cannot be saved, and why.", answers.Refused),
+                    "422": _response("It is not a valid script, and why.", answers.Refused),
                     **COMMON_RESPONSES,
                 },
             },
@@ -262,7 +262,7 @@ def _recordings() -> dict[str, Any]:
     number = {"name": "number", "in": "path", "required": True, "schema": {"type": "integer"}}
     json = {"required": True, "content": {"application/json": {"schema": _OBJECT}}}
     common = {"404": {"description": "There is no such recording here."}, **COMMON_RESPONSES}
-    made = {"409": _content("Nothing was recorded, and why.", "text/plain"), **common}
+    made = {"409": _response("Nothing was recorded, and why.", answers.Refused), **common}
     return {
         "recording": {
             "get": {
