@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from katana450.client import Client, connect
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 from tests.browser.camera import Camera, Drawing
 from tests.browser.chromium import launched

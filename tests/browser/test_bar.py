@@ -15,9 +15,9 @@ from playwright.sync_api import Page
 from katana450.arm.control.lease import Role
 from katana450.assembly import page_files
 from katana450.client import connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.resources import STATIC
 from katana450.server.api import requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.viser_bridge.viser_page import SCRIPTS
 from katana450.server.web import static_files
 from katana450.server.web.access_links import AccessFile

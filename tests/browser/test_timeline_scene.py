@@ -20,7 +20,6 @@ from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import place_of
-from katana450.library.script_run import run_script
 from katana450.server.api import answers, requests
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
@@ -70,7 +69,7 @@ def server(folder: Path) -> Iterator[AppServer]:
                 arm.ask(requests.Position(p=(0.3, 0.0, -0.4), wait=30))
             arm.ask(requests.Home(wait=30))
             episodes.stop("success")
-            assert run_script(arm, SCRIPT, 1.0).program is not None
+            assert arm.run(SCRIPT).program is not None
             end = arm.query(answers.State).t
             run = PlaybackRun(lambda: recordings_in(folder))
             while _end(run) < end:

@@ -18,8 +18,8 @@ import yaml
 from katana450.cli.main import _parser
 from katana450.client import connect
 from katana450.extension import Extension
-from katana450.extensions.programs.requests import Program, Steer
 from katana450.server.api import requests
+from katana450.server.api.program_requests import Program, Steer
 from katana450.server.api.requests import RequestDecoder
 from tests.browser.server import ROOT, AppServer
 from tests.docs.code_blocks import CodeBlock, code_block, code_blocks

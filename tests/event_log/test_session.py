@@ -20,8 +20,8 @@ from katana450.client import aconnect
 from katana450.client.asynchronous import AsyncClient
 from katana450.extensions.event_log.records import Record
 from katana450.extensions.event_log.verification import verified
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import newest, records

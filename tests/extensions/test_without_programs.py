@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.extensions.environments import distribution, without
 from tests.gateway.client import ask

@@ -17,7 +17,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.programs.extension import OWNER_SILENCE
-from katana450.extensions.programs.requests import ProgramOrder
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.command_gate import SETTLE_TIME
 from tests.browser.server import ROOT, SIMULATION_APP, AppServer
 from tests.gateway.client import ask

@@ -18,8 +18,8 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Program
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program
 from tests.browser.server import APP, AppServer
 from tests.exchange.trees import tree
 from tests.gateway.client import ask, opened

@@ -18,15 +18,15 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError, aconnect
-from katana450.extensions.programs.requests import (
+from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
+from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import (
     AllowUnattended,
     Breakpoints,
     Program,
     ProgramOrder,
     Steer,
 )
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
-from katana450.server.api import answers, requests
 from katana450.server.service import pending_answer, serialize
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Request
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import AppServer
 from tests.gateway.client import opened
 from tests.gateway.lines import post, speaking

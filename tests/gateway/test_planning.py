@@ -18,10 +18,10 @@ from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.compiler import TIMING, PlanningStage
 from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server import program_planner
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service import status
 from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES

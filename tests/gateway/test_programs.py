@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import AppServer
 
 pytestmark = pytest.mark.long

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Breakpoints, ProgramOrder, Steer
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Breakpoints, ProgramOrder, Steer
 from tests.browser.server import AppServer
 from tests.gateway.test_programs import planned, wait
 

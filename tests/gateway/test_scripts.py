@@ -12,10 +12,10 @@ import pytest
 
 from katana450.arm.control.lease import Role
 from katana450.client import connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.extensions.programs.script_schema import script_schema
 from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api import answers
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR, ask, enter

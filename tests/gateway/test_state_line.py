@@ -12,8 +12,8 @@ from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.state_line import duration
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service import status
 from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES

@@ -16,10 +16,10 @@ from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.extension import OWNER_SILENCE
-from katana450.extensions.programs.requests import AllowUnattended, ProgramOrder, Steer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests
+from katana450.server.api.program_requests import AllowUnattended, ProgramOrder, Steer
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs import requests as script_requests
 from katana450.server.api import answers, requests
+from katana450.server.api import program_requests as script_requests
 from tests.browser.server import AppServer
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.general_arms.gripping_arms import gripping_urdf
 from tests.general_arms.published_hands import ROBOTIQ_2F_85, hand_urdf, so101_urdf

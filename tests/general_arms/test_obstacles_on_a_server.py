@@ -15,12 +15,12 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import find_robot
 from katana450.client import Client, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.general_arms.chain_urdf import chain_urdf

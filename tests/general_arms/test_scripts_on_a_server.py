@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import APP, AppServer
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, UR5E

@@ -13,8 +13,8 @@ from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.layout import SO101
 from katana450.extensions.leader.leader_command import LeaderRun
 from katana450.extensions.leader.motor_bus import MotorBus
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.leader.follower_bench import Bench, ServerState
 from tests.leader.test_joint_map import WiredPort, arm, calibrated
 

@@ -6,6 +6,7 @@ import re
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,19 @@ def test_plan_is_followed_to_its_end(shoulder_arm: katana450.Arm, client: katana
     state = plan.run(client)
     np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
     assert not state.moving
+
+
+def test_script_is_run_to_its_end_or_refused_with_the_reason(
+    client: katana450.Client, tmp_path: Path
+) -> None:
+    steps = "steps:\n  - joints: [{}, -68, 85, 8, 0]\n"
+    state = client.run(steps.format(10))
+    np.testing.assert_allclose(np.degrees(state.q[0]), 10.0, atol=1e-6)
+    file = tmp_path / "turn.yaml"
+    file.write_text(steps.format(0) + "  - wait: 0\n" * 40, encoding="utf-8")
+    np.testing.assert_allclose(client.run(file, speed=0.9).q[0], 0.0, atol=1e-8)
+    with pytest.raises(RefusedError, match=r"line 2, column \d+: .*500"):
+        client.run(steps.format(500))
 
 
 def test_plan_is_followed_at_a_fraction_of_its_speed(

@@ -40,7 +40,6 @@ from katana450.extensions.recording.live.script_notes import (
 )
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
-from katana450.library.script_run import run_script
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.recording.recorded import header, run, swinging
 from tests.recording.test_recorder import RECORDER, _other_child, waited_for
@@ -87,12 +86,12 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
     named.write_text(NOD, encoding="utf-8")
     (folder / "more.yaml").write_text(MORE, encoding="utf-8")
     with katana450.connect(server.url, name="Ada") as client:
-        run_script(client, LEFT, 1.0)
+        client.run(LEFT)
         client.episodes.start("nod")
         assert main(["run", str(named), "--url", server.url]) == 0
         episode = client.episodes.stop("success")
         for text in (LEFT, RIGHT):
-            run_script(client, text, 1.0)
+            client.run(text)
 
     def has_all() -> bool:
         with suppress(InputError), RecordingFile.open(kept(folder)) as file:
@@ -202,7 +201,7 @@ def test_script_that_runs_is_attached_again_after_a_crash(server: AppServer, fol
 
 def suppressed(client: Client, text: str) -> None:
     with suppress(RefusedError):
-        run_script(client, text, 1.0)
+        client.run(text)
 
 
 def notes(folder: Path, server: AppServer) -> Iterator[Path]:

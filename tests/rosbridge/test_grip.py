@@ -8,8 +8,8 @@ import time
 import pytest
 
 from katana450.client import connect
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.server.api import answers
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import AppServer
 from tests.rosbridge.ros_client import GRIPPER, ros
 

@@ -20,7 +20,6 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server.panel import ProgramsPanel, _page
@@ -32,6 +31,7 @@ from katana450.extensions.water.nodes import WORTH_SHOWING
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.settings import Settings
 from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures

@@ -7,7 +7,7 @@ import math
 import secrets
 import time
 from collections.abc import AsyncGenerator, AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import aclosing, asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote
@@ -24,6 +24,7 @@ from katana450.client.files import STOP_TIMEOUT, LostError, RefusedError, Site
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT, Id
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 
 SOCKET = f"{ROOT}/socket"
 
@@ -35,6 +36,18 @@ CLOSE_TIMEOUT = 1.0
 
 FOLLOW_RATE = 30.0
 """[Hz] Rate of states while a motion is waited for."""
+
+PROGRESS_RATE = 10.0
+"""[Hz] Rate of states while a program is waited for."""
+
+PART_CHARACTERS = 150
+"""Maximum number of characters of a script per request."""
+
+UNPLANNED_STATUSES = ("refused", "cancelled")
+"""Statuses of a program whose planning has failed."""
+
+END_STATUSES = ("done", "stopped", "failed", *UNPLANNED_STATUSES)
+"""Statuses of a program that has ended."""
 
 A = TypeVar("A", bound=answers.Answer)
 
@@ -195,6 +208,47 @@ class AsyncClient:
                 # The client may have been closed meanwhile.
                 with suppress(LostError):
                     await self.send(requests.Watch(hz=0.0))
+
+    async def send_script(self, text: str, speed: float = 1.0) -> None:
+        """Send a script (see docs/programs.md), which the server then plans.
+
+        ``speed``: fraction of the script's own speed. Raises RefusedError and LostError.
+        """
+        parts = [text[k : k + PART_CHARACTERS] for k in range(0, len(text), PART_CHARACTERS)] or [
+            ""
+        ]
+        for part in parts[:-1]:
+            await self.ask(Program(text=part, more=True))
+        await self.ask(Program(text=parts[-1], speed=speed))
+
+    async def run(self, script: str | Path, speed: float = 1.0) -> answers.State:
+        """Plan and run a script; return the state at its end.
+
+        Args:
+            script: its text, such as ``str(program)``, or its file. A script that names files
+                beside it is run by ``katana450 run``, which sends them too.
+            speed: fraction of the script's own speed.
+
+        Raises:
+            RefusedError: it cannot be planned, or ends early; with the reason.
+            LostError: the connection is lost.
+        """
+        text = script
+        if isinstance(script, Path):
+            text = await asyncio.to_thread(script.read_text, encoding="utf-8")
+        await self.send_script(str(text), speed)
+        # It runs as soon as it is planned.
+        await self.ask(Steer(order=ProgramOrder.RUN))
+        async with aclosing(self.states(PROGRESS_RATE)) as states:
+            async for state in states:
+                now = state.program
+                if now is None:
+                    raise LostError("The server no longer knows the program.")
+                if now.status in END_STATUSES:
+                    if now.status != "done":
+                        raise RefusedError(now.why)
+                    return state
+        raise LostError(self._lost or "The server has closed the connection.")
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
         """Request a motion and wait until the arm is at rest; return its state then.

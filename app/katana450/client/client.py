@@ -76,6 +76,14 @@ class Client:
         """See ``AsyncClient.load_scene``."""
         return self._wait(self._client.load_scene(data))
 
+    def send_script(self, text: str, speed: float = 1.0) -> None:
+        """See ``AsyncClient.send_script``."""
+        self._wait(self._client.send_script(text, speed))
+
+    def run(self, script: str | Path, speed: float = 1.0) -> answers.State:
+        """See ``AsyncClient.run``."""
+        return self._wait(self._client.run(script, speed))
+
     @property
     def episodes(self) -> EpisodeClient:
         """Episodes of the server: record, judge and list them."""

@@ -262,13 +262,11 @@ class Recording:
             RefusedError: the server refuses the motion, with the moment and the parts of a contact;
                 or it was stopped.
         """
-        from katana450.library.script_run import run_script
-
         with RecordingFile.open(self.path) as file:
             found = session_for(file, None if urdf is None else Path(urdf))
             text = part_and_script(file, found, start, end)[1]
         check_same_arm(client, found.session.require_arm(), self.path)
-        return run_script(client, text, speed)
+        return client.run(text, speed)
 
     def score(
         self,

@@ -11,14 +11,15 @@ from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 from katana450.client import Client, RefusedError, connect
+from katana450.client.asynchronous import END_STATUSES, PROGRESS_RATE, UNPLANNED_STATUSES
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.programs.attached_files import without_scene
-from katana450.extensions.programs.requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.extensions.programs.script import Script
 from katana450.platform_support import without_interrupts
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Breakpoints, ProgramOrder, Steer
 
 ReportRun = Callable[[Client, answers.State], int]
 """Reports the run that has just ended and returns the exit status, by the state before it."""
@@ -27,18 +28,6 @@ NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
 
 HELP = "Enter pauses and resumes, a number sets the speed in percent, Ctrl-C ends."
-
-PART_CHARACTERS = 150
-"""Maximum number of characters of a script per request."""
-
-STATE_RATE = 10.0
-"""[Hz] Rate of the states that are requested."""
-
-UNPLANNED_STATUSES = ("refused", "cancelled")
-"""Statuses of a program whose planning has failed."""
-
-END_STATUSES = ("done", "stopped", "failed", *UNPLANNED_STATUSES)
-"""Statuses of a program that has ended."""
 
 
 def run_live(text: str, script: Script, options: Namespace, report: ReportRun | None = None) -> int:
@@ -88,10 +77,7 @@ def send_script(arm: Client, text: str, options: Namespace) -> None:
     """Send the script, which the server then plans. ``options.scene`` replaces its own scene."""
     if options.scene is not None:
         text = without_scene(text)
-    parts = [text[at : at + PART_CHARACTERS] for at in range(0, len(text), PART_CHARACTERS)] or [""]
-    for part in parts[:-1]:
-        arm.ask(Program(text=part, more=True))
-    arm.ask(Program(text=parts[-1], speed=options.speed))
+    arm.send_script(text, options.speed)
 
 
 def planned_program(arm: Client) -> None:
@@ -100,7 +86,7 @@ def planned_program(arm: Client) -> None:
         if now.steps and sys.stderr.isatty():
             line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
             print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
-        time.sleep(1.0 / STATE_RATE)
+        time.sleep(1.0 / PROGRESS_RATE)
     # A program that runs at once may have ended already.
     if now is None or now.status in UNPLANNED_STATUSES:
         raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
@@ -124,7 +110,7 @@ def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
     """Print the progress of the program until it ends, and steer it; return the last progress."""
     shown = ""
     terminal = sys.stderr.isatty()
-    for state in arm.states(STATE_RATE):
+    for state in arm.states(PROGRESS_RATE):
         now = state.program
         if now is None:
             raise LostError("The server no longer knows the program.")

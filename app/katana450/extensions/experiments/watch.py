@@ -8,21 +8,21 @@ from argparse import Namespace
 from pathlib import Path
 
 from katana450.client import Client, RefusedError, connect
+from katana450.client.asynchronous import END_STATUSES
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.experiments.live import (
-    END_STATUSES,
     begin,
     planned_program,
     send_script,
     server_at,
 )
 from katana450.extensions.experiments.problems import print_problems
-from katana450.extensions.programs.requests import ProgramOrder, Steer
 from katana450.extensions.programs.script import Script, parse
 from katana450.extensions.programs.script_files import script_text, text_of
 from katana450.extensions.programs.source import ScriptError
 from katana450.server.api import answers
+from katana450.server.api.program_requests import ProgramOrder, Steer
 
 EVERY = 0.2
 """[s] Interval of the looks at the file and the keyboard."""

@@ -34,10 +34,10 @@ from katana450.extensions.leader.motor_bus import (
     UnpluggedError,
 )
 from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, TORQUE_ENABLE
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.extensions.serial_port import SerialPort
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 
 NAME = "Leader"
 """Name of this client, which others see as the driver."""

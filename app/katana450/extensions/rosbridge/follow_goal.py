@@ -12,7 +12,6 @@ import numpy as np
 
 from katana450.arm.control.actor import Actor
 from katana450.errors import KatanaError
-from katana450.extensions.programs.requests import Program, ProgramOrder, Steer
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GoalStatus, Result
 from katana450.extensions.rosbridge.messages import (
     FollowedPoint,
@@ -32,6 +31,7 @@ from katana450.extensions.rosbridge.trajectory import (
 )
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
+from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.service.runner import Runner
 
 PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)

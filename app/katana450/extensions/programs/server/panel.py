@@ -17,7 +17,6 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
@@ -27,6 +26,7 @@ from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.view.controls import GestureGate, refuse, set_value
 
 ORDERS = {

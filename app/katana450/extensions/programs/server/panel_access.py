@@ -7,9 +7,9 @@ from collections.abc import Callable
 from katana450.arm.control.actor import Actor
 from katana450.errors import LeaseError
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.server.api import answers
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 

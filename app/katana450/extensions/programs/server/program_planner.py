@@ -9,12 +9,12 @@ from katana450.errors import LeaseError
 from katana450.extensions.programs.continuation import Interruption, continued
 from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.server.idle_planner import IdlePlanner
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.script_parts import ScriptParts
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 

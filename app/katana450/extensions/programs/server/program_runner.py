@@ -19,10 +19,9 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.programs import requests, runner
+from katana450.extensions.programs import runner
 from katana450.extensions.programs.continuation import Interruption
 from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.requests import ProgramOrder
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
@@ -36,7 +35,9 @@ from katana450.extensions.programs.server.program_planning import Planning
 from katana450.extensions.programs.server.run_progress import run_progress
 from katana450.extensions.programs.server.state_line import RunNews
 from katana450.server.api import answers
+from katana450.server.api import program_requests as requests
 from katana450.server.api.fields import Request
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
 from katana450.server.service.last_pause import LastPause

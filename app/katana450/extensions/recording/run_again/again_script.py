@@ -14,7 +14,6 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
 from katana450.extensions.programs.blocks import MAX_STEPS
-from katana450.extensions.programs.requests import SLOWEST_SPEED
 from katana450.extensions.programs.script import MAX_NAME_LENGTH
 from katana450.extensions.programs.source import MAX_BYTES, MAX_VALUES
 from katana450.extensions.programs.trajectory import MAX_POSTURES, TRAJECTORY
@@ -24,6 +23,7 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.scaling import Bounds
+from katana450.server.api.program_requests import SLOWEST_SPEED
 
 TOLERANCES = (1e-4, 3e-4, 1e-3)
 """[rad] Largest distances of the trajectory from the recorded setpoints; a larger one if the script
