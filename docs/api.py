@@ -37,14 +37,14 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **TCP**, one JSON object per line | `katana450 serve --lines PORT`, for programs on the same machine. The first line is a `hello`. STOP also has a [port of its own](access.md#the-port-of-stop), which `stop_port` in the `welcome` names. |
 | **HTTP** `POST /api/v{version}/do` | One request. The header `X-Program` identifies the program by a secret key of 16 to 64 letters and digits that the program chooses. `X-Name` is the name that others see. |
 | **HTTP** `GET /api/v{version}/state`, `arm`, `event_log`, `branches`, `loop`, `objects`, `world`, `links` | The answers of `query`. |
-| **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | Upload of a .wrl, .x3d, .x3dv, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file. `place` uses it by the key in the answer. |
+| **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | Upload of a .wrl, .x3dv, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file. `place` uses it by the key in the answer. |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | Download and upload of the scene as a .zip ([scenes](scenes.md)). An uploaded scene waits for a `load`. |
 | **HTTP** `GET /api/v{version}/scripts`, `scripts/NAME` | The names of the scripts of the library and of the folder of `--programs`; the text of one, such as `Pour`, for `program`. |
 | **HTTP** `GET /api/v{version}/script.schema.json` | The [JSON Schema](programs.md#in-an-editor) of scripts. |
 | **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |
 | **HTTP** `GET`, `POST /api/v{version}/episodes`, `GET episodes/NUMBER` | The list of [episodes](recording.md#episodes); starts, ends and judges them; the file of one. |
-| **HTTP** `GET /api/v{version}/openapi.json`, `asyncapi.json` | Descriptions of this API for programs: OpenAPI 3.1 for HTTP, AsyncAPI 3.0 for the websocket and the TCP port. Both describe each message with its units, including those of extensions. |
+| **HTTP** `GET /api/v{version}/openapi.json` | Description of this API for programs: OpenAPI 3.1. It describes each message with its units, including those of extensions; the messages on the websocket and the TCP port are the same. |
 
 Every request is a heartbeat. If the server requires an access link ([access](access.md)), send the
 token behind its `#` as `Authorization: Bearer TOKEN` or in the `hello`. The server stops a moving arm

@@ -1,4 +1,4 @@
-"""Check the OpenAPI and AsyncAPI documents: by validators, and by the messages of a server."""
+"""Check the OpenAPI document: by a validator, and by the messages of a server."""
 
 from __future__ import annotations
 
@@ -15,39 +15,20 @@ from typing import Any
 import jsonschema
 import pytest
 
-from katana450.extensions.api_description.asyncapi import asyncapi_json
 from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.api_description.openapi import openapi_json
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import tag_of
 from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import RECORDING_APP, AppServer
-from tests.exchange.tools import ASYNCAPI_PARSER, OPENAPI_VALIDATOR, needs, needs_package, run
+from tests.exchange.tools import OPENAPI_VALIDATOR, needs_package
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines
-
-HOST = "127.0.0.1:8080"
-
-PARSE = """
-globalThis.self = globalThis.window = globalThis;
-const fs = require("fs"), { default: Parser } = { default: require(process.argv[1]) };
-new (Parser.default ?? Parser.Parser ?? Parser)().parse(fs.readFileSync(process.argv[2], "utf8"))
-  .then(({ diagnostics, document }) => console.log(JSON.stringify({
-    diagnostics: diagnostics.map(({ severity, code, message }) => ({ severity, code, message })),
-    operations: document?.operations().all().length ?? 0,
-  })));
-"""
 
 
 @cache
 def openapi() -> dict[str, Any]:
     described: dict[str, Any] = json.loads(openapi_json(EVERY_REQUEST))
-    return described
-
-
-@cache
-def asyncapi() -> dict[str, Any]:
-    described: dict[str, Any] = json.loads(asyncapi_json(EVERY_REQUEST, HOST, secure=False))
     return described
 
 
@@ -77,8 +58,8 @@ def test_generators_of_clients_can_read_every_schema() -> None:
             assert len(schema.get("enum", "ab")) > 1, schema
 
 
-@pytest.mark.parametrize("document", [openapi(), asyncapi()], ids=["OpenAPI", "AsyncAPI"])
-def test_every_reference_leads_somewhere(document: dict[str, Any]) -> None:
+def test_every_reference_leads_somewhere() -> None:
+    document = openapi()
     references = set(re.findall(r'"\$ref": "([^"]+)"', json.dumps(document)))
     assert len(references) > 30
     for reference in references:
@@ -95,39 +76,20 @@ def test_every_operation_of_openapi_has_a_name_of_its_own() -> None:
 
 
 def test_fields_are_described_with_their_units() -> None:
-    for document in (openapi(), asyncapi()):
-        schemas = document["components"]["schemas"]
-        assert schemas["Margins"]["properties"]["limits"]["description"].count("[rad]")
-        assert schemas["Joint"]["properties"]["value"]["description"].startswith("Target [rad]")
-        assert "Attributes" not in json.dumps(schemas)
-
-
-def test_every_request_is_an_operation_of_asyncapi_with_its_answers() -> None:
-    operations = asyncapi()["operations"]
-    for kind in EVERY_REQUEST:
-        for channel in ("socket", "lines"):
-            name = f"{channel}_{tag_of(kind.__name__)}"
-            if (channel, kind) == ("socket", requests.Hello):
-                assert name not in operations
-                continue
-            operation = operations[name]
-            assert operation["action"] == "receive"
-            (message,) = operation["messages"]
-            payload = resolved(asyncapi(), message["$ref"])["payload"]["$ref"]
-            assert payload.endswith(f"/{kind.__name__}")
-            replies = [each["$ref"].rpartition("/")[2] for each in operation["reply"]["messages"]]
-            assert replies[-1] == "Refused"
-            assert set(replies) <= {each.__name__ for each in kinds(answers.AnyAnswer)}
+    schemas = openapi()["components"]["schemas"]
+    assert schemas["Margins"]["properties"]["limits"]["description"].count("[rad]")
+    assert schemas["Joint"]["properties"]["value"]["description"].startswith("Target [rad]")
+    assert "Attributes" not in json.dumps(schemas)
 
 
 def checked(message: dict[str, Any]) -> str:
-    """Return the name of a message that fits the AsyncAPI schema of its name."""
+    """Return the name of a message that fits the schema of its name."""
     message = dict(message)
     name = next(
         each.__name__ for each in kinds(answers.AnyAnswer) if tag_of(each.__name__) == message["is"]
     )
-    schema = {"$ref": f"#/components/schemas/{name}", "components": asyncapi()["components"]}
-    jsonschema.Draft7Validator(schema).validate(message)
+    schema = {"$ref": f"#/components/schemas/{name}", "components": openapi()["components"]}
+    jsonschema.Draft202012Validator(schema).validate(message)
     return name
 
 
@@ -151,21 +113,17 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
     assert seen == {kind.__name__ for kind in kinds(answers.AnyAnswer)} - {"Mesh", "Scene"}
     with pytest.raises(jsonschema.ValidationError):
         checked({"is": "echo", "n": "one"})
-    # A pose is four rows of four numbers in draft 7 too.
-    schema = {"$ref": "#/components/schemas/Pose", "components": asyncapi()["components"]}
+    # A pose is four rows of four numbers.
+    schema = {"$ref": "#/components/schemas/Pose", "components": openapi()["components"]}
     pose = {"do": "pose", "T": [[1, 0, 0, 0.4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
-    jsonschema.Draft7Validator(schema).validate(pose)
+    jsonschema.Draft202012Validator(schema).validate(pose)
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.Draft7Validator(schema).validate({**pose, "T": [[1, 0, 0, 0.4]]})
+        jsonschema.Draft202012Validator(schema).validate({**pose, "T": [[1, 0, 0, 0.4]]})
 
 
-def test_a_server_describes_all_its_paths_and_its_address(server: AppServer) -> None:
+def test_a_server_describes_all_its_paths(server: AppServer) -> None:
     served = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
     assert served["paths"] == openapi()["paths"]
-    described = json.loads(ask(f"{server.url}/api/v1/asyncapi.json")[2])
-    assert described["servers"]["socket"]["host"] == f"127.0.0.1:{server.port}"
-    assert described["servers"]["socket"]["protocol"] == "ws"
-    assert described["operations"] == asyncapi()["operations"]
 
 
 def test_every_path_in_the_code_is_described() -> None:
@@ -191,23 +149,6 @@ def test_paths_of_a_missing_extension_are_not_described() -> None:
     assert {path.removeprefix("/api/v1/") for path in paths} == {
         *("do", "scripts", "scripts/{name}", "episodes", "episodes/{number}"),
     }
-
-
-@pytest.mark.long
-@needs_package(ASYNCAPI_PARSER)
-@needs("node")
-def test_parser_of_asyncapi_finds_nothing(tmp_path: Path) -> None:
-    """It recommends the newest version of AsyncAPI, and mentions no more."""
-    parser, file = ASYNCAPI_PARSER.file, tmp_path / "asyncapi.json"
-    assert parser is not None
-    file.write_text(json.dumps(asyncapi()), encoding="utf-8")
-    found = json.loads(run("node", "-e", PARSE, parser, file))
-    assert {each["code"] for each in found["diagnostics"]} <= {"asyncapi-latest-version"}
-    assert found["operations"] == len(asyncapi()["operations"])
-    broken = {**asyncapi(), "operations": {"x": {"action": "shout"}}}
-    file.write_text(json.dumps(broken), encoding="utf-8")
-    found = json.loads(run("node", "-e", PARSE, parser, file))
-    assert any(each["severity"] == 0 for each in found["diagnostics"])
 
 
 @pytest.mark.long

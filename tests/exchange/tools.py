@@ -86,13 +86,10 @@ THREE = Package("three@0.187.0", "package/build/three.module.js")
 GLTF_VALIDATOR = Package("gltf-validator@2.0.0-dev.3.10", "package/index.js")
 """The validator of the makers of glTF."""
 
-ASYNCAPI_PARSER = Package("@asyncapi/parser@3.6.6", "package/browser/index.js")
-"""The parser of the makers of AsyncAPI, with all that it needs in one file."""
-
 ROSLIB = Package("roslib@2.1.0", "node_modules/roslib/dist/RosLib.js", alone=False)
 """The client of rosbridge for browsers."""
 
-NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ASYNCAPI_PARSER, ROSLIB)
+NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ROSLIB)
 """Packages of npm; nothing of them is executed when they are unpacked."""
 
 PYBULLET = Package("pybullet==3.2.7", "pybullet*.so")

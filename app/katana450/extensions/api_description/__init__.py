@@ -1,1 +1,1 @@
-"""Descriptions of the API for programs: OpenAPI of HTTP, AsyncAPI of websocket and TCP port."""
+"""Description of the API for programs, as OpenAPI."""

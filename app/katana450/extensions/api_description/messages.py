@@ -20,10 +20,10 @@ ABOUT = (
     "angles in rad, times in s, unless a field says otherwise. One client at a time holds the "
     "lease, the right to drive. Everybody may stop the arm at any time."
 )
-"""Description of both documents."""
+"""Description of the API."""
 
 REFERENCE = "#/components/schemas/{name}"
-"""Reference to the schema of a class, in both documents."""
+"""Reference to the schema of a class."""
 
 
 def kinds(union: Any) -> tuple[type[msgspec.Struct], ...]:

@@ -316,11 +316,6 @@ def _documents() -> dict[str, Any]:
     """Describe the paths of the documents about the API, by path."""
     return {
         "openapi.json": _document("get_openapi", "Return this document.", "application/json"),
-        "asyncapi.json": _document(
-            "get_asyncapi",
-            "Return the AsyncAPI document of the websocket and the TCP port.",
-            "application/json",
-        ),
     }
 
 
