@@ -11,6 +11,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import JOG_TIME
+from katana450.arm.control.modes import Servoing
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
@@ -259,6 +260,23 @@ def test_other_command_ends_the_stream(session: Session) -> None:
     for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.SetJoint(0, 0.1)):
         state = session.step(states[-1], [command], states[-1].t + DT)
         assert state.servo is None
+
+
+def test_sample_drives_the_fingers_too(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    gripper = session.require_arm().gripper
+    target = gripper.clamp(0.5 * (gripper.opened + gripper.closed))
+    for _ in range(3):
+        state = session.step(state, [cmd.Servo(session.ready, gripper=target)], state.t + DT)
+        state = session.step(state, [cmd.Servo(session.ready)], state.t + DT)
+        # A sample without them leaves the fingers on their way.
+        assert state.gripper_goal == target
+    assert isinstance(state.mode, Servoing)
+    for _ in range(500):
+        state = session.step(state, (), state.t + DT)
+    assert state.gripper_setpoint == pytest.approx(target, abs=1e-9)
+    with pytest.raises(InputError, match="finger angle"):
+        cmd.Servo(session.ready, gripper=math.inf)
 
 
 def test_stream_of_another_shape_is_refused(session: Session) -> None:

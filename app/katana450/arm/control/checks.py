@@ -44,6 +44,8 @@ def check_joints(joints: JointSet, environment: Environment, command: cmd.Comman
             raise InputError(joints.refusal)
         case cmd.AxisCommand():
             command.targets(np.zeros(joints.n))
+        case cmd.Servo(gripper=float()):
+            raise InputError("This robot has no gripper. Leave `gripper` out.")
         case cmd.SetJoints(q=q) | cmd.Servo(q=q):
             joints.check(q)
         case _:

@@ -111,6 +111,7 @@ class Servo(BaseCommand):
         q: the sample.
         qd: (n,) its rate of change [rad/s]; None to estimate it from the stream.
         t: time of the sample [s], on the clock of ``State.t``; None for the time of the tick.
+        gripper: target of the finger joint [rad or m]; None to leave it.
     """
 
     traits: ClassVar[CommandTraits] = CommandTraits(stream=True, joints_only=True)
@@ -118,9 +119,12 @@ class Servo(BaseCommand):
     q: FloatArray
     qd: FloatArray | None = None
     t: float | None = None
+    gripper: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", vector("The joint vector", self.q, None))
+        if self.gripper is not None:
+            check_finite("The finger angle", self.gripper)
         if self.qd is not None:
             object.__setattr__(self, "qd", vector("The joint rates", self.qd, self.q.size))
         if self.t is not None:

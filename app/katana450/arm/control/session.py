@@ -315,10 +315,10 @@ class Session:
                 return self._aim(state, command.targets(state.goal))
             case cmd.SetJoints(q=q):
                 return self._aim(state, q)
-            case cmd.Servo(q=q):
-                return with_stream_sample(
-                    state, self._aim(state, q), command, self._limits.acceleration
-                )
+            case cmd.Servo(q=q, gripper=fingers):
+                aimed = self._aim(state, q)
+                aimed = aimed if fingers is None else self._grip(aimed, fingers)
+                return with_stream_sample(state, aimed, command, self._limits.acceleration)
             case cmd.Home():
                 return self._aim(state, self.ready)
             case cmd.GoToZero() if self.arm is None:

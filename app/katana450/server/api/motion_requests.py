@@ -123,15 +123,18 @@ class Servo(Request, frozen=True, kw_only=True):
         q: (n,) Joint angles [rad]; [m] for joints that slide.
         qd: (n,) Rates of ``q``. Without them the rates are estimated from the stream, which is less
             exact.
+        gripper: Target of the finger joint [rad], or [m] if it slides; it stays without.
     """
 
     traits: ClassVar[RequestTraits] = RequestTraits(stream=True)
 
     q: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)]
     qd: Annotated[list[float], Meta(min_length=1, max_length=MAX_JOINTS)] | None = None
+    gripper: float | None = None
 
     def command(self) -> cmd.Command:
-        return cmd.Servo(np.array(self.q), None if self.qd is None else np.array(self.qd))
+        qd = None if self.qd is None else np.array(self.qd)
+        return cmd.Servo(np.array(self.q), qd, gripper=self.gripper)
 
 
 class Pose(MotionRequest, frozen=True, kw_only=True):
