@@ -109,6 +109,9 @@ class Gateway:
         provided = [part.routes for part in parts if part.routes is not None]
         if runners:
             hub.use_runner(runners[0]()(hub, options or Namespace()))
+        for runner in runners[1:]:
+            name, used = runner().__name__, type(hub.runner).__name__
+            log.warning("The runner %s is left out: a server has one runner, here %s.", name, used)
         for handler in handlers:
             hub.add_handler(handler()(hub, options or Namespace()))
         api = Api(hub, authenticator, self._budgets, options, provided)
