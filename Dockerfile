@@ -16,12 +16,14 @@ RUN /opt/katana450/bin/pip install --no-cache-dir --no-deps --no-build-isolation
 
 FROM ${BASE}
 COPY --from=build /opt/katana450 /opt/katana450
+COPY container_health.py /opt/katana450/
 RUN useradd --system --create-home --uid 10450 katana
 USER katana
 EXPOSE 8080 8081
 STOPSIGNAL SIGTERM
-HEALTHCHECK --interval=30s --timeout=3s --start-period=10s \
-  CMD ["/opt/katana450/bin/python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8080/health', timeout=2)"]
+# Reads port and certificate in the command line of the server, whatever it is.
+HEALTHCHECK --interval=30s --timeout=5s --start-period=10s \
+  CMD ["/opt/katana450/bin/python", "/opt/katana450/container_health.py"]
 ENTRYPOINT ["/opt/katana450/bin/katana450"]
 # Inside a container the port must be open to the outside of it; -p decides who reaches it there, and
 # docs/access.md says how links are made.

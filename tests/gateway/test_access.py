@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import shutil
 import ssl
 import subprocess
@@ -184,6 +185,26 @@ def test_public_server_needs_links_or_an_explicit_option() -> None:
     assert "Traceback" not in done.stderr
     with AppServer((*command, "--port", "{port}", "--insecure")) as server:
         assert enter(server.url)
+        check_health(server.pid, f"{server.url} is well.")
+
+
+def check_health(process: int, said: str, status: int = 0) -> None:
+    """Run the health check of the container image, which has ``process`` for its first one."""
+    image = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+    printed = re.search(r"^HEALTHCHECK .*\\\n +CMD (\[.*\])$", image, re.MULTILINE)
+    assert printed is not None
+    _, script = json.loads(printed[1])
+    command = [sys.executable, str(ROOT / Path(script).name), str(process)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, (done.stdout + done.stderr).startswith(said)) == (status, True), done
+
+
+def test_container_is_not_well_without_an_answer() -> None:
+    port = free_port()
+    command = [sys.executable, "-c", "input()", "serve", f"--port={port}"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        check_health(process.pid, f"http://127.0.0.1:{port} is not well: ", 1)
+        process.communicate(b"\n")
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")
@@ -211,6 +232,7 @@ def test_server_uses_https(tmp_path: Path) -> None:
             assert answer.read().startswith(b'{"stop": "confirmed"')
         with urllib.request.urlopen(f"{server.url}/health", context=trusting) as answer:
             assert answer.read() == b"ok\n"
+        check_health(server.pid, f"{server.url} is well.")
 
 
 @pytest.mark.parametrize(

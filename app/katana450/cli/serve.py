@@ -111,7 +111,7 @@ def serve(
     stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
     stop_port = stopping_socket.getsockname()[1]
     settings = replace(settings, stop_port=stop_port)
-    url = settings.public_url or _address(settings, listening.getsockname()[1])
+    url = settings.public_url or local_url(settings, listening.getsockname()[1])
     event_log = _server_log(options, listening.getsockname()[1])
     folder, claimed = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
@@ -243,7 +243,8 @@ def _remove_unclaimed(claim: Path) -> None:
                 shutil.rmtree(claim.parent)
 
 
-def _address(settings: Settings, port: int) -> str:
+def local_url(settings: Settings, port: int) -> str:
+    """Return the address at which this machine opens the server with ``settings`` on ``port``."""
     scheme = "https" if settings.tls_cert is not None else "http"
     return f"{scheme}://{_shown(settings.host)}:{port}"
 
