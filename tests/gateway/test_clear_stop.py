@@ -10,13 +10,15 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import ActiveStop, State
+from katana450.arm.control.state import ActiveStop, Finding, Reason, State
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import LeaseError
 from katana450.server.service import status
+from katana450.server.service.event_log import EventLog
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, key_of, presser_of
@@ -99,13 +101,46 @@ def test_stop_on_another_path_is_adopted_with_its_cause(table: ClearingTable) ->
     assert stopped.stage == "confirmed"
     assert table.hub.gate.revocations == revocations + 1
     assert not table.hub.gate.is_current(gesture)
-    # The Stop that ends plans has the same press, and a copy by the main path changes nothing.
-    assert table.stoppable.sent == [cmd.Stop(pressed("Somebody", key, "one", 5.0))]
+    # The Stop that ends plans has the same press and names its page, and a copy by the main path
+    # changes nothing.
+    assert table.stoppable.sent == [cmd.Stop(pressed(other.person.name, key, "one", 5.0))]
     assert table.hub.stop(other.actor, "one") == 0
     table.hub.move(driver, cmd.ClearStop())
     table.wait(TICK, driver)
     assert table.hub.stop(other.actor, "one") == 0
     assert (table.hub.stopped, table.arm.stops) == (None, 1)
+
+
+def test_copy_of_the_press_of_an_unknown_page_names_it(table: ClearingTable) -> None:
+    # The server has started again, and the page has not returned.
+    key = "session/page"
+    table.stoppable.stop_elsewhere(pressed("Somebody", key, "one", 5.0))
+    table.wait(TICK)
+    for whose, why in (("session/more", "Somebody"), (key, "Window 9"), (key, "Window 9")):
+        actor = Actor(Person(whose, "Window 9", Role.ADMIN), CommandChannel.PAGE)
+        stopped, sent = table.hub.stopped, len(table.stoppable.sent)
+        assert stopped is not None
+        assert table.hub.stop(actor, "one") == 0
+        assert table.hub.stopped is not None
+        assert table.hub.stopped.why == f"{why} pressed STOP."
+        names = [each.cause.by for each in table.stoppable.sent[sent:]]
+        assert names == ([] if stopped.why == table.hub.stopped.why else ["Window 9"])
+        assert table.hub.stopped.cause.at == 5.0
+
+
+def test_lines_of_the_log_name_the_page_of_the_port_of_stop(table: ClearingTable) -> None:
+    page, key = table.join(PAGES[0]), "session/unknown"
+    entries = [
+        LogEntry(float(each), Finding(Reason.STOPPED), True, pressed_on_its_port(whose), "Stop")
+        for each, whose in enumerate((page.person.key, key))
+    ]
+    log = EventLog()
+    log.follow(entries, table.hub._known.named)
+    assert [line.who for line in log.lines] == [page.person.name, "Somebody"]
+
+
+def pressed_on_its_port(key: str) -> Actor:
+    return Actor(Person(key, "Somebody", Role.ADMIN), CommandChannel.PAGE, grounds=Grounds.SAFETY)
 
 
 def stops(table: ClearingTable) -> list[Note]:

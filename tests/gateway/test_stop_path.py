@@ -95,6 +95,9 @@ def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: App
             shown = await control.wait(stop="confirmed")
             assert shown["stopped"] == "You pressed STOP."
             assert abs(shown["stopped_at"] - time.time()) < 10.0
+            log = await asyncio.to_thread(ask, f"{server.url}/api/v1/event_log", Cookie=cookie)
+            began = [each for each in json.loads(log[2])["lines"] if each["began"]]
+            assert (began[-1]["finding"]["reason"], began[-1]["who"]) == ("stopped", shown["name"])
             await control.clear_stop()
             await control.say("release_lease")
             await control.wait(holder=None)

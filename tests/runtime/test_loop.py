@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,9 @@ from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
+from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import find_robot
+from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -164,6 +167,31 @@ def test_stop_in_a_failed_tick_is_executed_in_the_next(arm: ArmModel, session: S
     assert state.stopped is not None
     assert (state.stopped.cause.why, state.presses) == ("Anna pressed STOP.", ("one",))
     np.testing.assert_array_equal(state.q, session.ready)
+
+
+def test_copy_of_a_press_names_who_pressed_and_stops_nothing(parts: LoopParts) -> None:
+    records: list[TickRecord] = []
+    parts.loop.record = records.append
+    parts.mailbox.put(cmd.Stop(pressed("Somebody", "a/page", "one", 1.0)))
+    parts.tick()
+    for whose, press in (("b/page", "one"), ("a/page", "two")):
+        parts.mailbox.put(cmd.Stop(pressed("Anna", whose, press, 2.0)))
+        parts.tick(10)
+    first = parts.loop.state_publisher.snapshot.state.stopped
+    assert first is not None
+    assert first.cause.by == "Somebody"
+    parts.mailbox.put(cmd.Stop(pressed("Anna", "a/page", "one", 2.0)))
+    parts.tick()
+    stopped = parts.loop.state_publisher.snapshot.state.stopped
+    assert stopped == replace(first, cause=pressed("Anna", "a/page", "one", 1.0))
+    # The late copy of the first process does not take the name away.
+    parts.mailbox.put(cmd.Stop(pressed("Somebody", "a/page", "one", 1.0)))
+    parts.tick()
+    assert parts.loop.state_publisher.snapshot.state.stopped == stopped
+    events = RunEvents()
+    assert [each for record in records for each in events.of(record)][-1] == (
+        "stop", {"why": "Anna pressed STOP.", "by": "Anna", "named": True}
+    )  # fmt: skip
 
 
 def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+UNNAMED = "Somebody"
+"""Name of a presser whose own name is not known where STOP arrives."""
+
 
 @dataclass(frozen=True)
 class StopCause:
@@ -22,6 +25,10 @@ class StopCause:
     key: str = ""
     press: str = ""
     at: float = 0.0
+
+    def lacks_name_of(self, copy: StopCause) -> bool:
+        """Return whether ``copy`` is of the same press and alone has the name of its presser."""
+        return self.by == UNNAMED != copy.by and (self.press, self.key) == (copy.press, copy.key)
 
 
 WATCHDOG = StopCause()

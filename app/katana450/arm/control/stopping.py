@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import replace
 
 from katana450.arm.control.commands import Stop
 from katana450.arm.control.state import State
+from katana450.arm.control.stop_cause import StopCause
 
 HOLD_OFF = 1.0
 """[s] Time after the newest STOP in which it cannot be cleared."""
@@ -50,6 +52,18 @@ def stopped_again(state: State) -> State:
     if state.stopped is None:
         return state
     return replace(state, stopped=replace(state.stopped, newest=state.t))
+
+
+def with_name(state: State, copies: Iterable[StopCause]) -> State:
+    """Return ``state`` with the name of its presser, if one of ``copies`` of the press has it.
+
+    The process of STOP knows no names of pages. The server knows them, and its copy comes later.
+    """
+    for copy in copies:
+        if state.stopped is not None and state.stopped.cause.lacks_name_of(copy):
+            cause = replace(copy, at=state.stopped.cause.at)
+            state = replace(state, stopped=replace(state.stopped, cause=cause))
+    return state
 
 
 def joined(first: Stop, second: Stop) -> Stop:

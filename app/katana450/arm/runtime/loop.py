@@ -17,6 +17,7 @@ from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import ACCEPTED, Finding, Reason, State, Verdict
+from katana450.arm.control.stopping import with_name
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.runtime.clock import Clock
 from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
@@ -124,7 +125,7 @@ class ControlLoop:
             log.exception("The control loop met an error; the arm holds.")
             state, has_failed = failed(before, commands), True
             self._put_stops_again(drained)
-        self._state = state
+        self._state = state = with_name(state, drained.repeated.values())
         for command, outcome in zip(commands, state.outcomes, strict=False):
             if isinstance(command, Stop):
                 self._driver.freeze(t)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command, Hold, Pause, Stop
+from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
 from katana450.arm.runtime.tick import Submission
@@ -48,14 +49,15 @@ class Drained:
         tickets: for each submission, its ticket and those of the commands that it replaced.
         dropped: tickets of the commands that waited when a stop came.
         last: the last ticket that was given.
-        repeated: tickets of presses of STOP that had been counted before; they have no effect.
+        repeated: causes of presses of STOP that had been counted before, by their tickets; they can
+            only name who pressed.
     """
 
     submissions: list[Submission]
     tickets: list[list[int]]
     dropped: list[int]
     last: int
-    repeated: tuple[int, ...] = ()
+    repeated: dict[int, StopCause] = field(default_factory=dict)
 
     @property
     def commands(self) -> list[Command]:
@@ -77,7 +79,7 @@ class Mailbox:
         self._waiting: list[Submission] = []
         self._of_waiting: list[list[int]] = []
         self._dropped: list[int] = []
-        self._repeated: list[int] = []
+        self._repeated: dict[int, StopCause] = {}
         self._presses = Presses()
         self._tickets = 0
         self.stop_waits = threading.Event()
@@ -99,7 +101,7 @@ class Mailbox:
                 if not self._presses.counts(command):
                     # Its copies come by several paths, some of them late.
                     self._tickets += 1
-                    self._repeated.append(self._tickets)
+                    self._repeated[self._tickets] = command.cause
                     return self._tickets
                 # Never refused. Waiting commands are dropped; an earlier stop is fulfilled.
                 for each, tickets in zip(self._waiting, self._of_waiting, strict=True):
@@ -124,9 +126,9 @@ class Mailbox:
         """Remove and return all waiting commands."""
         with self._lock:
             drained = Drained(
-                self._waiting, self._of_waiting, self._dropped, self._tickets, tuple(self._repeated)
+                self._waiting, self._of_waiting, self._dropped, self._tickets, self._repeated
             )
-            self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], []
+            self._waiting, self._of_waiting, self._dropped, self._repeated = [], [], [], {}
             self.stop_waits.clear()
             self.command_waits.clear()
             return drained

@@ -308,8 +308,15 @@ class CommandGate:
         cause = pressed(actor.name, actor.key, stop.cause.press, time.time())
         # A press that came by another path is in the state, even if its stop was cleared since.
         if self.is_known(cause.press) or not self._presses.counts(stop):
+            self._name(cause, actor)
             return 0
         return self._stop(cause, actor)
+
+    def _name(self, cause: StopCause, actor: Actor) -> None:
+        """Let a copy of the press name its presser, a page that was not known before."""
+        if self.arm is not None and self.stopped and self.stopped.cause.lacks_name_of(cause):
+            self.stopped = replace(self.stopped, cause=replace(cause, at=self.stopped.cause.at))
+            self.arm.deliver(cmd.Stop(cause), actor)
 
     def _stop(self, cause: StopCause, actor: Actor) -> int:
         self._end_gestures()
@@ -335,8 +342,8 @@ class CommandGate:
         named, actor = self._named(cause)
         log.warning("Stopped: %s", named.why)
         self.recorder.stop(named.why, actor, first=True)
-        # Sent too, because it ends what this process plans. The arm knows the press already.
-        self.stopped = StopRecord(named).requested(arm.deliver(cmd.Stop(cause), actor))
+        # Sent too: it ends what this process plans, and names the press that the arm knows.
+        self.stopped = StopRecord(named).requested(arm.deliver(cmd.Stop(named), actor))
 
     def _note_other(self, cause: StopCause) -> None:
         """Note for the event log a press that stopped the arm and did not pass this gate."""

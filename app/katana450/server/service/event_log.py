@@ -5,11 +5,11 @@ from __future__ import annotations
 import logging
 import time
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Reason
@@ -60,9 +60,14 @@ class EventLog:
         # Entries have times of the loop's monotonic clock.
         self._epoch = time.time() - time.perf_counter()
 
-    def follow(self, event_log: Sequence[LogEntry]) -> list[LogEntry]:
-        """Add the new entries of ``event_log``, and return them."""
-        newer = _newer(event_log, self._seen)
+    def follow(
+        self, event_log: Sequence[LogEntry], name: Callable[[Actor], Actor]
+    ) -> list[LogEntry]:
+        """Add the new entries of ``event_log``, with actors that have a ``name``; return them."""
+        newer = [
+            entry if entry.actor is None else replace(entry, actor=name(entry.actor))
+            for entry in _newer(event_log, self._seen)
+        ]
         for entry in newer:
             when = datetime.fromtimestamp(self._epoch + entry.t, UTC)
             self._lines.append(LogLine(entry, when))

@@ -236,11 +236,12 @@ class Hub:
     def stop(self, actor: Actor, press: str | None = None) -> int:
         """Stop the arm for ``actor``, which needs no right to drive; return the ticket.
 
-        A repeated ``press`` counts once: it changes nothing, and the ticket is 0. Raises MutedError
-        for a muted identity whose STOP does not count. The driver's always counts.
+        A repeated ``press`` counts once: it can only add the name, and the ticket is 0. Raises
+        MutedError for a muted identity whose STOP does not count. The driver's always counts.
         """
+        command = cmd.Stop(pressed(actor.name, actor.key, press, 0.0))
         if self.gate.is_known(press):
-            return 0
+            return self.gate.submit(command, actor)
         session = session_of(actor.key)
         interval = self.people.stop_interval(session)
         if interval is not None and session not in self.drivers:
@@ -252,7 +253,7 @@ class Hub:
             except MutedError as error:
                 self.recorder.refuse("stop", actor, error)
                 raise
-        return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
+        return self.gate.submit(command, actor)
 
     @property
     def drivers(self) -> tuple[str, ...]:
@@ -348,7 +349,8 @@ class Hub:
 
     def follow_stop(self) -> None:
         """Make gate and arm agree on the stop, and spread the news of it."""
-        for entry in () if self.arm is None else self.event_log.follow(self.arm.event_log):
+        entries = () if self.arm is None else self.arm.event_log
+        for entry in self.event_log.follow(entries, self._known.named):
             self.recorder.finding(entry)
         self.gate.reconcile()
         self.stop_news.note(self.stopped)

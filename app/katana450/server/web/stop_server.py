@@ -25,7 +25,7 @@ import msgspec
 
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person
-from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.control.stop_cause import UNNAMED, StopCause, pressed
 from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.errors import InputError
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
@@ -225,7 +225,7 @@ class StopServer:
         """
         pipe = self._pipe
         key = f"{identity.session}/{page}" if PAGE.fullmatch(page) else identity.session
-        name = identity.name or "Somebody"
+        name = identity.name or UNNAMED
         press = press or secrets.token_urlsafe(16)
         actor = Actor(Person(key, name, identity.role), channel, None, Grounds.SAFETY)
         cause = pressed(name, key, press, time.time())
@@ -252,7 +252,7 @@ class StopServer:
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
         pipe.press(StopPress(cause, actor))
         if stopped is None:
-            log.info("%s pressed STOP (port of STOP).", name)
+            log.info("STOP arrived on its own port.")
             kept = self._kept < MAX_KEPT
             self._kept += kept
             try:

@@ -39,8 +39,10 @@ class RunEvents:
 
 
 def _stops(before: State, after: State) -> Iterator[tuple[str, dict[str, Any]]]:
-    if after.stopped is not None and before.stopped is None:
-        cause = after.stopped.cause
-        yield STOP, {"why": cause.why, "by": cause.by}
-    elif after.stopped is None and before.stopped is not None:
+    was, now = before.stopped, after.stopped
+    if now is not None and was is None:
+        yield STOP, {"why": now.cause.why, "by": now.cause.by}
+    elif now is not None and was is not None and was.cause.lacks_name_of(now.cause):
+        yield STOP, {"why": now.cause.why, "by": now.cause.by, "named": True}
+    elif now is None and was is not None:
         yield CLEAR_STOP, {}

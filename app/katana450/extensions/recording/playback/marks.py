@@ -16,6 +16,9 @@ from katana450.extensions.recording.topics import EPISODES
 MAX_TEXT = 120
 """Maximum number of letters of the text of a mark."""
 
+NAMED = "named"
+"""Kind of a mark that is not shown: the last stop with the name of its presser."""
+
 REPEATED = 1.0
 """[s] Time in which a mark with the same text is left out."""
 
@@ -34,14 +37,20 @@ class Mark(NamedTuple):
     text: str
 
 
-def marks_of(messages: Iterable[Message]) -> list[Mark]:
-    """Return the marks of ``messages`` of events and episodes, without repetitions."""
-    found: list[Mark] = []
+def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
+    """Add the marks of ``messages`` of events and episodes to the earlier ``marks``.
+
+    Repetitions are left out, and a stop that is named later is named.
+    """
     for mark in _all(messages):
-        again = (each for each in reversed(found) if mark.t - each.t < REPEATED)
+        if mark.kind == NAMED:
+            stops = [number for number, each in enumerate(marks) if each.kind == run_events.STOP]
+            if stops:
+                marks[stops[-1]] = marks[stops[-1]]._replace(text=mark.text)
+            continue
+        again = (each for each in reversed(marks) if mark.t - each.t < REPEATED)
         if not any(each[1:] == mark[1:] for each in again):
-            found.append(mark)
-    return found
+            marks.append(mark)
 
 
 def _all(messages: Iterable[Message]) -> Iterator[Mark]:
@@ -63,7 +72,7 @@ def _all(messages: Iterable[Message]) -> Iterator[Mark]:
 def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
     match kind:
         case run_events.STOP:
-            return kind, str(form.get("why") or "Stopped")
+            return NAMED if form.get("named") else kind, str(form.get("why") or "Stopped")
         case run_events.CLEAR_STOP:
             return kind, "Stop cleared"
         case run_events.DRIVER:

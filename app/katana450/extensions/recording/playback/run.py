@@ -12,7 +12,7 @@ from typing import NamedTuple
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
-from katana450.extensions.recording.playback.marks import Mark, marks_of
+from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.rows import (
     Block,
     Describer,
@@ -233,6 +233,6 @@ class PlaybackRun:
             chunk = file.chunks[file.marked]
             file.marked += 1
             if file.index.has(chunk, EVENTS) or file.index.has(chunk, EPISODES):
-                file.marks += marks_of(file.index.messages(chunk, EVENTS, EPISODES))
+                add_marks(file.marks, file.index.messages(chunk, EVENTS, EPISODES))
                 del file.marks[:-MAX_MARKS]
         return file.marks

@@ -1,0 +1,28 @@
+"""The marks of a timeline, from the events of a recording."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from katana450.extensions.recording.codec import json_text
+from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.playback.marks import Mark, add_marks
+from katana450.extensions.recording.topics import EVENTS
+
+
+def event(t: int, **form: Any) -> Message:
+    return Message(EVENTS, t, t * 10**9, json_text(form))
+
+
+def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
+    stop, named = "Somebody pressed STOP.", "Window 2 pressed STOP."
+    marks: list[Mark] = []
+    # The name can be in a later part of the file, which is read when it is complete.
+    add_marks(marks, [event(1, kind="stop", why=stop), event(2, kind="driver", name="Anna")])
+    assert [each.text for each in marks] == [stop, "Anna drives"]
+    add_marks(marks, [event(3, kind="stop", why=named, named=True)])
+    assert marks == [Mark(1.0, "stop", named), Mark(2.0, "driver", "Anna drives")]
+    # A recording that begins in between does not show the press.
+    later: list[Mark] = []
+    add_marks(later, [event(3, kind="stop", why=named, named=True)])
+    assert later == []
