@@ -16,7 +16,10 @@ from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget
+from tests.kinematics.brute_force import tool_points
 from tests.kinematics.targets import FRONT_UP, targets
+
+TURNS = (-math.tau, 0.0, math.tau)
 
 
 def random_pose(rng: np.random.Generator) -> FloatArray:
@@ -73,6 +76,36 @@ def test_pitch_is_kept_and_the_position_gives_way(chain: Chain, rng: np.random.G
         assert found.position_error >= free.position_error - 1e-9
         gave_way += found.position_error > free.position_error + 1e-3
     assert gave_way > 10
+
+
+def test_no_grid_point_with_the_pitch_is_nearer(
+    chain: Chain, lengths: FloatArray, rng: np.random.Generator
+) -> None:
+    axis1, *axes = (np.array(ends) for ends in zip(chain.lower[:4], chain.upper[:4], strict=True))
+    theta2, theta3 = np.meshgrid(*(np.linspace(ends[0], ends[1], 100) for ends in axes[:2]))
+    angles = np.stack((np.zeros_like(theta2), theta2, theta3), axis=-1).reshape(-1, 3)
+    checked = turned = 0
+    for _ in range(150):
+        T = se3.from_rotation_translation(so3.exp(2.0 * rng.normal(size=3)), rng.normal(size=3) / 2)
+        found = project(chain, T, priority=Priority.PITCH)
+        if found.pitch_error > 1e-9:
+            continue
+        roll, azimuth = math.atan2(T[2, 1], T[2, 2]), math.atan2(T[1, 3], T[0, 3])
+        for pitch, needed in ((pitch_of(T), roll), (math.pi - pitch_of(T), roll + math.pi)):
+            if not any(chain.lower[4] <= needed + turn <= chain.upper[4] for turn in TURNS):
+                continue
+            theta4 = pitch - angles[:, 1] - angles[:, 2]
+            theta4 = (theta4 - axes[2][0]) % math.tau + axes[2][0]
+            q = np.column_stack((angles, theta4))[theta4 <= axes[2][1]]
+            points, _ = tool_points(lengths, q)
+            for theta1 in (azimuth, azimuth + math.pi, azimuth - math.pi, *axis1):
+                if axis1[0] <= theta1 <= axis1[1] and len(points):
+                    away = points @ so3.rotation_z(theta1).T - T[:3, 3]
+                    assert found.position_error <= np.linalg.norm(away, axis=1).min() + 1e-9
+                    checked += 1
+        turned += found.roll_error > 1e-3
+    assert checked > 300
+    assert turned > 0
 
 
 def test_position_is_kept_and_the_pitch_is_the_nearest_there(

@@ -89,6 +89,12 @@ class CanonicalTarget(NamedTuple):
             outward = -flat if inward else flat
         return math.atan2(down, outward)
 
+    def roll(self) -> float:
+        """Return the roll of a `faced` target in the plane that its roll axis lies in."""
+        outward, sideways, _ = self.heading(0.0)
+        theta1 = math.atan2(sideways, outward) + (math.pi if self.inward else 0.0)
+        return self.orientation.seen_from(theta1).best_roll(self.pitch(theta1))
+
     @property
     def on_axis(self) -> bool:
         """True if the point is on axis 1, which leaves theta1 free."""

@@ -88,17 +88,19 @@ def _faced(
     """Return the posture with the pitch kept, with the tool facing either way, or None.
 
     The yaw does not count, so a roll axis with the target pitch may point away from axis 1 or
-    towards it. The direction that keeps the roll is preferred, since the position gives way.
+    towards it. Preferred are the directions that the roll of the target fits, whatever the yaw,
+    and postures that have that roll nevertheless: a level cup stays level, the position gives way.
     """
     branches = (branch,) if branch else dict(limited.planar(None))
-    facings = canonical.faced(inward=False), canonical.faced(inward=True)
-    tried = (_reached(limited, facing, each, hint) for each in branches for facing in facings)
-    found = [found_posture for found_posture in tried if found_posture is not None]
-    kept = [
-        found_posture
-        for found_posture in found
-        if found_posture.rotation_error <= tolerances.SAME_ROTATION
-    ]
+    found, kept = [], []
+    for facing in (canonical.faced(inward=False), canonical.faced(inward=True)):
+        fits = limited.limits[4].fit(facing.roll()) is not None
+        for each in branches:
+            posture = _reached(limited, facing, each, hint)
+            if posture is not None:
+                found.append(posture)
+                if fits or posture.rotation_error <= tolerances.SAME_ROTATION:
+                    kept.append(posture)
     return _nearest(limited, canonical, kept or found, hint) if found else None
 
 

@@ -10,8 +10,8 @@ class Priority(Enum):
 
     PITCH and POSITION take the yaw from the arm. Their pitch is that of the roll axis below the
     horizontal, past the vertical when it points inwards. PITCH also accepts the same slope with the
-    tool facing the other way: a pose that the arm can take is kept as it is; otherwise the
-    direction that keeps the roll is preferred, then the nearer one.
+    tool facing the other way: a pose that the arm can take is kept as it is; otherwise a direction
+    that the roll of the target fits is preferred, then the nearer position.
 
     Arms of other kinds have POSE, POSITION and ORIENTATION; these take no yaw from the arm.
 
