@@ -13,6 +13,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import exact_chain, links_of
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.extensions.reachability.pose_solver import PoseSolver
@@ -104,6 +105,23 @@ def test_many_poses_are_corrected_as_one(tmp_path: Path, name: str) -> None:
     alone, _ = errors_of(chain, single, T)
     assert ((distance <= EXACT) & (turn <= EXACT)).sum() >= 100
     np.testing.assert_array_equal(distance <= EXACT, alone <= EXACT)
+
+
+def test_second_correction_is_made_only_where_it_is_needed(tmp_path: Path) -> None:
+    chain = chain_in(tmp_path, UR5E)
+    rounding = FileRounding(chain, links_of(chain))
+    solver = kinematics_of(exact_chain(chain, links_of(chain)))
+    assert isinstance(solver, ClosedForm)
+    T = forward_batch(chain, postures(chain, 30))
+    asked = []
+
+    def again(poses: np.ndarray) -> np.ndarray:
+        asked.append(poses)
+        return solver.inverse_batch(poses)[:, 0]
+
+    distance, turn = errors_of(chain, rounding.corrected(again(T), T, again)[:, None], T)
+    assert (np.maximum(distance, turn) <= EXACT).any()
+    assert len(asked) == 2
 
 
 @pytest.mark.parametrize("name", ["UR5e", "KR 6", "Puma 560"])

@@ -1,9 +1,9 @@
 """Solutions of an arm whose file rounds angles and lengths that a closed form takes as exact.
 
 A closed form solves the exact arm. The tool of the arm in the file is beside it by little more than
-the rounding. The closed form is asked again for the pose that is moved back by this difference,
-CORRECTIONS times; each time the error becomes smaller by the size of the rounding, divided by the
-distance of the posture from a singularity.
+the rounding. The closed form is asked again for the pose that is moved back by this difference, at
+most CORRECTIONS times, and only while more than DOUBLE is left; each time the error becomes smaller
+by the size of the rounding, divided by the distance of the posture from a singularity.
 """
 
 from __future__ import annotations
@@ -80,13 +80,16 @@ class FileRounding:
         for _ in range(CORRECTIONS):
             reached = forward_batch(self.chain, q)
             missed = T[:, :3, 3] - reached[:, :3, 3]
+            near = np.linalg.norm(missed, axis=1) <= BESIDE * self.offset
+            left = missed if self.chain.n == 4 else T - reached
+            if not (np.abs(left[near]) > DOUBLE).any():
+                return q
             if self.chain.n == 4:
                 # They hold the tool point of every pose, and the rotation as far as they can.
                 aimed = aimed.copy()
                 aimed[:, :3, 3] += missed
             else:
                 aimed = aimed @ np.linalg.solve(reached, T)
-            near = np.linalg.norm(missed, axis=1) <= BESIDE * self.offset
             q = np.where(near[:, None], solve(aimed), q)
         return q if self.chain.n == 4 else self._polished(q, T)
 
