@@ -49,6 +49,31 @@ def test_script_is_run_to_its_end_or_refused_with_the_reason(
         client.run(steps.format(500))
 
 
+def test_run_that_is_stopped_during_planning_ends_with_the_reason(
+    client: katana450.Client, server: AppServer
+) -> None:
+    turns = "".join(f"  - joints: [{k}, -68, 85, 8, {-k}]\n" for k in range(1, 100))
+    refused: list[RefusedError] = []
+
+    def run() -> None:
+        with pytest.raises(RefusedError) as raised:
+            client.run(f"steps:\n{turns}")
+        refused.append(raised.value)
+
+    running = threading.Thread(target=run)
+    running.start()
+    with katana450.connect(server.url, name="Onlooker") as onlooker:
+        for state in onlooker.states(50.0):
+            if state.program is not None and state.program.status == "planning":
+                break
+        time.sleep(0.1)
+        onlooker.ask(requests.Stop())
+        running.join(30.0)
+        assert not running.is_alive()
+        assert str(refused[0]) == "Not run: STOP was pressed during planning."
+        client.clear_stop()
+
+
 def test_plan_is_followed_at_a_fraction_of_its_speed(
     shoulder_arm: katana450.Arm, client: katana450.Client
 ) -> None:

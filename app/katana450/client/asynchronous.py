@@ -49,6 +49,9 @@ UNPLANNED_STATUSES = ("refused", "cancelled")
 END_STATUSES = ("done", "stopped", "failed", *UNPLANNED_STATUSES)
 """Statuses of a program that has ended."""
 
+NOT_RUN = "Not run"
+"""Begin of the reason for which a program was planned and then not run, as after a STOP."""
+
 A = TypeVar("A", bound=answers.Answer)
 
 
@@ -244,10 +247,10 @@ class AsyncClient:
                 now = state.program
                 if now is None:
                     raise LostError("The server no longer knows the program.")
-                if now.status in END_STATUSES:
-                    if now.status != "done":
-                        raise RefusedError(now.why)
+                if now.status == "done":
                     return state
+                if is_over(now):
+                    raise RefusedError(now.why)
         raise LostError(self._lost or "The server has closed the connection.")
 
     async def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
@@ -403,6 +406,11 @@ async def close_quietly(socket: ClientConnection) -> None:
         async with asyncio.timeout(CLOSE_TIMEOUT):
             await socket.close()
     socket.transport.abort()
+
+
+def is_over(program: answers.Progress) -> bool:
+    """Return whether ``program`` has ended, or is not going to run."""
+    return program.status in END_STATUSES or program.why.startswith(NOT_RUN)
 
 
 def _plain(value: Any) -> Any:

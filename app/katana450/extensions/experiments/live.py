@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 from katana450.client import Client, RefusedError, connect
-from katana450.client.asynchronous import END_STATUSES, PROGRESS_RATE, UNPLANNED_STATUSES
+from katana450.client.asynchronous import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.experiments.keyboard import Keyboard
@@ -90,7 +90,7 @@ def planned_program(arm: Client) -> None:
     # A program that runs at once may have ended already.
     if now is None or now.status in UNPLANNED_STATUSES:
         raise KatanaError(now.why if now is not None else "The server no longer knows the script.")
-    print(f"{now.name}: {now.steps} steps, {now.seconds:.1f} s of motion at full speed. {now.why}")
+    print(f"{now.name}: {now.steps} steps, about {now.seconds:.1f} s. {now.why}")
 
 
 def _follow(arm: Client, keyboard: Keyboard) -> None:
@@ -122,7 +122,7 @@ def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
         elif f"{now.step} {now.task}" != shown:
             shown = f"{now.step} {now.task}"
             print(line, flush=True)
-        if now.status in END_STATUSES:
+        if is_over(now):
             if terminal:
                 print(file=sys.stderr)
             return now
