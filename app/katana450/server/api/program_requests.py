@@ -71,8 +71,8 @@ class Steer(MotionRequest, frozen=True, kw_only=True):
     steps before it are left out, except those that choose the tool frame or the speed. A program
     that runs is ended first; its arm must be at rest. ``continue`` resumes a program that was
     stopped, ended or failed, at the place of its path where the arm left it, after a motion back to
-    the path if the arm has been moved. It is refused if the gripper, the tool frame or the scene
-    has changed.
+    the path if the arm has been moved. It chooses the tool frame of the run again, and is refused
+    if the gripper or the scene has changed.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND

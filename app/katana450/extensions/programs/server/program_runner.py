@@ -371,7 +371,7 @@ class ProgramRunner(Runner):
             single=order is ProgramOrder.STEP,
             pauses=self.planner.breakpoints,
         )
-        how = ", unattended" * unattended
+        how = ", unattended" if unattended else ""
         log.info("%s runs the program %s%s.", participant.person.name, program.name, how)
         what = {"program": program.name, "order": order.value, "unattended": unattended}
         self.hub.recorder.note("program", participant.actor, what)
