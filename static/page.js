@@ -334,7 +334,7 @@
       drawnActs = key;
       keepingFocus(byId("acts"), acts());
     }
-    const orders = [status.planning, ...status.orders, ...(status.continues ?? [])].join();
+    const orders = [status.planning, ...status.orders, ...status.continues].join();
     if (orders !== drawnOrders) {
       drawnOrders = orders;
       const [name, step, steps] = status.continues;
@@ -585,8 +585,9 @@
   async function showWelcome() {
     const options = { say, kept, scene, status: () => status };
     loadingWelcome ??= import("./welcome/welcome.js").then(({ Welcome }) => Welcome.on(options));
-    welcome = await loadingWelcome;
-    welcome.show();
+    welcome = await loadingWelcome.catch(() => null);
+    if (welcome) welcome.show();
+    else loadingWelcome = null; // The server did not answer: asked again, they load again.
   }
   byId("welcome-button").addEventListener("click", () => {
     help.close();

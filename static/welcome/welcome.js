@@ -41,7 +41,9 @@ export class Welcome {
     const style = html("link", { rel: "stylesheet", href: STYLE });
     const styled = new Promise((resolve) => ["load", "error"].forEach((kind) => style.addEventListener(kind, resolve)));
     document.head.append(style);
-    const arm = await fetch("api/v1/arm").then((answer) => answer.json());
+    const answer = await fetch("api/v1/arm");
+    if (!answer.ok) throw new Error(await answer.text());
+    const arm = await answer.json();
     await styled;
     return new Welcome(page, arm);
   }
@@ -62,13 +64,7 @@ export class Welcome {
     window.addEventListener("status", ({ detail }) => this.#note(detail));
     window.addEventListener("placed", () => this.#done("part"));
     for (const name of (page.kept?.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
-    this.#resume();
-  }
-
-  // Follow a program of this person that was begun before the page was loaded again.
-  async #resume() {
-    const { program } = (await this.#look()) ?? {};
-    if (this.#isOwn(program) && ["planning", "running", "paused"].includes(program.status)) this.#run(true);
+    if (page.status()) this.#note(page.status());
   }
 
   #isOwn(program) {
@@ -140,6 +136,9 @@ export class Welcome {
 
   // A drag is the newest change that this person can undo, or was asked for and moves the arm.
   #note(status) {
+    // The program runs, also after a reload or a stop, for its owner, who alone may end it.
+    const runs = status.orders.includes("end") && !status.planning;
+    if (runs && status.continues[0] === this.#program?.name) this.#run(true);
     const wanted = this.#arm.default_tool ? "arm (drag)" : "arm (";
     const isDrag = status.mine && (status.undo?.[0] ?? "").startsWith(wanted);
     const moves = this.#dragging !== null && status.mine && status.mood === "moving";
@@ -149,7 +148,7 @@ export class Welcome {
     if (!this.#isRunning) write(this.#says, "The arm follows. STOP is at the top left, and Space presses it.");
   }
 
-  // began: whether it was sent before the page was loaded again.
+  // began: whether it runs already.
   async #run(began = false) {
     if (this.#isRunning) return;
     this.#still();
@@ -221,7 +220,8 @@ export class Welcome {
       if (over || this.#refusal) {
         const worked = ran && own && program.status === "done";
         if (worked) this.#done(this.#program.name);
-        const reason = this.#refusal || stopped || (own && (program.why || program.status)) || "";
+        // In the words of the page a person who pressed STOP is "You".
+        const reason = this.#refusal || (stopped && (this.#page.status()?.stopped || stopped)) || (own && (program.why || program.status)) || "";
         return write(this.#says, worked ? this.#program.did : `${this.#program.not} ${reason}`);
       }
       const planning = program.status === "planning";

@@ -171,6 +171,21 @@ def test_pouring_is_planned_with_progress_and_runs(
 
 
 @pytest.mark.long
+def test_pouring_that_is_stopped_and_continued_is_done(visit: ViserPage, server: AppServer) -> None:
+    press(visit, "Watch it pour")
+    says = visit.page.locator("#welcome [role=status]")
+    visit.wait_until(lambda: "Step 3" in says.inner_text(), "the run", seconds=120.0)
+    visit.page.keyboard.press("Space")
+    says.filter(has_text="It did not pour. You pressed STOP.").wait_for()
+    Truth(server).wait(moving=False)
+    clear_stop(visit, Truth(server))
+    visit.press_in_bar("Continue Pour")
+    visit.wait_until(lambda: done(visit, "Watch it pour"), "the end", seconds=120.0)
+    assert "Poured" in says.inner_text()
+    assert visit.errors == []
+
+
+@pytest.mark.long
 def test_pouring_leaves_another_program_paused(server: AppServer, open_page: OpenPage) -> None:
     page = open_page(server.url, nodes=("/arm", MOVE), script=f"{FIRST_VISIT}{WORKER}")
     truth = Truth(server)
@@ -231,6 +246,11 @@ def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) ->
     window.locator("#holder", has_text="drive").wait_for()
     window.wait_for_timeout(500)
     assert window.locator("#welcome").count() == 0
+    # The first of two requests gets no answer.
+    window.route("**/api/v1/arm", lambda route: route.abort(), times=1)
+    with window.expect_event("requestfailed"):
+        window.click("#help-button")
+        window.get_by_role("button", name="First steps").click()
     window.click("#help-button")
     window.get_by_role("button", name="First steps").click()
     window.wait_for_selector("#welcome:not([hidden])")
