@@ -16,7 +16,7 @@ from katana450.extensions.leader.calibration import decoded_calibration
 from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.layout import SO101
 from katana450.extensions.leader.packets import HOMING_OFFSET, Packet, PacketReader
-from tests.browser.page import ViserPage
+from tests.browser.page import WINDOW, ViserPage
 from tests.browser.page_leader import (
     PACKETS,
     POSTURES,
@@ -128,6 +128,12 @@ def test_pads_and_buttons_move_while_they_are_held(
     page.wait_until(lambda: page.slider_value("5 wrist roll") > start + 3.0, "the tool to roll")
     mouse.up()
     truth.wait(mood="ok")
+    # At 200 % zoom too, each button has room for its words and its key.
+    page.page.set_viewport_size({"width": 720, "height": 450})
+    room = """() => [...document.querySelectorAll("#turns button:not([hidden])")].every((each) =>
+        each.scrollWidth <= each.clientWidth && each.getBoundingClientRect().right <= innerWidth)"""
+    assert page.page.evaluate(room)
+    page.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1]})
 
 
 GAMEPAD = """() => {
