@@ -40,7 +40,13 @@ export class Episodes {
       this.#acts.append(made);
     }
     this.#rec.addEventListener("click", () => this.#act("rec"));
-    this.#task.addEventListener("keydown", (event) => event.key === "Enter" && this.#act("rec"));
+    this.#task.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter") return;
+      // The letters on the buttons are keys from now on, and Enter does not also press the button.
+      event.preventDefault();
+      this.#rec.focus();
+      this.#act("rec");
+    });
     this.#list.addEventListener("focusout", () => setTimeout(() => this.#fill()));
     const task = html("label", { class: "task" }, "Task", this.#task);
     this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);

@@ -249,6 +249,27 @@ def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -
     assert len(watch.sent) == 7
 
 
+LONG_TABLE = """() => {
+    const table = document.querySelector(".k450 table:has(td.unit)");
+    const before = table.innerHTML;
+    table.querySelector("th").textContent = "tool_of_a_long_name_".repeat(3);
+    const cells = [...table.querySelectorAll("tbody td")].slice(0, 2);
+    for (const cell of cells) cell.textContent = "\u2212133.3";
+    const range = document.createRange();
+    const [now, goal] = cells.map((cell) => {
+        range.selectNodeContents(cell);
+        return range.getBoundingClientRect();
+    });
+    table.innerHTML = before;
+    return goal.left - now.right;
+}"""
+"""Function of the panel that shows a long name and numbers; it returns the gap between two [px]."""
+
+
+def test_numbers_beside_a_long_name_stay_apart(page: ViserPage) -> None:
+    assert page.frame.evaluate(LONG_TABLE) > 4.0
+
+
 def test_gripper_is_closed_and_opened_by_buttons(page: ViserPage) -> None:
     for label, percent in (("Close", 0.0), ("Open", 100.0)):
         page.click_button(label)
