@@ -51,9 +51,6 @@ NEAR_AXIS_1: Final = 1e-3
 # [rad] Step of theta1 at which the search for the nearest point beside axis 1 has converged.
 ALIGNED: Final = 1e-13
 
-# [m, or the unit of the plane's d] Misfit up to which a subproblem's answer counts as exact.
-SUBPROBLEM_EXACT: Final = 1e-9
-
 # [1] Sine of the angle between two axes below which they count as parallel.
 PARALLEL: Final = 1e-9
 

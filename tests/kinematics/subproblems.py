@@ -27,6 +27,9 @@ from katana450.maths.water.vectors import (
     sub,
 )
 
+EXACT = 1e-9
+"""[m, or the unit of the plane's d] Misfit up to which an answer counts as exact."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rotations:
@@ -72,7 +75,7 @@ def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
     u, v = perpendicular(u, omega), perpendicular(v, omega)
     radius_u, radius_v = norm(u), norm(v)
     misfit = math.hypot(height, radius_u - radius_v)
-    exact = misfit <= tolerances.SUBPROBLEM_EXACT
+    exact = misfit <= EXACT
     if min(radius_u, radius_v) <= tolerances.ON_AXIS:
         return Rotations((0.0,), exact, free=True)
     return Rotations((wrapped(math.atan2(dot(omega, cross(u, v)), dot(u, v))),), exact)
@@ -95,7 +98,7 @@ def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector)
         return RotationPairs(((single.angles[0], 0.0),), single.exact, free=True)
     if min(length_u, length_v) <= tolerances.ON_AXIS:
         misfit = abs(length_u - length_v)
-        exact = misfit <= tolerances.SUBPROBLEM_EXACT
+        exact = misfit <= EXACT
         return RotationPairs(((0.0, 0.0),), exact, free=True)
 
     # On the unit sphere the same angles have the smallest misfit, for any two lengths.
@@ -118,7 +121,7 @@ def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector)
         theta1 = subproblem1(omega1, origin, c, v)
         free = free or theta1.free or theta2.free
         pairs.append((theta1.angles[0], theta2.angles[0]))
-    exact = meets and abs(length_u - length_v) <= tolerances.SUBPROBLEM_EXACT
+    exact = meets and abs(length_u - length_v) <= EXACT
     return RotationPairs(tuple(pairs), exact, free)
 
 
@@ -140,13 +143,13 @@ def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) ->
     near, far = abs(radius_u - radius_v), radius_u + radius_v
     if min(radius_u, radius_v) <= tolerances.ON_AXIS:
         misfit = abs(math.hypot(height, far) - delta)
-        return Rotations((0.0,), misfit <= tolerances.SUBPROBLEM_EXACT, free=True)
+        return Rotations((0.0,), misfit <= EXACT, free=True)
     middle = math.atan2(dot(omega, cross(u, v)), dot(u, v))
     folded = (in_plane - near) * (in_plane + near)
     stretched = (far - in_plane) * (far + in_plane)
     opening = 2.0 * math.atan2(_sqrt(folded), _sqrt(stretched))
     rounding = -tolerances.RADICAND * far * far
-    if abs(height) > delta + tolerances.SUBPROBLEM_EXACT or min(folded, stretched) < rounding:
+    if abs(height) > delta + EXACT or min(folded, stretched) < rounding:
         return Rotations((wrapped(middle + opening),), exact=False)
     return Rotations((wrapped(middle + opening), wrapped(middle - opening)), exact=True)
 
@@ -166,7 +169,7 @@ def subproblem4(omega: Vector, r: Vector, p: Vector, h: Vector, d: float) -> Rot
     a, b = dot(h, cross(omega, u)), dot(h, u)
     amplitude = math.hypot(a, b)
     if amplitude <= tolerances.ON_AXIS:
-        return Rotations((0.0,), abs(c) <= tolerances.SUBPROBLEM_EXACT, free=True)
+        return Rotations((0.0,), abs(c) <= EXACT, free=True)
     middle = math.atan2(a, b)
     opening = 2.0 * math.atan2(_sqrt(amplitude - c), _sqrt(amplitude + c))
     if abs(c) > amplitude * (1.0 + tolerances.RADICAND):

@@ -13,6 +13,7 @@ from enum import Enum
 
 import numpy as np
 
+from katana450.client.asynchronous import is_over
 from katana450.extensions.leader.joint_map import LeaderPosture
 from katana450.extensions.leader.posture_history import SILENCE, PostureHistory
 from katana450.maths.geometry.arrays import FloatArray
@@ -36,12 +37,6 @@ FINGER_STEP = 0.02
 
 FINGER_INTERVAL = 0.1
 """[s] Minimum time between two targets of the fingers."""
-
-NOT_RUN = "Not run"
-"""Begins the reason for which a planned program was not run."""
-
-ENDED = ("stopped", "failed", "refused", "cancelled")
-"""Statuses of a program that does not reach its end."""
 
 
 class LeadPhase(Enum):
@@ -220,11 +215,11 @@ class Follower:
         program = state.program
         if self._eased is None or state.sent < self._eased or program is None:
             return []
-        if program.status in ENDED or program.why.startswith(NOT_RUN):
+        if not is_over(program):
+            return []
+        if program.status != "done":
             why = f"The arm did not reach the posture of the leader: {program.why}"
             return [self.refused(why)]
-        if program.status != "done":
-            return []
         self.phase, self._revocations, self._first = LeadPhase.SETTLING, state.revocations, True
         self._finger = None
         if self._distance(state) <= NEAR:
