@@ -17,9 +17,9 @@ from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.urdf_package import package_files
 from katana450.extensions.export.vrml import vrml_files, world_of
-from katana450.extensions.importers.vrml_reader import read_world
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
+from tests.exchange.strict_vrml import read_world
 from tests.exchange.trees import tree
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

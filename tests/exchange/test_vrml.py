@@ -30,11 +30,11 @@ from katana450.extensions.export.vrml_node import (
 )
 from katana450.extensions.export.vrml_text import HEADER, world_text
 from katana450.extensions.export.vrml_views import views
-from katana450.extensions.importers.vrml_reader import read_world
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
+from tests.exchange.strict_vrml import read_world
 from tests.exchange.tools import SCREEN, needs, run
 
 pytestmark = pytest.mark.long

@@ -13,10 +13,10 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError, connect
-from katana450.extensions.importers.vrml_reader import read_world
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.exchange.joint_rotations import THERE, rotation
+from tests.exchange.strict_vrml import read_world
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines, post, speaking
 

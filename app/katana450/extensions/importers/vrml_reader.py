@@ -1,4 +1,4 @@
-"""Strict parser for the text of VRML97."""
+"""Strict parser for the text of VRML97, which reads what this project exports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from katana450.extensions.export.vrml_node import (
     Value,
     World,
 )
-from katana450.extensions.export.vrml_text import HEADER
 
 T = TypeVar("T")
 N = TypeVar("N", int, float)
@@ -46,17 +45,6 @@ NUMBERS, INTEGERS = (
     re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
 )
 _NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{}\x7f]*")
-
-
-def read_world(text: str, name: str = "The file") -> World:
-    """Return the content of a file that uses only the nodes in FIELDS.
-
-    ``name`` is the name of the file for messages. Raises InputError with the line for anything that
-    VRML97 does not allow, or that is not among those nodes and fields.
-    """
-    if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
-        raise InputError(f"{name} is not VRML97: it must begin with {HEADER!r}.")
-    return Reader(text, name).world()
 
 
 class Reader:
