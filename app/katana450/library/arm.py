@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.scene_objects import SceneObject
@@ -14,6 +15,7 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.caching import cached_property
+from katana450.errors import InputError
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.library.motion_plan import MotionPlan
@@ -211,6 +213,26 @@ class Arm:
             q_hint=q_hint,
             within_limits=within_limits,
         )
+
+    def nearest_poses(
+        self, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = None, **options: Any
+    ) -> tuple[NearestPose, ...]:
+        """Return the feasible pose nearest to each of the poses ``T`` (N, 4, 4), as on a path.
+
+        Of equally good postures each one is that nearest to the one before; ``q_hint`` (n,) [rad]
+        stands before the first. ``options`` and errors are those of `nearest`.
+
+        >>> poses = arm.nearest_poses(np.stack([arm.fk(arm.ready)] * 3))
+        >>> [pose.reason for pose in poses]
+        ['', '', '']
+        """
+        if dimensions(T) != 3:
+            raise InputError(f"The poses must have the shape (N, 4, 4), not {np.shape(T)}.")
+        nearest_poses: list[NearestPose] = []
+        for pose in np.asarray(T):
+            nearest_poses.append(self.nearest(pose, q_hint=q_hint, **options))
+            q_hint = nearest_poses[-1].q
+        return tuple(nearest_poses)
 
     def jacobian(self, q: npt.ArrayLike, *, body: bool = False) -> FloatArray:
         """Return the (6, n) Jacobian at joint angles ``q`` (n,) [rad].
