@@ -84,13 +84,14 @@ def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) ->
         found = (folder / name).resolve()
         if not found.is_relative_to(folder) or not found.is_file():
             return None
-        return _content(found, maximum)
+        return content_of(found, maximum)
 
     maximum = MAX_ARCHIVE_BYTES if Format.of(path.name) is Format.ZIP else MAX_FILE_BYTES
-    return read_mesh(_content(path, maximum), path.name, unit, up, beside=beside)
+    return read_mesh(content_of(path, maximum), path.name, unit, up, beside=beside)
 
 
-def _content(path: Path, maximum: int) -> bytes:
+def content_of(path: Path, maximum: int) -> bytes:
+    """Return up to ``maximum`` + 1 bytes of the file at ``path``. Raises InputError."""
     try:
         with path.open("rb") as file:
             return file.read(maximum + 1)

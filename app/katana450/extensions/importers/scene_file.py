@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, check_packing
-from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.importers.mesh_file import content_of, read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
 from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft
@@ -125,12 +125,12 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
         found = (folder / name).resolve()
         if not found.is_relative_to(folder):
             raise InputError(f"{name} is not in the folder of the scene.")
-        return _content(found, maximum)
+        return content_of(found, maximum)
 
     try:
         if path.suffix.lower() == ".zip":
-            return read_scene_zip(_content(path, MAX_ZIP_BYTES), T_palm_tool)
-        text = _text(_content(path, MAX_BYTES), path.name)
+            return read_scene_zip(content_of(path, MAX_ZIP_BYTES), T_palm_tool)
+        text = _text(content_of(path, MAX_BYTES), path.name)
         if not is_script(text):
             return _stored(parsed(text), opened, T_palm_tool)
         scene = parse(attached(text, files_in(folder))).scene
@@ -216,14 +216,6 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
 
     up = None if file.up is None else Up(file.up)
     return read_mesh(content, file.path, file.unit, up, beside=beside)
-
-
-def _content(path: Path, maximum: int) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(maximum + 1)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
 
 
 def _text(content: bytes, name: str) -> str:
