@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import viser
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketDisconnected
+from uvicorn.protocols.utils import ClientDisconnected
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
@@ -104,6 +105,8 @@ class Proxy:
                 )
                 if why is not None:
                     await browser.close(SIGN_IN_CLOSE_CODE, why)
+        except ClientDisconnected:
+            log.debug("A page was closed before its scene could be sent.")
         except OSError as error:
             log.warning("viser does not answer: %s", str(error) or type(error).__name__)
             # A browser that has left needs no close frame.
