@@ -125,7 +125,7 @@ const Viser = (() => {
     window.Worker = class extends Plain {
       #tried = -Infinity; // time of an attempt to connect that has not ended
       #line = {
-        say: (message) => super.postMessage(stamped({ type: SEND, message })),
+        say: (message) => super.postMessage({ type: SEND, message }),
         show: (messages) =>
           this.dispatchEvent(new MessageEvent("message", { data: { type: BATCH, messages, ours: true } })),
       };
@@ -161,13 +161,10 @@ const Viser = (() => {
         if (data?.type === RETRY || data?.type === SERVER) this.#tried = performance.now();
         if (data?.type === SERVER) data = { ...data, server: server(data.server, this.#line) };
         if (data?.type === SEND && !sends(data.message, this.#line)) return;
-        super.postMessage(data?.type === SEND ? stamped(data) : data, ...rest);
+        super.postMessage(data, ...rest);
       }
     };
   }
-
-  // Return a message for the server with the time of its making [s]: the server does not execute what arrives late.
-  const stamped = (data) => ({ ...data, message: { ...data.message, made: performance.now() / 1000 } });
 
   // Return the view in `message` of the page; null for another message.
   const viewOf = (message) => (message.type === "ViewerCameraMessage" ? message : null);

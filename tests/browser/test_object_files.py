@@ -65,7 +65,7 @@ def test_files_that_are_dropped_together_are_one_object(page: ViserPage, reader:
     drop(page, square_gltf=json.dumps(document).encode(), **{"a b_bin": DATA}, note_txt=b"x")
     page.wait_until(lambda: "square" in scales(reader), "the object")
     assert "2 triangles, 100 × 0 × 100 mm" in shown(page)
-    part = b"#VRML V1.0 ascii\nCube { width 0.04 height 0.04 depth 0.04 }"
+    part = f"{HEADER}\nShape {{ geometry Box {{ size 0.04 0.04 0.04 }} }}".encode()
     drop(page, robot_wrl=f'{HEADER}\nInline {{ url "p/part.wrl" }}'.encode(), part_wrl=part)
     page.wait_until(lambda: "robot" in scales(reader), "the other object")
     assert "12 triangles" in shown(page)

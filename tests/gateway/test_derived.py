@@ -24,7 +24,7 @@ from katana450.server.service.identity import Identity
 
 
 def _snapshot() -> Snapshot:
-    return Snapshot(cast(State, None), 0)
+    return Snapshot(cast(State, Mock()), 0)
 
 
 def test_branches_are_computed_once_per_snapshot() -> None:

@@ -306,7 +306,6 @@ def wait_for(client: Client, mode: str) -> None:
     [
         *(
             ("--port", "70000"),
-            ("--view", "abc"),
             ("--object", "nan"),
             ("--calibration-scale", "0"),
         ),
