@@ -25,7 +25,7 @@ MAX_MARKS = 2
 
 
 ACTS = "pressed STOP|ended it|cancelled the planning|went to step|runs it from"
-"""What sentences say that people have done, as a pattern."""
+"""Pattern of the acts of people in sentences."""
 
 
 def addressed(words: str, name: str) -> str:

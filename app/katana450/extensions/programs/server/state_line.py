@@ -23,7 +23,7 @@ ENDS = {
     PlanningPhase.REFUSED.value: "cannot run",
     PlanningPhase.CANCELLED.value: "not planned",
 }
-"""What the page says of a program with this status."""
+"""The sentence of the page about a program with this status."""
 
 UNPLANNED_ENDS = (Phase.FAILED.value, PlanningPhase.REFUSED.value)
 """The statuses after which somebody has to look at the reason."""
