@@ -130,27 +130,17 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 
 
-def test_control_loop_that_ended_is_started_again_stopped(tmp_path: Path) -> None:
-    app = tmp_path / "fatal.py"
-    app.write_text(FATAL, encoding="utf-8")
-    with AppServer((sys.executable, str(app), "{port}")) as server:
-        killed = server.arm
-        with connect(server.url, "Driver") as arm:
-            arm.ask(requests.Joints(q=FAR.tolist()))
-            end = time.monotonic() + 15.0
-            while (state := arm.query(answers.State)).stop != "confirmed" or state.age > REPORTED:
-                assert time.monotonic() < end
-                time.sleep(0.05)
-            assert not state.moving
-            assert server.arm != killed
-            reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
-            assert "restarted" in reasons
-        assert "The arm's process ended with status 1" in server.output
-
-
-def test_arm_whose_states_reach_no_page_is_started_again_stopped(tmp_path: Path) -> None:
-    app = tmp_path / "mute.py"
-    app.write_text(MUTE, encoding="utf-8")
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (FATAL, "The arm's process ended with status 1"),
+        (MUTE, "no longer reaches the page's server"),
+    ],
+    ids=["its loop has ended", "its states reach no page"],
+)
+def test_arm_that_fails_is_started_again_stopped(tmp_path: Path, text: str, words: str) -> None:
+    app = tmp_path / "fails.py"
+    app.write_text(text, encoding="utf-8")
     with AppServer((sys.executable, str(app), "{port}")) as server:
         killed = server.arm
         with connect(server.url, "Driver") as arm:
@@ -159,6 +149,8 @@ def test_arm_whose_states_reach_no_page_is_started_again_stopped(tmp_path: Path)
             while (state := arm.query(answers.State)).stop != "confirmed" or state.age > REPORTED:
                 assert time.monotonic() < end
                 time.sleep(0.05)
-            assert server.arm != killed
             assert not state.moving
-        assert "no longer reaches the page's server" in server.output
+            assert server.arm != killed
+            reasons = [line.finding.reason for line in arm.query(answers.EventLog).lines]
+            assert "restarted" in reasons
+        assert words in server.output
