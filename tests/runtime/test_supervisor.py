@@ -75,9 +75,10 @@ def deaf(folder: Path, supervisor: SupervisorPipe) -> None:
 
 
 def careless(folder: Path, supervisor: SupervisorPipe) -> None:
-    """Meet an error in a thread."""
+    """Meet an error in a thread, once the first start is over."""
 
     def work() -> None:
+        until((folder / "running").exists)
         with (folder / "started").open("a") as file:
             file.write("x")
         raise LookupError("no such thing")
@@ -159,6 +160,8 @@ def test_error_in_any_thread_ends_the_process(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     running = Running(child_spec("careless", "It", careless, tmp_path, 5.0))
+    (tmp_path / "started").touch()
+    (tmp_path / "running").touch()
     try:
         until(lambda: len((tmp_path / "started").read_text()) >= 2)
     finally:
