@@ -171,8 +171,10 @@ class Api:
             participant = self._participant(request, identity)
             answer = self._dispatcher.handle(participant, decoded, self._budget(request))
             if isinstance(answer, PendingAnswer):
-                watched = self._watched(request, identity, participant, answer)
-                answer = await (watched if answer.waits else answer.answer())
+                if answer.waits:
+                    answer = await self._watched(request, identity, participant, answer)
+                else:
+                    answer = await answer.answer()
             end = answer.end if isinstance(answer, answers.Done) else None
             failed = isinstance(answer, answers.Refused) or (end and end.how not in ARRIVED)
             return as_json(answer, NOT_NOW if failed else 200)
