@@ -1,4 +1,4 @@
-"""Fixtures: the server of the test modules, and a program that drives its arm."""
+"""Fixtures: a server in this process, a server in others, and programs that drive their arms."""
 
 from __future__ import annotations
 
@@ -6,10 +6,35 @@ from collections.abc import Iterator
 
 import pytest
 
+from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.client import Client, connect
+from katana450.resources import URDF_PATH
 from katana450.server.api import requests
+from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.browser.shared_server import SharedServer
+from tests.gateway.virtual import VirtualServer
+
+
+@pytest.fixture(scope="session")
+def described() -> DescribedRobot:
+    """Return the robot with the session that `serve` makes, contacts included."""
+    return find_robot(Settings(), URDF_PATH, None)
+
+
+@pytest.fixture
+def local(described: DescribedRobot) -> Iterator[VirtualServer]:
+    """Return a new server in this process. Its clock is that of the test."""
+    with VirtualServer(described) as server:
+        yield server
+
+
+@pytest.fixture
+def program(local: VirtualServer) -> Iterator[Client]:
+    """Connect a program to that server; it holds the lease."""
+    with local.connect("Test") as program:
+        program.clear_stop()
+        yield program
 
 
 @pytest.fixture(scope="package")
@@ -26,8 +51,8 @@ def server(shared_server: SharedServer) -> AppServer:
 
 
 @pytest.fixture
-def program(server: AppServer) -> Iterator[Client]:
-    """Connect a program that holds the lease; its targets are dropped afterwards."""
+def live_program(server: AppServer) -> Iterator[Client]:
+    """Connect a program to the server in other processes, with the lease."""
     with connect(server.url, "Test") as program:
         program.clear_stop()
         program.ask(requests.Speed(value=1.0))

@@ -1,4 +1,4 @@
-"""Test programs on a real server: over a websocket, over HTTP, over a TCP port."""
+"""Test programs: over a websocket, over HTTP, over a TCP port of a real server."""
 
 from __future__ import annotations
 
@@ -11,35 +11,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.cli.main import main
+from katana450.arm.control.lease import Role
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError, connect
-from katana450.client.files import LostError
 from katana450.extensions.api_description.messages import kinds
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
+from katana450.server.web.access_links import AccessFile
 from tests.api.test_documented import EVERY_REQUEST
-from tests.browser.server import APP, AppServer, free_port
-from tests.gateway.client import ask
-from tests.gateway.lines import Lines, post, speaking
+from tests.browser.server import AppServer
+from tests.gateway.client import HOUR
+from tests.gateway.lines import Lines, speaking
 from tests.gateway.postures import READY, THERE
+from tests.gateway.virtual import VirtualServer
 
 
-@pytest.mark.parametrize(
-    ("path", "headers", "status", "code"),
-    [
+def test_refusals_have_one_form(local: VirtualServer) -> None:
+    cases: list[tuple[str, dict[str, Any], int, str]] = [
         ("nowhere", {}, 404, "not_found"),
         ("stop", {}, 405, "method_not_allowed"),
         ("state", {"Origin": "http://evil.test"}, 403, "forbidden"),
         ("scripts/nowhere.yaml", {}, 404, "not_found"),
-    ],
-)
-def test_refusals_have_one_form(
-    server: AppServer, path: str, headers: dict[str, Any], status: int, code: str
-) -> None:
-    answered, _, body = ask(f"{server.url}/api/v1/{path}", **headers)
-    refused = json.loads(body)
-    assert (answered, refused["is"], refused["code"]) == (status, "refused", code)
-    assert refused["why"]
+    ]
+    for path, headers, status, code in cases:
+        answered, _, body = local.ask(f"/api/v1/{path}", **headers)
+        refused = json.loads(body)
+        assert (answered, refused["is"], refused["code"]) == (status, "refused", code)
+        assert refused["why"]
 
 
 def test_every_query_is_answered(program: Client) -> None:
@@ -82,9 +80,8 @@ def test_json_lines_on_tcp_do_the_same(server: AppServer) -> None:
         assert lines.answer(do="release_lease")["is"] == "done"
 
 
-@pytest.mark.parametrize(
-    "first",
-    [
+def test_tcp_connection_without_hello_is_closed(server: AppServer) -> None:
+    for first in (
         b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
         b'POST / HTTP/1.1\r\n\r\n{"do":"stop"}\n',
         b'{"do": "stop"}\n',
@@ -92,73 +89,67 @@ def test_json_lines_on_tcp_do_the_same(server: AppServer) -> None:
         b"\xff\xfe\n",
         b"\n",
         b"x" * 100_000,
-    ],
-)
-def test_tcp_connection_without_hello_is_closed(server: AppServer, first: bytes) -> None:
-    lines = Lines(server)
-    with lines.socket, lines.reader:
-        with suppress(ConnectionError):
-            lines.raw(first)
-        assert lines.ends()
+    ):
+        lines = Lines(server)
+        with lines.socket, lines.reader:
+            with suppress(ConnectionError):
+                lines.raw(first)
+            assert lines.ends()
     with connect(server.url) as program:
         assert program.query(answers.State).stopped is None
 
 
-def test_repeated_invalid_requests_close_the_connection(
-    server: AppServer,
-) -> None:
-    with connect(server.url) as watcher:
-        before = watcher.query(answers.State)
-        with speaking(server) as lines:
-            for text in ("{", "[]", '{"do":"fly"}', '{"do":"joints","q":[NaN,0,0,0,0]}',
-                         '{"do":"joints","q":[1e999,0,0,0,0],"id":4}', '{"do":"watch","hz":-1}',
-                         '{"do":"joints"}', '{"do":"stop","now":true}'):  # fmt: skip
-                lines.raw(text.encode() + b"\n")
-                assert lines.hear()["is"] == "refused"
-            lines.raw(b"{\n" * 60)
-            assert lines.ends()
-        after = watcher.query(answers.State)
-        assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
+def test_repeated_invalid_requests_close_the_connection(local: VirtualServer) -> None:
+    before = local.state()
+    with local.speaking() as rows:
+        for text in ("{", "[]", '{"do":"fly"}', '{"do":"joints","q":[NaN,0,0,0,0]}',
+                     '{"do":"joints","q":[1e999,0,0,0,0],"id":4}', '{"do":"watch","hz":-1}',
+                     '{"do":"joints"}', '{"do":"stop","now":true}'):  # fmt: skip
+            rows.raw(text)
+            assert rows.hear()["is"] == "refused"
+        for _ in range(60):
+            rows.raw("{")
+        assert rows.ends() == 1008
+    after = local.state()
+    assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
 
 
-def test_single_requests_can_be_posted(server: AppServer) -> None:
-    status, done = post(server, do="clear_stop", id=1)
+def test_single_requests_can_be_posted(local: VirtualServer) -> None:
+    status, done = local.post(do="clear_stop", id=1)
     assert (status, done["is"], done["id"], done["outcome"]) == (200, "done", 1, "accepted")
-    status, done = post(server, do="joint", axis=5, value=0.3)
+    status, done = local.post(do="joint", axis=5, value=0.3)
     assert status == 200
     state: dict[str, Any] = {"ticket": 0}
     while state["ticket"] < done["ticket"] or state["moving"]:
-        status, _, body = ask(f"{server.url}/api/v1/state", X_Program="a-test-that-posts")
+        status, _, body = local.ask("/api/v1/state", X_Program="a-test-that-posts")
         assert status == 200
         state = json.loads(body)
         assert state["stopped"] is None
         time.sleep(0.05)
     assert state["q"][4] == pytest.approx(0.3, abs=1e-12)
-    status, answer = post(server, "another-program-there", do="home", id="h")
+    status, answer = local.post("another-program-there", do="home", id="h")
     assert (status, answer["is"], answer["id"]) == (409, "refused", "h")
     assert "holds the arm" in answer["why"]
-    assert post(server, do="fly")[0] == 422
-    assert post(server, do="watch", hz=3)[0] == 422
-    assert post(server, "short", do="home")[0] == 422
-    assert ask(f"{server.url}/api/v1/do", data=b"x" * 5000, X_Program="a-test-that-posts")[0] == 413
-    assert post(server, do="release_lease")[0] == 200
+    assert local.post(do="fly")[0] == 422
+    assert local.post(do="watch", hz=3)[0] == 422
+    assert local.post("short", do="home")[0] == 422
+    assert local.ask("/api/v1/do", data=b"x" * 5000, X_Program="a-test-that-posts")[0] == 413
+    assert local.post(do="release_lease")[0] == 200
 
 
-def test_page_of_another_site_cannot_send_requests_as_a_program(server: AppServer) -> None:
-    for headers in ({"Origin": "https://evil.example"}, {"Origin": "null"}):
-        status, _, _ = ask(
-            f"{server.url}/api/v1/stop", data=b"", X_Program="a-test-that-posts", **headers
-        )
-        assert status == 403
-    assert json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None
+def test_page_of_another_site_cannot_send_requests_as_a_program(local: VirtualServer) -> None:
+    for origin in ("https://evil.example", "null"):
+        names = {"X_Program": "a-test-that-posts", "Origin": origin}
+        assert local.ask("/api/v1/stop", data=b"", **names)[0] == 403
+    assert local.state().stopped is None
 
 
-def test_openapi_lists_every_route(server: AppServer) -> None:
-    described = json.loads(ask(f"{server.url}/api/v1/openapi.json")[2])
+def test_openapi_lists_every_route(local: VirtualServer) -> None:
+    described = json.loads(local.ask("/api/v1/openapi.json")[2])
     for path in described["paths"]:
         data = b"{}" if path.endswith("do") else None
-        url = server.url + path.format(name="Pour", number=1)
-        status, _, _ = ask(url, data=data, X_Program="a-test-that-posts")
+        url = path.format(name="Pour", number=1)
+        status, _, _ = local.ask(url, data=data, X_Program="a-test-that-posts")
         # This server records nothing.
         recorded = path.startswith(("/api/v1/recording", "/api/v1/episodes"))
         assert status in ((404, 409) if recorded else (200, 405, 422)), path
@@ -168,33 +159,24 @@ def test_openapi_lists_every_route(server: AppServer) -> None:
         assert kind.__name__ in shapes
 
 
-def test_program_needs_a_token_if_the_server_requires_links(tmp_path: Path, capsys: Any) -> None:
-    file = tmp_path / "access.json"
-    tokens = {}
-    for role in ("viewer", "operator"):
-        assert main(["access", "give", "--file", str(file), "--name", role, "--role", role]) == 0
-        tokens[role] = capsys.readouterr().out.partition("#")[2].strip()
-    port = free_port()
-    with AppServer((*APP, "--access", str(file), "--lines", "0"), port=port) as server:
+def test_program_needs_a_token_if_the_server_requires_links(
+    described: DescribedRobot, tmp_path: Path
+) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+    viewer, operator = (
+        file.give(role.value, role, time.time() + HOUR) for role in (Role.VIEWER, Role.OPERATOR)
+    )
+    with VirtualServer(described, access=file) as local:
         for token in ("", "guess"):
-            with pytest.raises((RefusedError, LostError)), connect(server.url, token=token):
+            with pytest.raises(RefusedError), local.connect(token=token):
                 pass
-        assert ask(f"{server.url}/api/v1/state")[0] == 401
-        assert ask(f"{server.url}/api/v1/stop", data=b"", Authorization="Bearer x")[0] == 401
-        with connect(server.url, "script", token=tokens["viewer"]) as watcher:
+        assert local.ask("/api/v1/state")[0] == 401
+        assert local.ask("/api/v1/stop", data=b"", Authorization="Bearer x")[0] == 401
+        with local.connect("script", viewer) as watcher:
             assert (watcher.welcome.name, watcher.welcome.role) == ("viewer, script", "viewer")
             with pytest.raises(RefusedError, match="may only watch"):
                 watcher.ask(requests.Home())
-            with connect(server.url, "script", token=tokens["operator"]) as driver:
+            with local.connect("script", operator) as driver:
                 assert driver.joints(THERE).status == "ok"
                 with pytest.raises(RefusedError):
                     driver.ask(requests.Take())
-        lines = Lines(server)
-        with lines.socket, lines.reader:
-            lines.say(do="hello", name="x")
-            assert lines.hear()["is"] == "refused"
-            assert lines.ends()
-        lines = Lines(server)
-        with lines.socket, lines.reader:
-            lines.say(do="hello", name="x", token=tokens["operator"])
-            assert lines.hear()["name"] == "operator, x"

@@ -16,7 +16,8 @@ from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask, controlling
 from tests.gateway.lines import speaking
-from tests.gateway.test_isolation import FAR, under_way
+from tests.gateway.postures import FAR
+from tests.gateway.test_isolation import under_way
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"

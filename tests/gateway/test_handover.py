@@ -1,15 +1,18 @@
-"""Test requests for the lease, take-overs, and the name of who stopped, on a real server."""
+"""Test requests for the lease, take-overs, and the name of who stopped."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 
 from tests.browser.server import AppServer
 from tests.gateway.client import Control, ask, controlling, enter, page_name
+from tests.gateway.virtual import VirtualServer
 
 SCRIPT = """\
 name: Wave
@@ -20,39 +23,36 @@ steps:
 """
 
 
-def state_of(server: AppServer) -> dict[str, Any]:
-    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
-    return state
+@asynccontextmanager
+async def closed(*controls: Control) -> AsyncIterator[None]:
+    """Close ``controls`` after the block."""
+    yield
+    for each in controls:
+        await each.close()
 
 
-async def until_program(server: AppServer, status: str) -> None:
+async def until_program(owner: Control, status: str) -> None:
     async with asyncio.timeout(30.0):
-        while (state_of(server).get("program") or {}).get("status") != status:
+        while True:
+            await owner.say("query")
+            program = (await owner.notice("state")).get("program") or {}
+            if program.get("status") == status:
+                return
             await asyncio.sleep(0.05)
 
 
-async def run_program(server: AppServer, owner: Control) -> None:
+async def run_program(owner: Control) -> None:
     await owner.say("program", text=SCRIPT)
-    await until_program(server, "ready")
+    await until_program(owner, "ready")
     await owner.say("steer", order="run")
     await owner.wait(holder="Wave")
 
 
-async def clean_up(driver: Control) -> None:
-    await driver.say("stop")
-    await driver.wait(stop="confirmed")
-    await driver.clear_stop()
-    await driver.say("release_lease")
-    await driver.wait(holder=None)
-
-
-def test_owner_of_a_running_program_decides_about_requests(server: AppServer) -> None:
+def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
     async def act() -> None:
-        async with (
-            controlling(server.url, enter(server.url)) as owner,
-            controlling(server.url, enter(server.url)) as other,
-        ):
-            await run_program(server, owner)
+        owner, other = await local.control(), await local.control()
+        async with closed(owner, other):
+            await run_program(owner)
             await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
             assert not other.status["own_program"]
             await other.say("ask")
@@ -70,11 +70,10 @@ def test_owner_of_a_running_program_decides_about_requests(server: AppServer) ->
             await owner.wait(asking=[asking])
             await owner.say("give", to=asking["number"])
             await other.wait(mine=True)
-            await until_program(server, "stopped")
+            await until_program(owner, "stopped")
             await owner.wait(mine=False, orders=[], holder=other.status["name"])
-            await clean_up(other)
 
-    asyncio.run(act())
+    local.run(act())
 
 
 async def numbered(owner: Control, other: Control) -> dict[str, Any]:
@@ -88,14 +87,12 @@ async def numbered(owner: Control, other: Control) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("by_program", [False, True])
-def test_former_driver_gets_the_name_of_the_new_one(server: AppServer, by_program: bool) -> None:
+def test_former_driver_gets_the_name_of_the_new_one(local: VirtualServer, by_program: bool) -> None:
     async def act() -> None:
-        async with (
-            controlling(server.url, enter(server.url)) as driver,
-            controlling(server.url, enter(server.url)) as other,
-        ):
+        driver, other = await local.control(), await local.control()
+        async with closed(driver, other):
             if by_program:
-                await run_program(server, driver)
+                await run_program(driver)
             else:
                 await driver.say("acquire")
                 await driver.wait(mine=True)
@@ -107,9 +104,8 @@ def test_former_driver_gets_the_name_of_the_new_one(server: AppServer, by_progra
             await driver.wait(holder=None, taken="")
             await driver.say("acquire")
             await driver.wait(mine=True, taken="")
-            await clean_up(driver)
 
-    asyncio.run(act())
+    local.run(act())
 
 
 @pytest.mark.long
@@ -119,7 +115,8 @@ def test_stop_names_the_page_that_pressed_it_after_a_restart() -> None:
     def press(server: AppServer, cookie: str) -> str | None:
         stop = f"{server.url}/stop?press=one&page={page}"
         assert ask(stop, data=b"", Origin=server.url, Cookie=cookie)[0] == 204
-        stopped: str | None = state_of(server)["stopped"]
+        state = json.loads(ask(f"{server.url}/api/v1/state")[2])
+        stopped: str | None = state["stopped"]
         return stopped
 
     async def name(server: AppServer, cookie: str) -> str:

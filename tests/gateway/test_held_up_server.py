@@ -13,7 +13,7 @@ import pytest
 
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask, websocket
-from tests.gateway.test_isolation import FAR
+from tests.gateway.postures import FAR
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"

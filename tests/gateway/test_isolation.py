@@ -18,12 +18,11 @@ from katana450.client.files import LostError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
+from tests.gateway.postures import FAR
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
 )
-
-FAR = np.deg2rad((120.0, -68.0, 85.0, 8.0, 0.0))
 
 
 @pytest.fixture

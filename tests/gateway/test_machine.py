@@ -61,25 +61,25 @@ def test_mechanism_has_sliding_and_driven_joints(robot: Robot) -> None:
 
 
 def test_every_link_is_where_another_program_has_it(
-    program: Client, robot: Robot, path: Path
+    live_program: Client, robot: Robot, path: Path
 ) -> None:
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
     for seed in range(3):
         q = somewhere(robot, seed)
-        there = program.joints(q)
+        there = live_program.joints(q)
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It gets the driven joints alone, and computes the following joints itself.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        poses = {link.name: link.T for link in program.query(answers.Links).links}
+        poses = {link.name: link.T for link in live_program.query(answers.Links).links}
         assert set(poses) == set(urdf.link_map)
         for name, T in poses.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
 def test_arm_answer_gives_the_reason_for_joints_only(
-    server: AppServer, program: Client, robot: Robot
+    server: AppServer, live_program: Client, robot: Robot
 ) -> None:
-    description = program.query(answers.Arm)
+    description = live_program.query(answers.Arm)
     assert description.joints == list(robot.joint_group.names)
     assert description.slides == list(robot.joint_group.slides)
     assert (
@@ -94,7 +94,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
         None,
     )
     assert "carries a tool. Its joints are j1 (prismatic)" in description.joints_only
-    state = program.query(answers.State)
+    state = live_program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
@@ -104,22 +104,22 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     ]  # fmt: skip
     for request in cartesian:
         with pytest.raises(RefusedError, match=r"Only its joints can be driven\. .*carries a tool"):
-            program.ask(request)
+            live_program.ask(request)
     status, _, body = ask(f"{server.url}/api/v1/branches")
     assert status == 409
     assert "Only its joints" in json.loads(body)["why"]
     with pytest.raises(RefusedError, match=f"no axis {robot.joint_group.n + 1}: the robot has"):
-        program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
+        live_program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, but the command has 2"):
-        program.ask(requests.Joints(q=[0.0, 0.0]))
+        live_program.ask(requests.Joints(q=[0.0, 0.0]))
     assert "Joints only." in server.output
 
 
 def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
-    program: Client, robot: Robot
+    live_program: Client, robot: Robot
 ) -> None:
     slide = robot.joint_group.slides.index(True)
-    there = program.go(requests.Joint(axis=slide + 1, value=2.0))
+    there = live_program.go(requests.Joint(axis=slide + 1, value=2.0))
     assert there.q[slide] == robot.joint_group.upper[slide]
     (finding,) = there.findings
     assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
@@ -128,41 +128,41 @@ def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
 
 
 def test_stop_pause_and_lease_are_those_of_an_arm(
-    server: AppServer, program: Client, robot: Robot
+    server: AppServer, live_program: Client, robot: Robot
 ) -> None:
-    program.ask(requests.Speed(value=0.05))
+    live_program.ask(requests.Speed(value=0.05))
     far = np.where(np.arange(robot.joint_group.n) == 0, robot.joint_group.lower, 0.0)
-    program.ask(requests.Joints(q=far.tolist()))
+    live_program.ask(requests.Joints(q=far.tolist()))
     with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
-    program.ask(requests.Pause())
-    while (now := program.query(answers.State)).moving:
+    live_program.ask(requests.Pause())
+    while (now := live_program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "paused"
     assert now.q[0] != far[0]
-    program.ask(requests.Resume())
+    live_program.ask(requests.Resume())
     with connect(server.url, "Other") as other:
         other.ask(requests.Stop())
-    while (now := program.query(answers.State)).moving:
+    while (now := live_program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "stopped"
     assert now.stopped == "Other pressed STOP."
     assert now.q[0] != far[0]
     with pytest.raises(RefusedError, match="clear the stop first"):
-        program.joints(far)
+        live_program.joints(far)
 
 
-def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
+def test_its_vrml_world_has_names(live_program: Client, robot: Robot) -> None:
     slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
     axis = robot.axis(robot.joints[slide])
-    program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert program.query(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
-        0.05
-    )
-    program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
-    world = {node.node: node for node in program.query(answers.World).nodes}
+    live_program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
+    assert live_program.query(answers.State).q[
+        robot.joint_group.names.index(slide)
+    ] == pytest.approx(0.05)
+    live_program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
+    world = {node.node: node for node in live_program.query(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
-    program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
+    live_program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
 
 def test_slider_moves_a_joint_in_its_own_unit(server: AppServer, robot: Robot) -> None:

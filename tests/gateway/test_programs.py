@@ -1,4 +1,4 @@
-"""Test programs on a real server, requested by the Python client."""
+"""Test programs that the Python client requests, and the command on a real server."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import AppServer
-
-pytestmark = pytest.mark.long
+from tests.gateway.virtual import VirtualServer
 
 ROOT = Path(__file__).resolve().parents[2]
 READY = np.deg2rad((0.0, -68.0, 85.0, 8.0, 0.0))
@@ -33,16 +32,9 @@ steps:
 
 
 @pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Test") as arm:
+def arm(local: VirtualServer) -> Iterator[Client]:
+    with local.connect("Test") as arm:
         yield arm
-        state = arm.query(answers.State)
-        if state.program is not None and state.program.status in ("running", "paused"):
-            arm.ask(Steer(order=ProgramOrder.END))
-        arm.clear_stop()
-        arm.go(requests.Resume())
-        arm.go(requests.Home())
-        arm.ask(requests.ReleaseLease())
 
 
 def planned(arm: Client, text: str) -> answers.Progress:
@@ -75,9 +67,8 @@ def test_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     during = arm.query(answers.State)
     assert during.holder is not None
     assert during.holder.startswith("There and back")
-    lines, end = set(), time.monotonic() + 20.0
+    lines = set()
     while (program := arm.query(answers.State).program) is not None and program.status == "running":
-        assert time.monotonic() < end
         lines.add(program.line)
         time.sleep(0.02)
     assert program is not None
@@ -117,25 +108,22 @@ def test_program_is_paused_stepped_and_ended(arm: Client) -> None:
     assert state.holder is None
 
 
-def test_lease_can_be_taken_from_a_program(server: AppServer, arm: Client) -> None:
+def test_lease_can_be_taken_from_a_program(local: VirtualServer, arm: Client) -> None:
     run(arm)
-    with connect(server.url, "Boss") as boss:
+    with local.connect("Boss") as boss:
         boss.ask(requests.Take())
         program = wait(boss, lambda program: program.status != "running", 1.0)
         assert program.status == "stopped"
         assert "taken" in program.why
-        boss.ask(requests.ReleaseLease())
 
 
-def test_program_ends_when_its_owner_leaves(server: AppServer) -> None:
-    with connect(server.url, "Guest") as guest:
+def test_program_ends_when_its_owner_leaves(local: VirtualServer) -> None:
+    with local.connect("Guest") as guest:
         run(guest)
-    with connect(server.url, "Watcher") as watcher:
+    with local.connect("Watcher") as watcher:
         program = wait(watcher, lambda program: program.status != "running", 2.0)
         assert program.status == "stopped"
         assert "left" in program.why
-        watcher.go(requests.Home())
-        watcher.ask(requests.ReleaseLease())
 
 
 def test_errors_are_reported_with_their_lines(arm: Client) -> None:
@@ -160,6 +148,7 @@ def test_script_that_is_too_long_is_refused(arm: Client) -> None:
         arm.ask(Program(text=part, more=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_program_runs_from_the_command_line(
     server: AppServer, tmp_path: Path, interrupted: bool

@@ -1,4 +1,4 @@
-"""Test on a real server: continue a program, begin it at a step, pause before a step."""
+"""Test to continue a program, begin it at a step, and pause before a step."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Breakpoints, ProgramOrder, Steer
-from tests.browser.server import AppServer
 from tests.gateway.test_programs import planned, wait
+from tests.gateway.virtual import VirtualServer
 
 SCRIPT = """\
 name: Three steps
@@ -26,14 +26,10 @@ END = np.deg2rad((12.0, -68.0, 85.0, 8.0, 0.0))
 
 
 @pytest.fixture
-def arm(server: AppServer) -> Iterator[Client]:
-    with connect(server.url, "Test") as arm:
+def arm(local: VirtualServer) -> Iterator[Client]:
+    with local.connect("Test") as arm:
         assert planned(arm, SCRIPT).status == "ready"
         yield arm
-        arm.clear_stop()
-        arm.go(requests.Resume())
-        arm.go(requests.Home())
-        arm.ask(requests.ReleaseLease())
 
 
 def posture(arm: Client) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Undo over the API of a real server: goals, objects and settings, never past a stop."""
+"""Undo over the API: goals, objects and settings, never past a stop."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import time
 import numpy as np
 import pytest
 
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api import program_requests as script_requests
-from tests.browser.server import AppServer
+from tests.gateway.virtual import VirtualServer
 
 
 def state(program: Client) -> answers.State:
@@ -114,10 +114,10 @@ def test_nothing_is_undone_while_stopped_or_past_a_stop(program: Client) -> None
     np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
 
 
-def test_nothing_is_undone_past_a_change_of_driver(server: AppServer, program: Client) -> None:
+def test_nothing_is_undone_past_a_change_of_driver(local: VirtualServer, program: Client) -> None:
     moved = program.nudge(1, 0.2)
     program.ask(requests.ReleaseLease())
-    with connect(server.url, "Other") as other:
+    with local.connect("Other") as other:
         with pytest.raises(RefusedError, match="nothing to undo"):
             other.ask(requests.Undo())
         other.ask(requests.Acquire())

@@ -26,7 +26,7 @@ from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask
-from tests.gateway.test_isolation import FAR
+from tests.gateway.postures import FAR
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
