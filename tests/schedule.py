@@ -42,7 +42,6 @@ KINDS = {
     "tests/real_arm/test_driver_with_emulator.py": SERVERS[0],
     "tests/real_arm/test_session_with_driver.py": SERVERS[1],
     "tests/real_arm/test_emulator_process.py": SERVERS[0],
-    "tests/real_arm/test_faults.py": SERVERS[0],
     "tests/general_arms/test_branches_on_a_server.py": SERVERS[1],
     "tests/general_arms/test_driven_on_a_server.py": SERVERS[1],
     "tests/general_arms/test_grasping_on_a_server.py": SERVERS[0],

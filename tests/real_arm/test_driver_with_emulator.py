@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 
 import numpy as np
@@ -17,14 +17,6 @@ from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.faults import (
-    AnyFault,
-    Delay,
-    FaultScript,
-    Jitter,
-    Obstacle,
-    PowerCycle,
-)
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
@@ -33,7 +25,9 @@ from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, JOINTS, MAP
 
 CUTS = 200 if LONG else 6
-SLOW: tuple[AnyFault, ...] = (Delay(seconds=0.035), Jitter(seconds=0.01))
+
+Delay = Callable[[], float]
+"""Time by which the next reply is late [s]."""
 
 MOTIONS = (
     requests.MotorFlag.OFF,
@@ -71,13 +65,21 @@ def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
     return Wire(monkeypatch)
 
 
+def prompt() -> float:
+    return 0.0
+
+
+def slow() -> float:
+    return random.uniform(0.035, 0.045)
+
+
 @contextmanager
 def emulated(
-    *faults: AnyFault, calibrated: bool = True
+    delay: Delay = prompt, *, calibrated: bool = True
 ) -> Iterator[tuple[SmallLoop, EmulatorServer]]:
     """Yield a loop with the driver of an emulated arm."""
     arm = EmulatedArm(calibrated=calibrated, calibration_scale=60.0)
-    server = EmulatorServer(arm, "127.0.0.1", 0, FaultScript(faults=faults))
+    server = EmulatorServer(arm, "127.0.0.1", 0, delay)
     server.start()
     loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
     try:
@@ -100,9 +102,9 @@ def inwards(loop: SmallLoop, size: float = 0.3, fingers: float = 0.0) -> None:
 
 # In real time, so it needs a machine that does nothing else; test_machine.py has simulated time.
 @pytest.mark.long
-@pytest.mark.parametrize("faults", [(), SLOW], ids=["fast", "slow"])
-def test_setpoints_are_followed(wire: Wire, faults: tuple[AnyFault, ...]) -> None:
-    with emulated(*faults) as (loop, _):
+@pytest.mark.parametrize("delay", [prompt, slow])
+def test_setpoints_are_followed(wire: Wire, delay: Delay) -> None:
+    with emulated(delay) as (loop, _):
         loop.engage()
         begun = time.perf_counter() + 0.1
         start = loop.measured
@@ -143,7 +145,9 @@ def test_arm_is_calibrated_by_an_act_only(wire: Wire) -> None:
 
 
 def test_collision_is_reported_and_unblocked(wire: Wire) -> None:
-    with emulated(Obstacle(axis=1, encoder=29500)) as (loop, server):
+    with emulated() as (loop, server):
+        with server.lock:
+            server.arm.obstruct(1, 29500)
         loop.engage()
         inwards(loop)
         loop.wait(ArmMode.COLLIDED, 4.0)
@@ -159,11 +163,17 @@ def test_collision_is_reported_and_unblocked(wire: Wire) -> None:
 
 
 def test_power_cycle_ends_in_a_state_where_nothing_moves(wire: Wire) -> None:
-    with emulated(PowerCycle(after=150, seconds=0.4)) as (loop, _):
+    with emulated() as (loop, server):
         loop.engage()
         inwards(loop)
+        loop.wait(ArmMode.MOVING)
+        with server.lock:
+            server.arm.switch_off()
         loop.wait(ArmMode.LOST, 6.0)
         count = len(wire.motions())
+        time.sleep(0.2)
+        with server.lock:
+            server.arm.switch_on()
         loop.wait(ArmMode.UNCALIBRATED, 5.0)
         time.sleep(0.3)
         assert len(wire.motions()) == count
@@ -227,7 +237,7 @@ def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:
 
 @pytest.mark.long
 def test_replies_of_150_milliseconds_are_no_loss() -> None:
-    with emulated(Delay(seconds=0.15)) as (loop, _):
+    with emulated(lambda: 0.15) as (loop, _):
         loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED, 10.0)
         begun = time.perf_counter()
         loop.act(ArmAct.ENGAGE, ArmMode.HOLDING, 10.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -91,10 +90,8 @@ def test_client_may_poll_without_pause(port: int) -> None:
         assert sorted(link.round_trips)[500] < 2e-3
 
 
-def test_calibration_is_seen_by_polling_the_first_axis(tmp_path: Path) -> None:
-    script = tmp_path / "faults.yaml"
-    script.write_text("object_mm: 40\nfaults: [{do: jitter, seconds: 0.01, lasts: 0.1}]\n")
-    options = ("--calibration-scale", "30", "--faults", str(script))
+def test_calibration_is_seen_by_polling_the_first_axis() -> None:
+    options = ("--calibration-scale", "30", "--object", "40")
     with emulator(*options) as port, linked(port) as link:
         assert link.exchange(req.ReadSensors()).values[11] > 200  # type: ignore[attr-defined]
         link.exchange(req.SetCollisionDetection(0))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import random
 import subprocess
 import sys
 from pathlib import Path
@@ -14,15 +15,18 @@ import pytest
 
 import katana450.extensions.programs
 from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.robot.loader import load
 from katana450.cli.main import main
 from katana450.client import connect
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.posture import loads_of_robot
+from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import RECORDING_APP, AppServer
-from tests.real_arm.emulated import ROOT, emulator
+from tests.real_arm.emulated import ROOT
 from tests.real_arm.test_arm_commands import wait_for
 
 LIBRARY = Path(katana450.extensions.programs.__file__).parent / "library"
-SLOW = "faults: [{do: delay, seconds: 0.035}, {do: jitter, seconds: 0.01}]"
 LENIENT = ("--silence", "2.0", "--owner-silence", "6.0")
 """A machine that others keep busy delays heartbeats."""
 
@@ -122,11 +126,13 @@ def test_run_on_a_server_reports_what_it_has_measured(script: Path, tmp_path: Pa
 def test_run_on_the_emulated_arm_with_slow_replies_is_reported_as_measured(
     name: str, tmp_path: Path
 ) -> None:
-    """Emulator, server and command are processes, with real time between them."""
-    out, faults = tmp_path / "report", tmp_path / "faults.yaml"
-    faults.write_text(SLOW, encoding="utf-8")
-    with emulator("--calibrated", "--faults", str(faults)) as port:
-        arm = ("--arm", f"tcp://127.0.0.1:{port}", *LENIENT)
+    """Server and command are processes, with real time between them and the emulator."""
+    out = tmp_path / "report"
+    emulated = EmulatedArm(calibrated=True, loads=loads_of_robot(load()))
+    server = EmulatorServer(emulated, "127.0.0.1", 0, lambda: random.uniform(0.035, 0.045))
+    server.start()
+    try:
+        arm = ("--arm", f"tcp://127.0.0.1:{server.port}", *LENIENT)
         record = ("--record", str(tmp_path / "recordings"))
         with AppServer((*RECORDING_APP, *record, *arm)) as app:
             with connect(app.url, "Test") as client:
@@ -137,6 +143,8 @@ def test_run_on_the_emulated_arm_with_slow_replies_is_reported_as_measured(
             command = ("run", str(LIBRARY / f"{name}.yaml"), "--speed", "0.5", "--url", app.url)
             done = command_done(*command, "--report", str(out), seconds=300.0)
             assert done.returncode == 0, done.stderr
+    finally:
+        server.stop()
     assert "Commanded: the plan and its setpoints" in done.stdout
     assert "Measured at the arm" in done.stdout
     found = report_in(out)

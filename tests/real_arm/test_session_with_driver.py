@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import time
 from collections.abc import Callable, Iterator
 
@@ -19,7 +20,6 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.faults import Delay, FaultScript, Jitter
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.resources import URDF_PATH
@@ -68,9 +68,10 @@ class Operator:
 
 @pytest.fixture(params=["fast", pytest.param("slow", marks=pytest.mark.long)])
 def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
-    slow = (Delay(seconds=0.03), Jitter(seconds=0.02)) if request.param == "slow" else ()
+    chance = random.Random(450)
+    delay = (lambda: chance.uniform(0.03, 0.05)) if request.param == "slow" else (lambda: 0.0)
     arm = EmulatedArm(calibration_scale=60.0)
-    server = EmulatorServer(arm, "127.0.0.1", 0, FaultScript(faults=slow))
+    server = EmulatorServer(arm, "127.0.0.1", 0, delay)
     server.start()
     session = describe_robot(Settings(), URDF_PATH, None).session
     found = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))

@@ -1,4 +1,4 @@
-"""Speeds, presses, lost connections and random times of the emulator, as documented."""
+"""Speeds, presses, lost connections and late replies of the emulator, as documented."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.axis import COLLISION_LIMIT
-from katana450.extensions.real_arm.emulator.faults import FaultSchedule, FaultScript, Jitter
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from tests.real_arm.emulated import Bench, linked
 
@@ -46,7 +45,7 @@ def test_axis_that_presses_with_its_whole_current_stops_the_arm() -> None:
 
 
 def test_lost_connection_stops_no_motion() -> None:
-    server = EmulatorServer(EmulatedArm(calibrated=True), "127.0.0.1", 0, FaultScript())
+    server = EmulatorServer(EmulatedArm(calibrated=True), "127.0.0.1", 0)
     server.start()
     try:
         with linked(server.port) as link:
@@ -62,11 +61,17 @@ def test_lost_connection_stops_no_motion() -> None:
         server.stop()
 
 
-def test_random_times_follow_the_seed() -> None:
-    def times(seed: int) -> list[float]:
-        script = FaultScript(faults=(Jitter(seconds=0.02),), seed=seed)
-        schedule = FaultSchedule(script, EmulatedArm())
-        schedule.follow(0)
-        return [schedule.next_reply().delay for _ in range(5)]
-
-    assert times(1) == times(1) != times(2)
+def test_replies_are_late_and_the_arm_moves_meanwhile() -> None:
+    delays = iter([0.0, 0.03, 0.05])
+    server = EmulatorServer(EmulatedArm(calibrated=True), "127.0.0.1", 0, lambda: next(delays))
+    server.start()
+    try:
+        with linked(server.port) as link:
+            link.exchange(req.EchoRequest())
+            begun = server.arm.time
+            link.exchange(req.EchoRequest())
+            link.exchange(req.EchoRequest())
+            assert server.arm.time - begun > 0.07
+            assert sorted(link.round_trips)[-2] > 0.03
+    finally:
+        server.stop()

@@ -9,7 +9,6 @@ from argparse import Namespace
 from katana450.arm.robot.loader import load
 from katana450.assembly.output import say
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.faults import FaultScript, read_fault_script
 from katana450.extensions.real_arm.emulator.posture import loads_of_robot
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.plant.profile import profile_named
@@ -24,16 +23,15 @@ def emulate(options: Namespace) -> int:
     ending = threading.Event()
     for number in stop_signals():
         signal.signal(number, lambda *_: ending.set())
-    script = FaultScript() if options.faults is None else read_fault_script(options.faults)
     arm = EmulatedArm(
         profile_named(options.plant),
         loads_of_robot(load()),
         calibrated=options.calibrated,
         calibration_scale=options.calibration_scale,
-        object_width=script.object_mm if options.object is None else options.object,
+        object_width=options.object,
     )
     raise_priority()
-    emulator = EmulatorServer(arm, options.host, options.port, script)
+    emulator = EmulatorServer(arm, options.host, options.port)
     emulator.start()
     say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
     try:

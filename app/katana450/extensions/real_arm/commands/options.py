@@ -49,13 +49,10 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
         help="address of this machine on which it listens (default: %(default)s)",
     )
     parser.add_argument(
-        "--faults", type=Path, metavar="FILE", help="script of faults (docs/arm-emulator.md)"
-    )
-    parser.add_argument(
         "--object",
         type=_between("a width in mm", float, 1.0, WIDEST_OBJECT),
         metavar="MM",
-        help="width of an object between the fingers, in place of that in the script of faults",
+        help="width of an object between the fingers",
     )
     parser.add_argument(
         "--calibrated", action="store_true", help="begin calibrated and holding, for tests"

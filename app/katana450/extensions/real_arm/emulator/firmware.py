@@ -56,18 +56,15 @@ class Firmware:
 
     Attributes:
         arm: the arm.
-        requests: number of requests that were answered, also by a refusal.
     """
 
     def __init__(self, arm: EmulatedArm) -> None:
         self.arm = arm
-        self.requests = 0
         self._error = NO_ERROR
         self._registers: dict[int, int] = {}
 
     def handle(self, event: FirmwareEvent) -> bytes:
         """Execute what was received and return the bytes of the answer."""
-        self.requests += 1
         if isinstance(event, RequestInvalid):
             crc_is_wrong = event.code == CRC_ERROR
             text = "CRC error" if crc_is_wrong else "unknown command or wrong length"

@@ -7,18 +7,11 @@ import socket
 import struct
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 
 from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.faults import (
-    FaultSchedule,
-    FaultScript,
-    HalfReply,
-    Reset,
-    Silence,
-    WrongCrc,
-)
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.server.web.listen import listen
 
@@ -50,13 +43,24 @@ class EmulatorServer:
     """
 
     def __init__(
-        self, arm: EmulatedArm, host: str, port: int, faults: FaultScript | None = None
+        self,
+        arm: EmulatedArm,
+        host: str,
+        port: int,
+        reply_delay: Callable[[], float] = lambda: 0.0,
     ) -> None:
-        """Open the port; 0 for any free one. Raises ConfigurationError if it is taken."""
+        """Open a port. Raises ConfigurationError if it is taken.
+
+        Args:
+            arm: the arm that is served.
+            host: address of this machine.
+            port: 0 for any free one.
+            reply_delay: returns the time by which the next reply is late [s]; for tests.
+        """
         self.arm = arm
         self.lock = threading.Lock()
         self._firmware = Firmware(arm)
-        self._faults = FaultSchedule(faults or FaultScript(), arm)
+        self._reply_delay = reply_delay
         self._listening = listen(host, port)
         self._listening.setblocking(False)
         self.port: int = self._listening.getsockname()[1]
@@ -117,7 +121,6 @@ class EmulatorServer:
         longest = LONGEST_SCALED_STEP if self.arm.is_calibrating else LONGEST_STEP
         self.arm.step(min(now - self._now, longest))
         self._now = now
-        self._faults.follow(self._firmware.requests)
         if not self.arm.is_powered:
             self._drop()
 
@@ -145,19 +148,8 @@ class EmulatorServer:
                 return
 
     def _send(self, client: socket.socket, reply: bytes) -> bool:
-        """Send ``reply`` as the faults let it pass; return False if the connection has ended."""
-        self._faults.follow(self._firmware.requests)
-        faults = self._faults.next_reply()
-        self._wait(faults.delay)
-        match faults.damage:
-            case Reset():
-                self._reset()
-            case Silence():
-                return True
-            case HalfReply():
-                reply = reply[: len(reply) // 2]
-            case WrongCrc():
-                reply = reply[:-1] + bytes((reply[-1] ^ 0xFF,))
+        """Send ``reply``; return False if the connection has ended."""
+        self._wait(self._reply_delay())
         if self._client is not client:
             return False
         try:
