@@ -38,7 +38,6 @@ const Jog = (() => {
   let say = () => {};
   let stop = () => {};
   /** @type {(hz: number) => void} */
-  let watch = () => {};
 
   function quiet() {
     keys.clear();
@@ -197,7 +196,7 @@ const Jog = (() => {
   }
 
   function begin(options) {
-    ({ say, stop, watch } = options);
+    ({ say, stop } = options);
     listen(byId("plane"), pads.plane, (rates, right, down) => {
       [rates[0], rates[1]] = [-bent(down), -bent(right)];
       return [right, down];
@@ -239,7 +238,7 @@ const Jog = (() => {
     loading = true;
     try {
       const { Steps } = await import("./jog/steps.js");
-      steps = await Steps.in(byId("jog"), say, watch);
+      steps = await Steps.in(byId("jog"), say);
     } catch (error) {
       console.warn(`No steps in the Jog sheet: ${error.message}`);
     }
@@ -251,7 +250,6 @@ const Jog = (() => {
     key,
     release,
     quiet,
-    hear: (answer) => steps?.hear(answer),
     show(shown) {
       open = shown;
       if (shown) load();

@@ -428,7 +428,7 @@
     else if (data.unsaid) REPEATED.includes(data.unsaid) || toast(OFFLINE);
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
-    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard) || Jog.hear(data.heard))) return drawLink();
+    else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard))) return drawLink();
     else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) {
       toast(data.heard.why);
@@ -501,7 +501,7 @@
   const kept = storage();
   Pace.begin({ say, toast });
   More.begin({ say, toast, kept, view: () => window.katana.view });
-  Jog.begin({ say, stop, watch: (hz) => see("leader", hz) });
+  Jog.begin({ say, stop });
   Objects.begin({ say });
   Edit.begin({ say, toast, connected: () => up, scene: () => stage, replay: (file) => showTimeline(true, (there) => there.open(file)) });
   // What a pointer does in the scene; loaded when the scene is drawn.

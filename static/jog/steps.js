@@ -17,11 +17,10 @@ export class Steps {
   #held = [0, 0, 0, 0, 0, 0]; // signs of the gamepad's sticks
   #gripped = [false, false];
   #grid = html("div", { id: "steps", hidden: "" });
-  #leader = null; // a leader arm, loaded with the first press of its button
   #gripper = html("fieldset", { id: "gripper" }, html("legend", {}, "Gripper"));
 
-  // Return the steps in the sheet `root`, once the description of the arm is there. watch: sets the rate of states [Hz].
-  static async in(root, say, watch) {
+  // Return the steps in the sheet `root`, once the description of the arm is there.
+  static async in(root, say) {
     const style = html("link", { rel: "stylesheet", href: STYLE });
     const styled = new Promise((resolve) => ["load", "error"].forEach((kind) => style.addEventListener(kind, resolve)));
     document.head.append(style);
@@ -29,10 +28,10 @@ export class Steps {
     if (!answer.ok) throw new Error(await answer.text());
     const arm = await answer.json();
     await styled;
-    return new Steps(root, say, watch, arm);
+    return new Steps(root, say, arm);
   }
 
-  constructor(root, say, watch, arm) {
+  constructor(root, say, arm) {
     this.#say = say;
     this.#arm = arm;
     const sizes = SIZES.map((size) => radio("step", size, size ? `${size}` : "Hold", !size));
@@ -51,24 +50,6 @@ export class Steps {
     root.addEventListener("change", ({ target }) => this.#choose(target));
     if (arm.freedoms === 6) for (const yaw of root.querySelectorAll("[data-hold^=yaw]")) yaw.hidden = false;
     if (arm.joints_only) root.querySelector("[value=joints]").click();
-    else if ("serial" in navigator) this.#offer(root, watch);
-  }
-
-  // Offer to connect a leader arm, where the browser has Web Serial.
-  #offer(root, watch) {
-    const button = html("button", { type: "button" }, "Connect a leader arm");
-    const place = html("p", { id: "leader" }, button);
-    root.append(place);
-    button.addEventListener("click", async () => {
-      const { Leader } = await import("../leader/leader.js");
-      this.#leader ??= new Leader(place, this.#say, watch, this.#arm);
-      this.#leader.press();
-    });
-  }
-
-  // Take a message of the server; return whether it was for the leader arm alone.
-  hear(answer) {
-    return this.#leader?.hear(answer) ?? false;
   }
 
   // Whether a press moves by one step, so that holding moves nothing.

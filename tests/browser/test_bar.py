@@ -314,10 +314,8 @@ def test_the_page_is_small() -> None:
     sent = {name: size for name, size in sent.items() if "/" in name or name in first}
     # The timeline and Teach are only for those who open them, files of objects for those who add
     # one, episodes for servers that record, touch for those who open the instruments or let a
-    # device vibrate, and the leader and the arm for those who have one.
-    folders = dict.fromkeys(
-        ("timeline", "teach", "objects", "episodes", "touch", "leader", "arm"), 0
-    )
+    # device vibrate, and the arm for those who have one.
+    folders = dict.fromkeys(("timeline", "teach", "objects", "episodes", "touch", "arm"), 0)
     for name, size in sent.items():
         folder = name.partition("/")[0]
         if folder in folders:

@@ -1,10 +1,7 @@
-"""Jogging at the page: held keys, pads, buttons, a gamepad, a SpaceMouse and a leader arm."""
+"""Jogging at the page: held keys, pads, buttons, a gamepad and a SpaceMouse."""
 
 from __future__ import annotations
 
-import json
-import random
-import urllib.request
 from pathlib import Path
 from typing import Any
 
@@ -12,30 +9,9 @@ import numpy as np
 import pytest
 
 from katana450.client import connect
-from katana450.extensions.leader.calibration import decoded_calibration
-from katana450.extensions.leader.joint_map import JointMap
-from katana450.extensions.leader.layout import SO101
-from katana450.extensions.leader.packets import HOMING_OFFSET, Packet, PacketReader
 from tests.browser.page import WINDOW, ViserPage
-from tests.browser.page_leader import (
-    PACKETS,
-    POSTURES,
-    REFUSED,
-    RULES,
-    SERIAL,
-    TURNED,
-    connect_leader,
-    setpoint,
-    turn_pan,
-    words,
-)
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop
-from tests.gateway.client import enter
-from tests.leader.emulated_leader import OFFSETS, RANGE, START, calibration, write_calibration
-from tests.leader.follower_bench import FINGERS
-from tests.leader.scripted_leader import alike, scripted
-from tests.leader.test_joint_map import arm, calibrated
 
 
 def tool_point(page: ViserPage) -> Any:
@@ -272,127 +248,3 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     truth.wait(moving=True)
     page.page.evaluate("() => clearInterval(held)")
     truth.wait(moving=False)
-
-
-@pytest.mark.long
-def test_page_follows_a_leader_until_stop_and_unplugging(
-    page: ViserPage, truth: Truth, artefacts: Path, tmp_path: Path
-) -> None:
-    connect_leader(page, tmp_path)
-    assert page.page.evaluate("() => leader.baud") == 1_000_000
-    assert page.page.evaluate("() => leader.torque.some(Boolean)") is False
-    before = setpoint(truth)
-    page.press_in_bar("Follow the leader")
-    words(page, "The arm follows the leader.")
-    page.keep(artefacts / "gateway-leader.png")
-    reached = setpoint(truth)
-    assert np.abs(reached - before).max() > 0.05
-    turn_pan(page, TURNED)
-    page.wait_until(
-        lambda: bool(np.allclose(setpoint(truth) - reached, [-TURNED, 0, 0, 0, 0], atol=5e-3)),
-        "the arm to follow",
-    )
-    page.page.keyboard.press("Escape")
-    words(page, "The arm was stopped")
-    clear_stop(page, truth)
-    rests = setpoint(truth)
-    turn_pan(page, -TURNED)
-    assert np.array_equal(setpoint(truth), rests)
-    page.press_in_bar("Follow the leader")
-    words(page, "The arm follows the leader.")
-    assert setpoint(truth)[0] == pytest.approx(reached[0], abs=0.1)
-    page.page.evaluate("() => leader.unplug()")
-    words(page, "unplugged")
-    truth.wait(moving=False)
-    assert page.page.get_by_role("button", name="Connect a leader arm").is_visible()
-
-
-@pytest.mark.long
-def test_silent_leader_and_hidden_page_end_it(
-    new_page: ViserPage, truth: Truth, tmp_path: Path
-) -> None:
-    page = new_page
-    connect_leader(page, tmp_path)
-    page.press_in_bar("Follow the leader")
-    words(page, "The arm follows the leader.")
-    page.page.evaluate("() => { leader.answers = false }")
-    words(page, "no valid posture")
-    page.page.evaluate("() => { leader.answers = true }")
-    truth.wait(moving=False)
-    rests = setpoint(truth)
-    turn_pan(page, TURNED)
-    assert np.array_equal(setpoint(truth), rests)
-    page.press_in_bar("Follow the leader")
-    words(page, "The arm follows the leader.")
-    page.page.evaluate(
-        """() => {
-          Object.defineProperty(document, "hidden", {value: true, configurable: true});
-          document.dispatchEvent(new Event("visibilitychange"));
-          delete document.hidden;
-        }"""
-    )
-    words(page, "hidden")
-    # It was compared with the calibration that was chosen before.
-    file = write_calibration(tmp_path / "other.json")
-    page.page.locator("#leader input[type=file]").set_input_files(file)
-    words(page, "The port is closed.")
-    page.page.get_by_role("button", name="Connect a leader arm").wait_for()
-
-
-@pytest.mark.parametrize(
-    "seed", [1, 2, 3, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 30))]
-)
-def test_page_has_the_rules_of_the_command(page: ViserPage, seed: int) -> None:
-    inputs, expected = scripted(seed)
-    text = json.dumps({"inputs": inputs, "fingers": FINGERS})
-    found = json.loads(page.page.evaluate(RULES, text))
-    for number, (one, other) in enumerate(zip(expected, found, strict=True)):
-        assert alike(one, other), (number, one, other)
-
-
-def test_page_finds_the_postures_of_the_command(page: ViserPage) -> None:
-    chance, text = random.Random(1), calibrated(drive_mode=1)
-    joints = JointMap(decoded_calibration(text), SO101, arm())
-    ticks = [{motor: chance.randrange(4096) for motor in joints.motors} for _ in range(50)]
-    limits = {"lower": arm().lower, "upper": arm().upper, "gripper": arm().gripper}
-    pairs = [[list(each) for each in one.items()] for one in ticks]
-    found = page.page.evaluate(POSTURES, [text.decode(), limits, pairs])
-    for one, other in zip(map(joints.posture, ticks), found, strict=True):
-        assert other["raw"] == pytest.approx(one.raw, abs=1e-9)
-        assert other["q"] == pytest.approx(one.q, abs=1e-9)
-        assert other["finger"] == pytest.approx(one.finger, abs=1e-9)
-
-
-def test_page_finds_the_packets_of_the_command(page: ViserPage) -> None:
-    chance, reader = random.Random(1), PacketReader()
-    stream = b""
-    for _ in range(200):
-        data = bytes(chance.choice((chance.randrange(256), 0xFF)) for _ in range(2))
-        good = Packet(chance.randrange(254), chance.randrange(256), data).encoded
-        # Whole, cut off, or as one wrong byte.
-        stream += chance.choice((good, good, good[: chance.randrange(8)], b"\xff"))
-    parts = [stream[at : at + 7] for at in range(0, len(stream), 7)]
-    expected = [each for part in parts for each in reader.feed(part)]
-    found = page.page.evaluate(PACKETS, [list(part) for part in parts])
-    assert 50 < len(expected) < 200
-    assert found == [
-        [each.id, each.code, list(each.parameters), HOMING_OFFSET.decoded(each.parameters[:2])]
-        for each in expected
-    ]
-
-
-def test_page_runs_no_other_program_if_that_of_the_leader_is_refused(page: ViserPage) -> None:
-    page.page.evaluate(SERIAL, [list(OFFSETS), sum(RANGE) / 2.0, list(START)])
-    limits = {"lower": [-3.0] * 5, "upper": [3.0] * 5, "gripper": None}
-    text = json.dumps(calibration())
-    assert page.page.evaluate(REFUSED, [limits, text]) == [True, "program"]
-
-
-def test_only_our_page_may_ask_for_a_serial_port(server: AppServer) -> None:
-    cookie = enter(server.url)
-    found = {}
-    for path in ("/", "/static/page.js", "/viser/", "/api/v1/state"):
-        request = urllib.request.Request(server.url + path, headers={"Cookie": cookie})
-        with urllib.request.urlopen(request, timeout=10.0) as answer:
-            found[path] = "serial=(self)" in answer.headers["Permissions-Policy"]
-    assert found == {"/": True, "/static/page.js": False, "/viser/": False, "/api/v1/state": False}

@@ -23,5 +23,5 @@ export default [
       "prefer-const": "error",
     },
   },
-  { files: ["static/{arm,episodes,instruments,jog,leader,more,objects,people,scene,selection,sheet,teach,timeline,touch,welcome}/*.js"], languageOptions: { sourceType: "module" } },
+  { files: ["static/{arm,episodes,instruments,jog,more,objects,people,scene,selection,sheet,teach,timeline,touch,welcome}/*.js"], languageOptions: { sourceType: "module" } },
 ];

@@ -18,7 +18,6 @@ from katana450.extensions.leader.follower import (
     Say,
 )
 from tests.leader.follower_bench import PERIOD, Bench, N, program
-from tests.leader.scripted_leader import scripted
 
 
 def texts(actions: list[Action]) -> str:
@@ -197,10 +196,3 @@ def test_fingers_wait_until_the_jaw_has_met_them() -> None:
     assert 3 <= len(grips) <= 10
     assert max(each.angle for each in grips) < 0.6
     assert grips[-1].angle < 0.15
-
-
-def test_random_script_reaches_every_phase_and_action() -> None:
-    _, results = scripted(seed=1)
-    assert {phase for phase, *_ in results} == {each.value for each in LeadPhase}
-    done = {each["act"] for _, *acts in results for each in acts}
-    assert done == {"say", "ease", "end", "sample", "finger", "release"}

@@ -56,7 +56,7 @@ def page_routes(
 
     async def page(request: Request) -> Response:
         origin = stop_path.origin_beside(request.headers["host"])
-        return security.with_serial(index.answer(request, security.page_policy(inline, origin)))
+        return index.answer(request, security.page_policy(inline, origin))
 
     async def file(request: Request) -> Response:
         found = static.get(request.path_params["name"])

@@ -7,18 +7,12 @@ from contextlib import suppress
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect
-from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from katana450.server.web.authenticator import UNKNOWN_HOST, Address, framing_fault
 from katana450.server.web.bodies import refusal
 
 SAFE_METHODS = ("GET", "HEAD")
-
-FEATURES = "Permissions-Policy"
-
-USED = "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), payment=(), usb=(), "
-"""Features that documents may use, except serial ports, which only our own page may ask for."""
 
 EVERYWHERE = {
     # Static files set another value.
@@ -27,7 +21,8 @@ EVERYWHERE = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
-    FEATURES: USED + "serial=()",
+    "Permissions-Policy": "gamepad=(self), hid=(self), camera=(), geolocation=(), microphone=(), "
+    "payment=(), usb=(), serial=()",
 }
 
 FOR_PROGRAMS = ("/api/", "/rosbridge")
@@ -61,12 +56,6 @@ def content_policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
     """Return a content security policy: ``sources`` by their kind, then ``ends`` as they are."""
     parts = [f"{kind}-src {' '.join(each)}" for kind, each in sources.items()]
     return "; ".join((*parts, *ends))
-
-
-def with_serial(response: Response) -> Response:
-    """Return ``response``, our own page, with the permission to ask for a serial port."""
-    response.headers[FEATURES] = USED + "serial=(self)"
-    return response
 
 
 class SecurityMiddleware:
