@@ -27,18 +27,13 @@ def _emulate(options: Namespace) -> int:
 
 
 def _arm(options: Namespace) -> int:
-    match options.act:
-        case "probe":
-            from katana450.extensions.real_arm.commands.probe import probe
+    if options.act == "probe":
+        from katana450.extensions.real_arm.commands.probe import probe
 
-            return probe(options)
-        case "log":
-            from katana450.extensions.real_arm.commands.exchange_lines import show_log
+        return probe(options)
+    from katana450.extensions.real_arm.commands.exchange_lines import show_log
 
-            return show_log(options)
-    from katana450.extensions.real_arm.commands.operate import operate
-
-    return operate(options)
+    return show_log(options)
 
 
 def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
@@ -69,7 +64,7 @@ EXTENSION = Extension(
     (
         CliCommand(
             "arm",
-            "probe, calibrate or release a real arm, or show its log",
+            "probe a real arm, or show its log",
             add_arm_command_options,
             _arm,
         ),

@@ -22,9 +22,6 @@ STOP_BUTTON = (
 
 ADDRESS_HELP = "address of the arm: tcp://HOST, tcp://HOST:PORT or serial:///dev/ttyUSB0"
 
-TRIALS = ("bad-crc", "pipelining", "second-client")
-"""Trials of the probe that move nothing but can disturb the connection."""
-
 MAX_REPEATS = 10_000
 
 WIDEST_OBJECT = 120.0
@@ -73,11 +70,9 @@ def add_emulate_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommands probe, calibrate, release and log of ``katana450 arm`` to ``parser``."""
+    """Add the subcommands probe and log of ``katana450 arm`` to ``parser``."""
     parser.description = STOP_BUTTON
-    acts = parser.add_subparsers(
-        dest="act", required=True, metavar="probe | calibrate | release | log"
-    )
+    acts = parser.add_subparsers(dest="act", required=True, metavar="probe | log")
     probe = acts.add_parser(
         "probe",
         help="ask an arm all that can be learned without a motion, and write a report",
@@ -96,34 +91,7 @@ def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="report as JSON; the same in words is written beside it (default: named by the time)",
     )
-    probe.add_argument(
-        "--try",
-        dest="trials",
-        choices=TRIALS,
-        nargs="+",
-        default=[],
-        help="also send a request with a wrong checksum, two requests at once, or connect twice: "
-        "nothing moves, but the arm may need to be switched off afterwards",
-    )
-    calibrate = acts.add_parser(
-        "calibrate",
-        help="let an arm search its mechanical stops: it moves by itself",
-        description=f"The arm moves by itself for about 30 s. {STOP_BUTTON}",
-    )
-    release = acts.add_parser(
-        "release",
-        help="switch the motors off: the arm falls",
-        description=f"Motors off means the arm falls. {STOP_BUTTON}",
-    )
-    for act in (probe, calibrate, release):
-        act.add_argument("url", metavar="URL", help=ADDRESS_HELP)
-    for act in (calibrate, release):
-        act.add_argument(
-            "--yes-i-hold-the-arm",
-            dest="confirmed",
-            action="store_true",
-            help="confirm both questions; counts only where nobody can be asked",
-        )
+    probe.add_argument("url", metavar="URL", help=ADDRESS_HELP)
     log = acts.add_parser("log", help="show the exchanges that `serve --arm-log FILE` has written")
     log.add_argument("file", type=Path, metavar="FILE", help="file of the exchanges")
     log.add_argument(

@@ -7,7 +7,7 @@ import statistics
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,17 +16,12 @@ from katana450.assembly.log_lines import printable
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.version import version
 from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.codec.crc import crc16
-from katana450.extensions.real_arm.codec.host_codec import ADDRESS, START, request_bytes
+from katana450.extensions.real_arm.codec.host_codec import request_bytes
 from katana450.extensions.real_arm.codec.replies import AXES, ArmReply
 from katana450.extensions.real_arm.commands.probe_report import report_text
 from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.real_arm.link.transport import (
-    ArmRefusalError,
-    LinkLostError,
-    Transport,
-)
+from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
 
 TIMEOUT = 2.0
 """[s] Longest time for which the probe waits for a reply: an unknown arm may be slow."""
@@ -62,13 +57,10 @@ def probe(options: Namespace) -> int:
         "address": str(url),
         "repeats": options.repeat,
         "readings": {},
-        "trials": {},
     }
     lost = ""
     try:
         read_arm(ArmLink(url.open()), options.repeat, report["readings"])
-        for trial in options.trials:
-            report["trials"][trial] = TRIAL_FUNCTIONS[trial](url)
     except LinkLostError as error:
         lost = report["lost"] = str(error)
     text = report_text(report)
@@ -136,83 +128,6 @@ def _plain(value: object) -> object:
     if isinstance(value, bytes):
         return value.decode("ascii") if value.isascii() and value.strip(b"\0") else value.hex(" ")
     return list(value) if isinstance(value, tuple) else value
-
-
-def _raw(transport: Transport, data: bytes, wait: float = 1.0) -> str:
-    """Send ``data`` and return all bytes that arrive within ``wait`` [s], as hexadecimals."""
-    transport.write(data, TIMEOUT)
-    end = time.monotonic() + wait
-    received = b""
-    while (left := end - time.monotonic()) > 0.0:
-        received += transport.read(left)
-    return received.hex(" ")
-
-
-def _answers(url: ArmUrl) -> bool:
-    """Return whether the arm answers on a new connection."""
-    try:
-        link = ArmLink(url.open())
-        link.exchange(req.EchoRequest(), TIMEOUT)
-    except LinkLostError:
-        return False
-    link.close()
-    return True
-
-
-def _try_bad_crc(url: ArmUrl) -> Report:
-    payload = req.ReadMasterVersion().payload
-    crc = crc16(payload) ^ 0xFFFF
-    transport = url.open()
-    try:
-        sent = bytes((START, ADDRESS, len(payload))) + payload + crc.to_bytes(2, "big")
-        reply = _raw(transport, sent)
-        reason = _raw(transport, req.ErrorQuery().payload) if reply.startswith("c0") else ""
-    except LinkLostError as error:
-        return {"reply": str(error), "answers_afterwards": _answers(url)}
-    finally:
-        transport.close()
-    return {"reply": reply, "reason": reason, "answers_afterwards": _answers(url)}
-
-
-def _try_pipelining(url: ArmUrl) -> Report:
-    transport = url.open()
-    two = request_bytes(req.ReadMasterVersion()) + request_bytes(req.ReadPositions())
-    try:
-        reply = _raw(transport, two)
-    except LinkLostError as error:
-        reply = str(error)
-    finally:
-        transport.close()
-    return {"reply": reply, "answers_afterwards": _answers(url)}
-
-
-def _try_second_client(url: ArmUrl) -> Report:
-    first = ArmLink(url.open())
-    found: Report = {}
-    try:
-        first.exchange(req.EchoRequest(), TIMEOUT)
-        try:
-            second = ArmLink(url.open())
-            second.exchange(req.EchoRequest(), TIMEOUT)
-            found["second"] = "it is answered"
-            second.close()
-        except LinkLostError as error:
-            found["second"] = str(error)
-        try:
-            first.exchange(req.EchoRequest(), TIMEOUT)
-            found["first"] = "it is still answered"
-        except LinkLostError as error:
-            found["first"] = str(error)
-    finally:
-        first.close()
-    return found | {"answers_afterwards": _answers(url)}
-
-
-TRIAL_FUNCTIONS: dict[str, Callable[[ArmUrl], Report]] = {
-    "bad-crc": _try_bad_crc,
-    "pipelining": _try_pipelining,
-    "second-client": _try_second_client,
-}
 
 
 def printable_lines(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The report of a probe in words: what was learned, and what cannot be learned without a motion."""
+"""The report of a probe in words: what was learned, and what cannot be learned by reading."""
 
 from __future__ import annotations
 
@@ -17,15 +17,9 @@ NOT_LEARNED = (
     "the scale of the sensors: press and approach them by hand, and probe again",
     "what the arm does when the connection is lost in a motion; assume that it continues",
     "the counts of axis 3, the sign of speeds, and the place where a calibration ends",
+    "the answers to a wrong checksum, to two requests at once, and to a second client",
 )
 """Open questions that a reading cannot answer."""
-
-TRIAL_QUESTIONS = {
-    "bad-crc": "the answer to a request with a wrong checksum",
-    "pipelining": "the answer to two requests at once",
-    "second-client": "the reaction to a second client",
-}
-"""Open questions that a trial answers, by its name."""
 
 
 def report_text(report: Report) -> str:
@@ -47,20 +41,8 @@ def _lines(report: Report) -> Iterator[str]:
     yield ""
     yield from _findings(readings)
     yield ""
-    yield "Not learned, because it needs a motion or an order:"
+    yield "Not learned, because it needs more than reading:"
     yield from (f"  {each}" for each in NOT_LEARNED)
-    trials = report["trials"]
-    missing = [
-        f"  {TRIAL_QUESTIONS[each]} (--try {each})"
-        for each in TRIAL_QUESTIONS
-        if each not in trials
-    ]
-    if missing:
-        yield "Not tried:"
-        yield from missing
-    for name, found in trials.items():
-        values = ", ".join(f"{key.replace('_', ' ')}: {value}" for key, value in found.items())
-        yield f"Tried: {TRIAL_QUESTIONS[name]}. {values}"
 
 
 def _notes(reading: Report) -> str:
