@@ -37,7 +37,6 @@ const Jog = (() => {
   /** @type {(request: object) => void} */
   let say = () => {};
   let stop = () => {};
-  /** @type {(hz: number) => void} */
 
   function quiet() {
     keys.clear();
