@@ -18,6 +18,7 @@ from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.commands.exchange_lines import ExchangeDecoder
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.extensions.real_arm.emulator.axis import AxisMode
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTransport
@@ -69,7 +70,9 @@ def test_probe_writes_what_the_arm_tells(server: EmulatorServer, tmp_path: Path)
     text = out.with_suffix(".txt").read_text()
     assert "State of axis 1: 0 (its motor is off)" in text
     assert "the depth of the buffer of polynomials" in text
-    assert {axis.flag for axis in server.arm.axes} == {0}, "no motor was ordered anything"
+    assert {axis.mode for axis in server.arm.axes} == {AxisMode.OFF}, (
+        "no motor was ordered anything"
+    )
 
 
 def test_probe_without_an_arm_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:

@@ -13,13 +13,12 @@ import pytest
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.errors import InputError
-from katana450.extensions.real_arm.codec import replies, requests
+from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.firmware_codec import refusal_bytes, reply_bytes
 from katana450.extensions.real_arm.codec.replies import FirmwareError
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.real_arm.link.transport import LinkLostError
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, HOME, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware
@@ -126,14 +125,13 @@ def test_arm_that_hangs_never_delays_the_loop() -> None:
         assert loop.longest < 0.03
 
 
-def test_thread_that_hangs_is_reported_by_send() -> None:
+def test_thread_that_hangs_is_reported_by_send(monkeypatch: pytest.MonkeyPatch) -> None:
     with served() as (_, _, loop):
         loop.engage()
         driver = loop.driver
         assert isinstance(driver, KatanaDriver)
-        future = driver.ask(requests.ReadInputs())
-        # A callback runs in the thread of the driver.
-        future.add_done_callback(lambda _: time.sleep(1.2))
+        delays, turn = iter([1.2]), driver._turn
+        monkeypatch.setattr(driver, "_turn", lambda: (time.sleep(next(delays, 0.0)), turn()))
         # Counted from the request before, which was sent up to two polls earlier.
         assert 0.2 < loop.wait(ArmMode.LOST) < 0.5
         assert "has not heard" in loop.report.note
@@ -168,21 +166,6 @@ def test_end_of_the_program_stops_a_moving_arm() -> None:
         loop.driver.stop()
         flags = [r.flag for _, r in paper.arm.requests if isinstance(r, requests.CommandMotor)]
         assert flags[-6:] == [32, 8, 8, 8, 8, 8]
-
-
-def test_inputs_and_outputs_are_asked_for_beside_the_motion() -> None:
-    with served() as (_, _, loop):
-        driver = loop.driver
-        assert isinstance(driver, KatanaDriver)
-        loop.engage()
-        assert driver.ask(requests.ReadInputs()).result(1.0) == replies.DigitalBits(1)
-        assert driver.ask(requests.WriteOutputs(6)).result(1.0) == replies.DigitalBits(1)
-        with pytest.raises(InputError, match="reserved for the driver"):
-            driver.ask(requests.CommandMotor(1, 24, 0))
-        loop.stop()
-        loop.act(ArmAct.DISCONNECT, ArmMode.DISCONNECTED)
-        with pytest.raises(LinkLostError):
-            driver.ask(requests.ReadInputs()).result(1.0)
 
 
 def test_internal_error_is_a_loss_and_does_not_end_the_thread(

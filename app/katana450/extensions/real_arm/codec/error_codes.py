@@ -35,18 +35,14 @@ COMMANDS = {
     "C": "motor command",
     "D": "axis state",
     "E": "sensors",
-    "G": "polynomial of an axis",
     "H": "polynomials",
-    "I": "motor flag",
-    "M": "Modbus",
     "N": "states or positions",
     "S": "axis parameter",
-    "T": "digital inputs and outputs",
+    "T": "digital inputs",
     "V": "slave firmware",
     "X": "command table",
     "Y": "identity",
     "Z": "echo",
-    "\xc7": "start of polynomials",
 }
 
 

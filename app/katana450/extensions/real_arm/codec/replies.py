@@ -155,11 +155,6 @@ class AxisParameters(ArmReply):
     r2: int
     r3: int
 
-    @property
-    def force(self) -> int:
-        """Force, as a signed byte, in the answer to parameter 244."""
-        return self.r2 - 256 if self.r2 > 127 else self.r2
-
 
 @dataclass(frozen=True)
 class CollisionDetectionSet(ArmReply):
@@ -181,24 +176,6 @@ class SensorBytes(ArmReply):
 
 
 @dataclass(frozen=True)
-class SplineStored(ArmReply):
-    """Answer to the polynomial of one axis. ``result``: unknown."""
-
-    HEAD = b"g"
-    LAYOUT = struct.Struct(">B")
-    result: int = 0
-
-
-@dataclass(frozen=True)
-class SplinesStarted(ArmReply):
-    """Answer to the start of stored polynomials. ``result``: unknown."""
-
-    HEAD = b"\xe7"
-    LAYOUT = struct.Struct(">B")
-    result: int = 0
-
-
-@dataclass(frozen=True)
 class SplinesSent(ArmReply):
     """Answer to the polynomials of all axes. ``results``: two bytes of unknown meaning."""
 
@@ -208,33 +185,12 @@ class SplinesSent(ArmReply):
 
 
 @dataclass(frozen=True)
-class MotorFlagReading(ArmReply):
-    """Newest motor command of an axis."""
-
-    HEAD = b"i"
-    LAYOUT = struct.Struct(">BB")
-    axis: int
-    flag: int
-
-
-@dataclass(frozen=True)
 class DigitalBits(ArmReply):
     """Digital inputs: input n is bit n - 1, 0 while it is active."""
 
     HEAD = b"t"
     LAYOUT = struct.Struct(">B")
     bits: int
-
-
-@dataclass(frozen=True)
-class RegisterValue(ArmReply):
-    """Modbus register, with a last byte of unknown meaning. The order of the bytes is doubtful."""
-
-    HEAD = b"m"
-    LAYOUT = struct.Struct(">BBB")
-    low: int
-    high: int
-    rest: int = 0
 
 
 @dataclass(frozen=True)

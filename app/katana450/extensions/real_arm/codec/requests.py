@@ -15,9 +15,6 @@ from katana450.extensions.real_arm.codec.wire_message import WireMessage
 ALL_AXES = 0
 """Number that stands for all axes in a motor command."""
 
-SET_ENCODER = 128
-"""Added to the axis of a motor command: its encoder is set to the value, without a motion."""
-
 SENSOR_CONTROLLER = 15
 """Number of the controller with the sensors of the gripper."""
 
@@ -119,8 +116,8 @@ class CommandMotor(ArmRequest):
     """Order to the motor of one axis or, with axis 0, of all.
 
     Attributes:
-        axis: 1 to 6, ALL_AXES, or an axis plus SET_ENCODER.
-        flag: A ``MotorFlag``, as a number because real clients may send others.
+        axis: 1 to 6, or ALL_AXES.
+        flag: A ``MotorFlag``.
         value: Target or position [encoders]; 32000 for a calibration.
     """
 
@@ -138,11 +135,11 @@ class CommandMotor(ArmRequest):
 
 @dataclass(frozen=True)
 class SetAxisParameter(ArmRequest):
-    """Set a parameter of an axis, or read it for numbers from 244.
+    """Set a parameter of an axis.
 
     Attributes:
         axis: 1 to 6.
-        parameter: 3 speed limits, 4 acceleration, 10 current limits [%], 244 read the force, ...
+        parameter: 3 speed limits, 4 acceleration, 10 current limits [%], ...
         p1, p2, p3: Values, 0 without a meaning.
     """
 
@@ -213,22 +210,6 @@ class AxisSegment(NamedTuple):
         return self.p1 / 64 + tick * (self.p2 / 512 + tick * 3 * self.p3 / 32768)
 
 
-@dataclass(frozen=True)
-class StoreSpline(ArmRequest):
-    """Polynomial of one axis, kept until ``StartSplines``; for a Katana300 or 400."""
-
-    HEAD = b"G"
-    LAYOUT = struct.Struct(">B6h")
-    REPLY = replies.SplineStored
-    axis: int
-    target: int
-    ticks: int
-    p0: int
-    p1: int
-    p2: int
-    p3: int
-
-
 class More(IntEnum):
     """Position of a packet of polynomials in a motion."""
 
@@ -241,25 +222,13 @@ class More(IntEnum):
 
 
 @dataclass(frozen=True)
-class StartSplines(ArmRequest):
-    """Start of the polynomials that were stored one by one."""
-
-    HEAD = b"\xc7"
-    LAYOUT = struct.Struct(">BB")
-    REPLY = replies.SplinesStarted
-    more: int
-    exact: int
-
-
-@dataclass(frozen=True)
 class SendSplines(ArmRequest):
     """Polynomials of all axes, in one packet.
 
     Attributes:
-        segments: (6,) One for each axis. The firmware ignores that of the gripper unless bit 1 of
-            ``exact`` is set; on real arms it never moved the gripper.
+        segments: (6,) One for each axis. That of the gripper never moved it on real arms.
         more: A value of ``More``.
-        exact: Bit 0: the position is controlled after the motion. Bit 1: axis 6 follows too.
+        exact: 1: the position is controlled after the motion.
     """
 
     HEAD = b"H"
@@ -281,63 +250,12 @@ class SendSplines(ArmRequest):
 
 
 @dataclass(frozen=True)
-class ReadMotorFlag(ArmRequest):
-    """Read the newest motor command of an axis."""
-
-    HEAD = b"I"
-    LAYOUT = struct.Struct(">B")
-    REPLY = replies.MotorFlagReading
-    axis: int
-
-
-@dataclass(frozen=True)
 class ReadInputs(ArmRequest):
     """Read the digital inputs."""
 
     HEAD = b"Tr"
     LAYOUT = struct.Struct(">3x")
     REPLY = replies.DigitalBits
-
-
-@dataclass(frozen=True)
-class WriteOutputs(ArmRequest):
-    """Write the digital outputs: output n is bit n."""
-
-    HEAD = b"Tw"
-    LAYOUT = struct.Struct(">B2x")
-    REPLY = replies.DigitalBits
-    bits: int
-
-
-@dataclass(frozen=True)
-class SetLed(ArmRequest):
-    """Set the lamp of the arm. ``color``: letter r or g, or 0 for off."""
-
-    HEAD = b"Tl"
-    LAYOUT = struct.Struct(">B2x")
-    REPLY = replies.DigitalBits
-    color: int
-
-
-@dataclass(frozen=True)
-class ReadRegister(ArmRequest):
-    """Read a Modbus register."""
-
-    HEAD = b"MR"
-    LAYOUT = struct.Struct(">B2x")
-    REPLY = replies.RegisterValue
-    register: int
-
-
-@dataclass(frozen=True)
-class WriteRegister(ArmRequest):
-    """Write a Modbus register."""
-
-    HEAD = b"MW"
-    LAYOUT = struct.Struct(">Bh")
-    REPLY = replies.RegisterValue
-    register: int
-    value: int
 
 
 @dataclass(frozen=True)
@@ -351,8 +269,7 @@ class ErrorQuery(ArmRequest):
 REQUESTS: tuple[type[ArmRequest], ...] = (
     EchoRequest, ReadMasterVersion, ReadArmIdentity, ReadCommandTable, ReadSlaveVersion, ReadAxis,
     ReadStates, ReadPositions, CommandMotor, SetAxisParameter, SetCollisionDetection, ReadSensors,
-    StoreSpline, StartSplines, SendSplines, ReadMotorFlag, ReadInputs, WriteOutputs, SetLed,
-    ReadRegister, WriteRegister,
+    SendSplines, ReadInputs,
 )  # fmt: skip
 """Requests that are sent in frames: all but ``ErrorQuery``."""
 

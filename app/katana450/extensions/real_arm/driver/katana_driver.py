@@ -7,7 +7,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,8 +17,6 @@ from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError, KatanaError
-from katana450.extensions.real_arm.codec import requests
-from katana450.extensions.real_arm.codec.replies import ArmReply
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.encoders import EncoderMap
@@ -51,16 +48,6 @@ MAX_SETPOINTS = 1000
 """Setpoints that wait for a thread that hangs, at most."""
 
 JOINTS = 5
-
-SAFE_REQUESTS = (
-    requests.EchoRequest,
-    requests.ReadInputs,
-    requests.WriteOutputs,
-    requests.SetLed,
-    requests.ReadRegister,
-    requests.WriteRegister,
-)
-"""Requests that others may ask for: none of them moves the arm."""
 
 log = logging.getLogger(__name__)
 
@@ -106,7 +93,6 @@ class KatanaDriver:
         self._retry, self._retry_at = SHORTEST_RETRY, -np.inf
         self._setpoints: deque[_Setpoint] = deque(maxlen=MAX_SETPOINTS)
         self._acts: deque[ArmAct] = deque()
-        self._asked: deque[tuple[ArmRequest, Future[ArmReply]]] = deque()
         self._wake = threading.Event()
         self._ending = threading.Event()
         self._stop_pressed = threading.Event()
@@ -161,17 +147,6 @@ class KatanaDriver:
         self._stop_pressed.set()
         self._wake.set()
 
-    def ask(self, request: ArmRequest) -> Future[ArmReply]:
-        """Return the coming reply to a request about inputs, outputs, the lamp or a register.
-
-        The future raises ArmRefusalError and LinkLostError. Raises InputError for other requests.
-        """
-        if not isinstance(request, SAFE_REQUESTS):
-            raise InputError(f"{type(request).__name__} is reserved for the driver itself.")
-        future: Future[ArmReply] = Future()
-        self._asked.append((request, future))
-        return future
-
     def stop(self) -> None:
         """Stop an arm that moves, and disconnect. Its motors keep holding it."""
         self._ending.set()
@@ -208,11 +183,9 @@ class KatanaDriver:
             self._sleep(UNCONNECTED_TIME)
         elif self._link is None:
             self._connect(now)
-        elif (request := machine.urgent(now)) is not None:
-            self._exchange(request)
-        elif self._asked:
-            self._exchange_asked()
-        elif (request := machine.poll(now)) is not None:
+        elif (request := machine.urgent(now)) is not None or (
+            request := machine.poll(now)
+        ) is not None:
             self._exchange(request)
         else:
             self._sleep()
@@ -261,16 +234,6 @@ class KatanaDriver:
             self._retry = SHORTEST_RETRY
             self._machine.replied(request, reply, sent, self._clock())
 
-    def _exchange_asked(self) -> None:
-        assert self._link is not None
-        request, future = self._asked.popleft()
-        try:
-            future.set_result(self._link.exchange(request))
-        except KatanaError as error:
-            future.set_exception(error)
-            if isinstance(error, LinkLostError):
-                self._lose(str(error))
-
     def _lose(self, problem: str) -> None:
         """Drop the connection, and connect again after a while."""
         self._close()
@@ -282,9 +245,6 @@ class KatanaDriver:
         if self._link is not None:
             self._link.close()
             self._link = None
-        while self._asked:
-            _, future = self._asked.popleft()
-            future.set_exception(LinkLostError("There is no connection to the arm."))
 
     def _publish(self) -> None:
         """Let the control loop have what has changed."""

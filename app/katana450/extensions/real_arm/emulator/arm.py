@@ -1,4 +1,4 @@
-"""The emulated arm: six axes in motion, its gripper and its digital lines, without I/O."""
+"""The emulated arm: six axes in motion and its gripper, without I/O."""
 
 from __future__ import annotations
 
@@ -19,10 +19,6 @@ from katana450.extensions.real_arm.plant.profile import KATANA450, PlantProfile
 
 GRIPPER = 5
 """Number of the axis of the gripper, from 0."""
-
-NO_INPUT = 0xFD
-"""Digital inputs after power-up. With 0xFF, no active input, clients of the maker report a failure.
-"""
 
 LOAD_INTERVAL = 8
 """Steps after which the weights on the axes are computed again: 20 ms."""
@@ -48,7 +44,6 @@ class EmulatedArm:
         time: simulated time since the start [s].
         detects_collisions: whether a blocked axis stops the arm.
         collided: axis that stopped the arm, from 1; 0 for none.
-        inputs, outputs: digital lines as bytes; an input is 0 while it is active.
         is_powered: False while the power is off.
     """
 
@@ -78,7 +73,6 @@ class EmulatedArm:
         self.time = 0.0
         self.detects_collisions = True
         self.collided = 0
-        self.inputs, self.outputs = NO_INPUT, 0
         self.is_powered = True
         self.object_width = object_width
         self._scale = calibration_scale
@@ -197,7 +191,7 @@ class EmulatedArm:
         for axis in self.axes:
             axis.power_up()
         self.is_powered, self.detects_collisions = True, True
-        self.collided, self.outputs = 0, 0
+        self.collided = 0
         self.touch()
 
     def _set_stops(self, axis: int, lower: float, upper: float) -> None:

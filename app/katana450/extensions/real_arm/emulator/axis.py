@@ -5,18 +5,14 @@ from __future__ import annotations
 from enum import Enum
 
 from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.requests import MotorFlag
 from katana450.extensions.real_arm.emulator.motors import MAX_ACCELERATION, MotorFacts
 from katana450.extensions.real_arm.emulator.spline_buffer import TICK, SplineBuffer
 from katana450.extensions.real_arm.emulator.target_move import TargetMove
 from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis
 from katana450.extensions.real_arm.plant.profile import PlantProfile
 
-SPEED_LIMIT, ACCELERATION_LIMIT, COLLISION_LIMIT, SPLINE_COLLISION_LIMIT, FORCE = 3, 4, 5, 6, 244
+SPEED_LIMIT, ACCELERATION_LIMIT, COLLISION_LIMIT, SPLINE_COLLISION_LIMIT = 3, 4, 5, 6
 """Numbers of parameters of an axis."""
-
-READ_BACK = 256
-"""Parameter ``READ_BACK - n`` reads parameter n; inferred, not seen."""
 
 PRESSING_TIME = 0.15
 """[s] Time at the whole current of the motor that counts as a collision. Assumed."""
@@ -49,7 +45,6 @@ class EmulatedAxis:
         is_calibrated: whether the offset was set by a calibration.
         is_supported: whether something holds the axis up while its motor is off.
         mode: what it does.
-        flag: newest motor command.
         status: status byte that it reports, apart from ``SPLINE_BUFFER_FULL``.
         splines: its polynomials.
         setpoint: where it should be [counts].
@@ -69,7 +64,7 @@ class EmulatedAxis:
         )
         self.splines = SplineBuffer()
         self._move = TargetMove(position, 0.0, position)
-        self.mode, self.status, self.flag = AxisMode.OFF, AxisStatus.OFF, 0
+        self.mode, self.status = AxisMode.OFF, AxisStatus.OFF
         # The weight under which nothing changes any more, until the axis is touched.
         self._still_under: float | None = None
         self.setpoint, self._speed, self._pressed = position, 0.0, 0.0
@@ -87,7 +82,6 @@ class EmulatedAxis:
         self.offset = -round(self.plant.position)
         self.is_calibrated = self.is_supported = False
         self.turn_off()
-        self.flag = 0
 
     @property
     def position(self) -> int:
@@ -108,22 +102,22 @@ class EmulatedAxis:
 
     def turn_off(self) -> None:
         """Switch the current off. The weight moves the axis then."""
-        self._enter(AxisMode.OFF, AxisStatus.OFF, MotorFlag.OFF)
+        self._enter(AxisMode.OFF, AxisStatus.OFF)
 
     def freeze(self) -> None:
         """Brake, and hold where the axis comes to rest."""
-        self._enter(AxisMode.BRAKE, AxisStatus.FIXED, MotorFlag.FREEZE)
+        self._enter(AxisMode.BRAKE, AxisStatus.FIXED)
 
     def collide(self) -> None:
         """Brake and hold as after a collision."""
-        self._enter(AxisMode.BRAKE, AxisStatus.COLLIDED, self.flag)
+        self._enter(AxisMode.BRAKE, AxisStatus.COLLIDED)
 
     def move_to(self, reading: int) -> None:
         """Move to the encoder value ``reading``."""
         start = self._move if self.mode is AxisMode.TARGET else None
         position = self.setpoint if start or self.mode is AxisMode.HOLD else self.plant.position
         speed = start.speed if start else 0.0
-        self._enter(AxisMode.TARGET, AxisStatus.MOVING_TO_TARGET, MotorFlag.MOVE)
+        self._enter(AxisMode.TARGET, AxisStatus.MOVING_TO_TARGET)
         self._move = TargetMove(position, speed, reading - self.offset)
 
     def start_splines(self, more: int) -> None:
@@ -136,7 +130,7 @@ class EmulatedAxis:
 
     def begin_calibration(self) -> None:
         """Let ``calibrate`` lead the axis from now on."""
-        self._enter(AxisMode.CALIBRATE, AxisStatus.CALIBRATING, MotorFlag.CALIBRATE)
+        self._enter(AxisMode.CALIBRATE, AxisStatus.CALIBRATING)
 
     def lead(self, setpoint: float, speed: float) -> None:
         """Set the setpoint [counts] and its speed [counts/s] during a calibration."""
@@ -203,14 +197,8 @@ class EmulatedAxis:
         deviation = abs(self.setpoint - self.plant.position)
         return deviation > (256 * high + low) or self._pressed > PRESSING_TIME
 
-    def parameter(self, number: int) -> tuple[int, int, int]:
-        """Return the bytes with which the axis answers that parameter ``number`` is read."""
-        if number == FORCE:
-            return 0, round(self.plant.effort * PWM_MAX) % 256, 0
-        return self.parameters.get(READ_BACK - number, (0, 0, 0))
-
-    def _enter(self, mode: AxisMode, status: AxisStatus, flag: int) -> None:
-        self.mode, self.status, self.flag = mode, status, flag
+    def _enter(self, mode: AxisMode, status: AxisStatus) -> None:
+        self.mode, self.status = mode, status
         self.touch()
         self.splines.clear()
         self.setpoint, self._speed, self._pressed = self.plant.position, 0.0, 0.0

@@ -17,7 +17,7 @@ from katana450.extensions.real_arm.codec.firmware_codec import (
     reply_bytes,
 )
 from katana450.extensions.real_arm.emulator.arm import GRIPPER, EmulatedArm
-from katana450.extensions.real_arm.emulator.axis import READ_BACK, AxisMode, EmulatedAxis
+from katana450.extensions.real_arm.emulator.axis import AxisMode, EmulatedAxis
 from katana450.extensions.real_arm.emulator.spline_buffer import TICK
 
 VERSION = (2, 1)
@@ -31,11 +31,12 @@ STATE_MISMATCH, NOT_OPERATIONAL, SPLINE_FAILED = -3, -7, -9
 COLLISION_AXIS = 30
 """Axis field of the error after a collision, as seen on a real arm; its text names the axis."""
 
-READ_FROM = 244
-"""Smallest number of a parameter that is read."""
+PARAMETERS = 12
+"""Number above those of the parameters that are set."""
 
-EXACT_GRIPPER = 2
-"""Bit of ``exact`` with which axis 6 follows its polynomial."""
+NO_INPUT = 0xFD
+"""Digital inputs without a signal. With 0xFF, no active input, clients of the maker report a
+failure."""
 
 NO_ERROR = replies.FirmwareError(0, -1, 0, "")
 
@@ -61,7 +62,6 @@ class Firmware:
     def __init__(self, arm: EmulatedArm) -> None:
         self.arm = arm
         self._error = NO_ERROR
-        self._registers: dict[int, int] = {}
 
     def handle(self, event: FirmwareEvent) -> bytes:
         """Execute what was received and return the bytes of the answer."""
@@ -86,7 +86,7 @@ class Firmware:
                 return replies.AxisStates(tuple(axis.reported_status for axis in arm.axes))
             case req.ReadPositions():
                 return replies.AxisPositions(tuple(axis.position for axis in arm.axes))
-            case req.SendSplines() | req.StoreSpline() | req.StartSplines():
+            case req.SendSplines():
                 return self._splines(request)
             case req.CommandMotor():
                 return self._command(request)
@@ -97,14 +97,11 @@ class Firmware:
                 return replies.CollisionDetectionSet()
             case req.ReadSensors(controller):
                 return replies.SensorBytes(controller, arm.sensors)
-            case req.ReadMotorFlag(axis):
-                return replies.MotorFlagReading(axis, self._axis(axis).flag)
             case _:
                 return self._facts(request)
 
     def _facts(self, request: req.ArmRequest) -> replies.ArmReply:
         """Answer the requests that concern no motion."""
-        arm = self.arm
         match request:
             case req.EchoRequest():
                 return replies.EchoReply()
@@ -118,18 +115,7 @@ class Firmware:
                 self._axis(axis)
                 return replies.SlaveVersion(axis, parameter, 2, 1, 0, 0, 0)
             case req.ReadInputs():
-                return replies.DigitalBits(arm.inputs)
-            case req.WriteOutputs(bits):
-                arm.outputs = bits
-                return replies.DigitalBits(bits)
-            case req.SetLed(color):
-                return replies.DigitalBits(color)
-            case req.ReadRegister(register):
-                value = self._registers.get(register, 0) & 0xFFFF
-                return replies.RegisterValue(value & 0xFF, value >> 8)
-            case req.WriteRegister(register, value):
-                self._registers[register] = value
-                return replies.RegisterValue(value & 0xFF, value >> 8 & 0xFF)
+                return replies.DigitalBits(NO_INPUT)
         raise RequestError(INVALID_ARGUMENT, 0, "unknown command")
 
     def _refuse(self, payload: bytes, refusal: RequestError) -> bytes:
@@ -162,10 +148,6 @@ class Firmware:
 
     def _command(self, request: req.CommandMotor) -> replies.MotorCommanded:
         arm, number, flag = self.arm, request.axis, request.flag
-        if number >= req.SET_ENCODER:
-            axis = self._axis(number - req.SET_ENCODER)
-            axis.offset = request.value - round(axis.plant.position)
-            return replies.MotorCommanded(number, flag)
         if number != req.ALL_AXES:
             self._axis(number)
         match flag:
@@ -193,41 +175,27 @@ class Firmware:
     def _parameter(self, request: req.SetAxisParameter) -> replies.AxisParameters:
         axis, number = self._axis(request.axis), request.parameter
         values = (request.p1, request.p2, request.p3)
-        if number >= READ_FROM:
-            values = axis.parameter(number)
-        elif 0 < number < READ_BACK - READ_FROM:
-            axis.parameters[number] = values
-        else:
+        if not 0 < number < PARAMETERS:
             raise RequestError(INVALID_ARGUMENT, request.axis, f"unknown parameter {number}")
+        axis.parameters[number] = values
         return replies.AxisParameters(request.axis, number, *values)
 
-    def _splines(
-        self, request: req.SendSplines | req.StoreSpline | req.StartSplines
-    ) -> replies.ArmReply:
+    def _splines(self, request: req.SendSplines) -> replies.SplinesSent:
         arm = self.arm
-        if isinstance(request, req.StoreSpline):
-            segment = _segment_of(request)
-            self._free_axis(request.axis, segment).splines.store(segment, req.More.STORE)
-            return replies.SplineStored()
         if request.more not in (req.More.START, req.More.LAST, req.More.STORE):
             raise RequestError(INVALID_ARGUMENT, 0, f"more must be 0, 1 or 2, not {request.more}")
-        followed = len(arm.axes) if request.exact & EXACT_GRIPPER else GRIPPER
-        if isinstance(request, req.StartSplines):
-            for axis in arm.axes[followed:]:
-                axis.splines.clear()
-            self._start([axis for axis in arm.axes if len(axis.splines)], request.more)
-            return replies.SplinesStarted()
-        segments = request.segments[:followed]
+        segments = request.segments[:GRIPPER]
         # All axes can take theirs, or none gets anything.
         axes = [self._free_axis(number, each) for number, each in enumerate(segments, 1)]
         for axis, segment in zip(axes, segments, strict=True):
             axis.splines.store(segment, request.more)
         if request.more != req.More.STORE:
-            self._start(arm.axes[:followed], request.more)
-            for axis in arm.axes[followed:]:
-                # A client that waits for all axes would wait for a gripper that does not follow.
-                if axis.status == AxisStatus.FIXED:
-                    axis.status = AxisStatus.SPLINES_DONE
+            for axis in arm.axes[:GRIPPER]:
+                axis.start_splines(request.more)
+            arm.touch()
+            # A client that waits for all axes would wait for a gripper that does not follow.
+            if arm.axes[GRIPPER].status == AxisStatus.FIXED:
+                arm.axes[GRIPPER].status = AxisStatus.SPLINES_DONE
         return replies.SplinesSent()
 
     def _free_axis(self, number: int, segment: req.AxisSegment) -> EmulatedAxis:
@@ -241,17 +209,6 @@ class Firmware:
         if axis.splines.is_full:
             raise RequestError(SPLINE_FAILED, number, "move buffer error")
         return axis
-
-    def _start(self, axes: list[EmulatedAxis] | tuple[EmulatedAxis, ...], more: int) -> None:
-        for axis in axes:
-            axis.start_splines(more)
-        self.arm.touch()
-
-
-def _segment_of(request: req.StoreSpline) -> req.AxisSegment:
-    return req.AxisSegment(
-        request.ticks, request.target, request.p0, request.p1, request.p2, request.p3
-    )
 
 
 def _command_table() -> bytes:
