@@ -131,7 +131,12 @@ def test_thread_that_hangs_is_reported_by_send(monkeypatch: pytest.MonkeyPatch) 
         driver = loop.driver
         assert isinstance(driver, KatanaDriver)
         delays, turn = iter([1.2]), driver._turn
-        monkeypatch.setattr(driver, "_turn", lambda: (time.sleep(next(delays, 0.0)), turn()))
+
+        def late_turn() -> None:
+            time.sleep(next(delays, 0.0))
+            turn()
+
+        monkeypatch.setattr(driver, "_turn", late_turn)
         # Counted from the request before, which was sent up to two polls earlier.
         assert 0.2 < loop.wait(ArmMode.LOST) < 0.5
         assert "has not heard" in loop.report.note

@@ -1,4 +1,4 @@
-"""Episodes of a real server: by the client and the command, through kills, without a lost one."""
+"""Episodes of a real server: by the client, through kills, without a lost one."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def move(server: AppServer, *postures: tuple[float, ...]) -> float:
 
 
 @pytest.mark.long
-def test_client_and_command_record_episodes(
+def test_client_records_episodes(
     server: AppServer, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert f"episodes in {folder}" in server.output
@@ -82,20 +82,18 @@ def test_client_and_command_record_episodes(
     assert (episode.number, episode.task, episode.outcome) == (1, "pour", "success")
     assert episode.end - episode.start > 1.0
     capsys.readouterr()
-    url = ("--url", server.url)
-    for arguments, words in (
-        (("describe", "1", "--note", "half a cup"), "is described"),
-        (("trim", "1", "--from", "0.1", "--to", "0.9"), "from 0.1 to 0.9 s"),
-        (("judge", "failure"), "Episode 1: failure"),
-        (("undo",), "as before"),
-        (("list",), "0.8 s  success     pour  (half a cup)"),
-        (("discard", "1"), "discarded"),
-        (("restore", "1"), "kept again"),
-    ):
-        assert main(["record", "episodes", *arguments, *url]) == 0
-        assert words in capsys.readouterr().out
-    assert main(["record", "episodes", "discard", "7", *url]) == 1
-    assert "There is no episode 7" in capsys.readouterr().err
+    client.describe(1, note="half a cup")
+    client.trim(1, 0.1, 0.9)
+    client.judge("failure")
+    client.undo()
+    (episode,) = client.list()
+    assert (episode.outcome, episode.note) == ("success", "half a cup")
+    assert episode.end - episode.start == pytest.approx(0.8)
+    client.discard(1)
+    assert not client.list()
+    client.restore(1)
+    with pytest.raises(RefusedError, match="There is no episode 7"):
+        client.discard(7)
     address, cookie = f"{server.url}/api/v1/episodes", enter(server.url)
     assert ask(f"{address}/99", Cookie=cookie)[0] == 404
     for body, status in (("{", 422), ('{"do": "win"}', 422), ('{"do": "stop"}', 409)):

@@ -1,4 +1,4 @@
-"""Measures of recordings are those of their motions, and the table and page compare them."""
+"""Measures of recordings are those of their motions, and the table compares them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -141,14 +140,6 @@ def test_measured_arm_is_scored_apart_from_its_setpoints(line: Path, tmp_path: P
     assert not len(exact.measured)
     sent, turned = (np.arctan2(p[:, 1], p[:, 0]) for p in (found.tool, found.measured[10:]))
     np.testing.assert_allclose(turned, sent[0] + 0.005, atol=1e-4)
-    page = tmp_path / "score.html"
-    assert main(["score", str(line), str(path), "--html", str(page)]) == 0
-    text = page.read_text(encoding="utf-8")
-    assert text.count('<g class="measured"><polyline class="c') == 2
-    assert "Dotted: the path of the tool as it was measured." in text
-    assert "Measured position error, mm" in text
-    assert main(["score", str(line), "--html", str(page)]) == 0
-    assert "Dotted" not in page.read_text(encoding="utf-8")
 
 
 def test_stops_are_counted(stopped: Path) -> None:
@@ -276,31 +267,17 @@ def test_values_have_four_digits(value: float | None, text: str) -> None:
     assert shown(value) == text
 
 
-def test_command_prints_table_json_and_page(
+def test_command_prints_table_and_json(
     line: Path, stopped: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = tmp_path / "score.html"
     hostile = tmp_path / "<b>&.mcap"
     hostile.write_bytes(stopped.read_bytes())
     files = [str(hostile), str(line)]
-    assert main(["score", *files, "--html", str(page), "--like", str(line)]) == 0
+    assert main(["score", *files, "--like", str(line)]) == 0
     printed = capsys.readouterr().out
     assert re.search(r"1\. line\.mcap +2\. <b>&\.mcap", printed), printed
     assert re.search(r"Stops +0 \* +1\n", printed), printed
     assert re.search(r"Placing error mm +0 +0\n", printed), printed
-    text = page.read_text(encoding="utf-8")
-    assert "&lt;b&gt;&amp;.mcap" in text
-    assert "<b>&" not in text
-    assert "http" not in text
-    assert "prefers-color-scheme: dark" in text
-    figures = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
-    assert len(figures) == 3
-    for each in figures:
-        curves = ElementTree.fromstring(each).findall("polyline")
-        assert len(curves) == 2
-        numbers = np.array([p.split(",") for p in curves[0].attrib["points"].split()], dtype=float)
-        assert len(numbers) > 50
-        assert (numbers >= 0.0).all()
     assert main(["score", str(line), "--json", "--target", "cup=340,-260"]) == 0
     (found,) = json.loads(capsys.readouterr().out)
     assert found["name"] == "line.mcap"

@@ -96,7 +96,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
     add_episode_options(
-        acts.add_parser("episodes", help="record, judge and list the episodes of a server")
+        acts.add_parser("episodes", help="list and recover the episodes in a folder")
     )
     export = acts.add_parser("export", help="write recordings for other programs")
     add_export_options(export)

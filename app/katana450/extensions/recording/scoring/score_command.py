@@ -1,23 +1,20 @@
-"""``katana450 score``: measures of recordings, as a table, as JSON, and as a page."""
+"""``katana450 score``: measures of recordings, as a table or as JSON."""
 
 from __future__ import annotations
 
 import json
 from argparse import Namespace
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
 from katana450.assembly.log_lines import printable
-from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.scoring.leaderboard import BEST, Leaderboard, check_measure
-from katana450.extensions.recording.scoring.score_page import score_page
 from katana450.extensions.recording.scoring.scored import Places, Scored, scored
 
 
@@ -46,11 +43,6 @@ def score_files(options: Namespace) -> int:
             print(printable(line))
         if len(found) > 1:
             print(f"Sorted by {options.sort}; {BEST} marks the best.")
-    if options.html is not None:
-        page = score_page(board, datetime.now().astimezone())
-        write_files({options.html: writer_of(page.encode())})
-        if not options.json:
-            print(f"Page: {options.html}")
     return 0
 
 

@@ -35,9 +35,6 @@ def add_score_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print the measures as JSON")
     parser.add_argument(
-        "--html", type=Path, metavar="OUT", help="write a page that compares the recordings"
-    )
-    parser.add_argument(
         "--urdf",
         type=Path,
         metavar="FILE",

@@ -40,27 +40,27 @@ from katana450.maths.kinematics.batch import forward_batch
 PLACING: Final = "placing_error_mm"
 """Name of the measure that needs targets."""
 
-MEASURES: Final = {
-    "duration_s": "from the first motion to the end of the last",
-    "tool_path_mm": "length of the path of the tool point, by setpoints",
-    "dimensionless_jerk": "mean squared jerk of the tool over time and length; at best 720",
-    "sparc": "spectral arc length of the tool's speed; the nearer to 0, the smoother",
-    "nearest_clearance_mm": "minimum of all pairs of parts, without objects that fingers touch",
-    "margin_to_limits_deg": REPORTED["margin_to_limits_deg"],
-    "smallest_singular_value": REPORTED["smallest_singular_value"],
-    "max_speed_fraction": REPORTED["max_speed_fraction"],
-    "max_tool_speed_mm_s": REPORTED["max_tool_speed_mm_s"],
-    "executed_position_error_mm": REPORTED["executed_position_error_mm"],
-    **{name: about for name, about in REPORTED.items() if name in OF_A_MEASURED_ARM},
-    "emptied_ml": "water in the basin at the end",
-    "emptied_percent": REPORTED["emptied_percent"],
-    "spilled_ml": REPORTED["spilled_ml"],
-    "cup_peak_jerk_m_s3": REPORTED["cup_peak_jerk_m_s3"],
-    PLACING: "maximum distance of an object's final place from its target",
-    "stops": "number of times that the arm was stopped",
-    "contacts": "number of times that the arm waited before a contact",
-}
-"""Name of each measure, with its unit at the end, and its definition."""
+MEASURES: Final = (
+    "duration_s",
+    "tool_path_mm",
+    "dimensionless_jerk",
+    "sparc",
+    "nearest_clearance_mm",
+    "margin_to_limits_deg",
+    "smallest_singular_value",
+    "max_speed_fraction",
+    "max_tool_speed_mm_s",
+    "executed_position_error_mm",
+    *(name for name in REPORTED if name in OF_A_MEASURED_ARM),
+    "emptied_ml",
+    "emptied_percent",
+    "spilled_ml",
+    "cup_peak_jerk_m_s3",
+    PLACING,
+    "stops",
+    "contacts",
+)
+"""Name of each measure, with its unit at the end; docs/recording.md defines them."""
 
 HIGHER_IS_BETTER: Final = frozenset(
     (
