@@ -16,6 +16,9 @@ ROOT = Path(__file__).resolve().parents[2]
 MAX_LINES = 600
 """Maximum length of a file, with comments and docstrings."""
 
+MAX_UNRELEASED = 60
+"""Maximum number of lines about what no version has yet, so that people read them."""
+
 SCHEMAS = {
     "github-workflows": ".github/workflows/*.yml",
     "github-issue-forms": ".github/ISSUE_TEMPLATE/[!c]*.yml",
@@ -75,3 +78,13 @@ def test_version_has_an_entry_in_the_changelog_with_its_date() -> None:
     assert cited["version"] == project["version"]
     heading = f"## [{cited['version']}] - {cited['date-released']}"
     assert heading in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
+
+
+def test_changelog_dates_its_releases_and_says_briefly_what_is_unreleased() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    unreleased, *releases = re.split(r"^## ", text, flags=re.MULTILINE)[1:]
+    assert unreleased.startswith("[Unreleased]\n")
+    assert unreleased.count("\n") <= MAX_UNRELEASED
+    assert releases
+    dated = re.compile(r"\[\d+\.\d+\.\d+\] - \d{4}-\d\d-\d\d\n")
+    assert [each for each in releases if dated.match(each) is None] == []
