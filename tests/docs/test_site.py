@@ -14,6 +14,8 @@ import katana450
 from tests.docs.code_blocks import DOCUMENTS, FENCE, ROOT
 
 ITEM = re.compile(r"(?:[-*]|\d+\.) ")
+MAX_LINES = 6000
+"""Maximum number of lines of docs/*.md together, so that they can be read."""
 LOADED = re.compile(r'<(?:script|img|iframe|link)\b[^>]*?(?:src|href)="(https?:[^"]+)"')
 
 
@@ -60,3 +62,26 @@ def test_list_begins_after_an_empty_line(document: Path) -> None:
             assert ITEM.match(before) or before.startswith("#"), (
                 f"the site runs this item into the paragraph above it: {line}"
             )
+
+
+def test_pages_stay_short_enough_to_be_read() -> None:
+    pages = {path.name: path.read_bytes().count(b"\n") for path in ROOT.glob("docs/*.md")}
+    assert sum(pages.values()) <= MAX_LINES, pages
+
+
+def test_archive_lists_every_decision_by_its_title() -> None:
+    folder = ROOT / "docs" / "decisions"
+    rows = re.findall(
+        r"^\| \[(.+?)\]\((.+?)\) \| ", (folder / "archive.md").read_text("utf-8"), re.MULTILINE
+    )
+    files = sorted(folder.glob("0*.md"))
+    headings = [path.read_text("utf-8").partition("\n")[0].removeprefix("# ") for path in files]
+    names = [path.name for path in files]
+    assert rows == list(zip(headings, names, strict=True)), (
+        "add its row to docs/decisions/archive.md"
+    )
+
+
+def test_twelve_decisions_are_for_newcomers() -> None:
+    text = (ROOT / "docs" / "decisions" / "README.md").read_text(encoding="utf-8")
+    assert len(set(re.findall(r"\((0\d{3}-.+?\.md)\)", text))) == 12
