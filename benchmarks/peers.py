@@ -7,10 +7,7 @@ import sys
 from pathlib import Path
 
 PINS = Path(__file__).with_name("peers.lock")
-PEERS = (
-    *("EAIK", "ik-geo", "pytracik", "roboticstoolbox-python", "pin", "mink", "ikpy"),
-    "vtk",
-)
+PEERS = ("EAIK", "ik-geo", "pytracik", "roboticstoolbox-python", "pin", "mink", "ikpy")
 _LINES_OF_REASON = 3
 
 

@@ -6,7 +6,7 @@ The server has the profile of a real arm. The driver starts a long motion and st
 Then it sends nothing more on its open connection, on which it still receives states. The time ends
 with the first state in which the stop is confirmed, by its own time stamp: server and benchmark
 read the same clock of the machine. The attacks are those of ``benchmarks.stop``, without the flood
-of STOP, under which an arm never moves. ``benchmarks.late_samples`` follows.
+of STOP, under which an arm never moves.
 """
 
 from __future__ import annotations
@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.client import ClientConnection
 
-from benchmarks import late_samples
 from benchmarks.stop import ATTACKS, DESCRIPTIONS, LOST, Links, attacked
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
@@ -117,8 +116,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else "")
     parser.add_argument("--trials", type=int, default=40, help="by attack (default: 40)")
     parser.add_argument("--only", nargs="*", choices=NAMES, help="attacks (default: all)")
-    parser.add_argument("--late", type=int, default=10_000, help="late samples (default: 10000)")
-    parser.add_argument("--slow", type=int, default=4, help="trials by delay (default: 4)")
     options = parser.parse_args()
     print("| attack | min, s | p50, s | max, s | within 0.25 s ± 0.05 |", flush=True)
     for name in options.only or NAMES:
@@ -131,8 +128,6 @@ def main() -> None:
             ):
                 times = asyncio.run(measure(server.url, links, options.trials))
         print(f"| {DESCRIPTIONS[name]} | {shown(times)} |", flush=True)
-    if options.late:
-        late_samples.measure(options.slow, options.late)
 
 
 if __name__ == "__main__":
