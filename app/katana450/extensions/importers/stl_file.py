@@ -6,7 +6,6 @@ Source: 3D Systems, StereoLithography Interface Specification (1989).
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from katana450.extensions.importers.surface import (
     doubles,
     of_polygons,
 )
-from katana450.maths.geometry.arrays import FloatArray
 
 HEADER = 84
 """[bytes] Size of the binary header: 80 bytes of any content, and the number of triangles."""
@@ -40,7 +38,9 @@ _SOLID = re.compile(rb"\s*(end)?solid\b[^\r\n]*", re.IGNORECASE)
 
 def read_stl(data: bytes, name: str) -> MeshReading:
     """Return all triangles of all solids. Raises InputError for an invalid file."""
-    count, note = int.from_bytes(data[80:84], "little"), ""
+    left_out: tuple[str, ...] = ()
+    note = ""
+    count = int.from_bytes(data[80:84], "little")
     whole, rest = divmod(len(data) - HEADER, TRIANGLE.itemsize)
     if count in UNCOUNTED and whole > 0 and not rest:
         count, note = whole, "The file does not say how many triangles it has: all were read."
@@ -48,24 +48,28 @@ def read_stl(data: bytes, name: str) -> MeshReading:
     if len(data) >= HEADER and len(data) == HEADER + count * TRIANGLE.itemsize:
         check_triangles(count, name)
         rows = np.frombuffer(data, TRIANGLE, count, HEADER)
-        left_out = (
-            ("colours, which the STL standard does not define",) if rows["extra"].any() else ()
-        )
-        return replace(_reading(doubles(rows["corners"]), name, left_out), note=note)
-    if _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
-        return _reading(_text(data, name), name)
-    if len(data) < HEADER:
+        points = doubles(rows["corners"]).reshape(-1, 3)
+        if rows["extra"].any():
+            left_out = ("colours, which the STL standard does not define",)
+    elif _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
+        try:
+            points = np.array(_corners(data, name), dtype=object).astype(float).reshape(-1, 3)
+        except ValueError as error:
+            reason = str(error)[:80]
+            raise InputError(f"{name} has coordinates that are not numbers: {reason}.") from error
+    else:
         raise InputError(
-            f"{name} is not an STL file: it has less than {HEADER} bytes and no text of a 'solid'."
+            f"{name} is corrupt or not an STL file: it is no text of a 'solid', and it declares "
+            f"{count} triangles, which take {HEADER + count * TRIANGLE.itemsize} bytes, but has "
+            f"{len(data)} bytes."
         )
-    raise InputError(
-        f"{name} is corrupt or not an STL file: it declares {count} triangles, which take "
-        f"{HEADER + count * TRIANGLE.itemsize} bytes, but has {len(data)} bytes."
-    )
+    places = np.arange(len(points))
+    surface = of_polygons(points, places, np.full(len(points) // 3, 3), name)
+    return MeshReading(surface, left_out, note=note)
 
 
-def _text(data: bytes, name: str) -> FloatArray:
-    """Return the corners (m, 3, 3) of a text file."""
+def _corners(data: bytes, name: str) -> list[tuple[bytes, ...]]:
+    """Return the nine numbers of each triangle of a text file."""
     found: list[tuple[bytes, ...]] = []
     at, end, is_open = 0, len(data.rstrip()), False
     while at < end:
@@ -81,21 +85,10 @@ def _text(data: bytes, name: str) -> FloatArray:
         at = match.end()
     if is_open:
         raise _broken(data, end, name, "the file ends before 'endsolid'")
-    try:
-        return np.array(found, dtype=object).astype(np.float64).reshape(-1, 3, 3)
-    except ValueError as error:
-        raise InputError(
-            f"{name} has coordinates that are not numbers: {str(error)[:80]}."
-        ) from error
+    return found
 
 
 def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
     blank = len(data[at:]) - len(data[at:].lstrip())
     line = data.count(b"\n", 0, at + blank) + 1
     return InputError(f"{name} is corrupt at line {line}: {what}.")
-
-
-def _reading(corners: FloatArray, name: str, left_out: tuple[str, ...] = ()) -> MeshReading:
-    places = np.arange(3 * len(corners))
-    surface = of_polygons(corners.reshape(-1, 3), places, np.full(len(corners), 3), name)
-    return MeshReading(surface, left_out)
