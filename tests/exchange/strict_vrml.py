@@ -1,17 +1,86 @@
-"""A reader of VRML97 that refuses whatever the standard, or an export of this project, lacks."""
+"""A reader of VRML97 that refuses whatever an export of this project lacks, and keeps routes."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import World
+from katana450.extensions.export.vrml_node import (
+    FIELDS,
+    KEYWORDS,
+    Node,
+    Route,
+    Type,
+    Use,
+    World,
+)
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.vrml_reader import Reader
+
+EVENTS: Mapping[tuple[str, str], Type] = {
+    ("TimeSensor", "fraction_changed"): Type.FLOAT,
+    ("OrientationInterpolator", "value_changed"): Type.ROTATION,
+    ("PositionInterpolator", "value_changed"): Type.VECTOR,
+}
+"""Types of the events that nodes send (eventOut), by kind of node and name of the event."""
+
+SETTERS: Mapping[tuple[str, str], Type] = {
+    ("OrientationInterpolator", "set_fraction"): Type.FLOAT,
+    ("PositionInterpolator", "set_fraction"): Type.FLOAT,
+    ("Transform", "set_rotation"): Type.ROTATION,
+    ("Transform", "set_translation"): Type.VECTOR,
+}
+"""Types of the events that nodes receive (eventIn), by kind of node and name of the event."""
 
 
 def read_world(text: str) -> World:
     """Return the content of a file. Raises InputError, with the line of an error in a node."""
     if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
         raise InputError(f"A world must begin with {HEADER!r}.")
-    return Reader(text, "The file").world()
+    return StrictReader(text, "The file").world()
+
+
+class StrictReader(Reader):
+    """A reader of the nodes of exports, with routes and references as they are written."""
+
+    fields = FIELDS
+
+    def __init__(self, text: str, name: str) -> None:
+        super().__init__(text, name)
+        self._routes: list[Route] = []
+
+    def world(self) -> World:
+        """Return the content of the file. Raises InputError with the line of an error."""
+        found = self.nodes()
+        nodes = tuple(node for node in found if isinstance(node, Node))
+        if len(nodes) < len(found):
+            raise self._error("USE is not allowed at the top level")
+        return World(nodes, tuple(self._routes))
+
+    def _body(self, kind: str, name: str | None, depth: int) -> Node:
+        if kind not in FIELDS:
+            raise self._error(f"the node {kind!r} is not supported")
+        if name in self._named:
+            raise self._error(f"{name!r} is defined twice")
+        if name in KEYWORDS:
+            raise self._error(f"{name!r} is not a name")
+        return super()._body(kind, name, depth)
+
+    def _used(self, name: str) -> Use:
+        super()._used(name)
+        return Use(name)
+
+    def _route(self) -> None:
+        source, _, out = self._take().partition(".")
+        self._expect("TO")
+        target, _, into = self._take().partition(".")
+        kinds = {name: node.kind for name, node in self._named.items()}
+        event, setter = (kinds.get(source, ""), out), (kinds.get(target, ""), into)
+        if event not in EVENTS:
+            raise self._error(f"a route cannot go out of {source}.{out}")
+        if setter not in SETTERS:
+            raise self._error(f"a route cannot go into {target}.{into}")
+        if EVENTS[event] is not SETTERS[setter]:
+            raise self._error(f"{source}.{out} and {target}.{into} have different types")
+        self._routes.append(Route(source, out, target, into))

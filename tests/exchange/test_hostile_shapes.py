@@ -26,10 +26,8 @@ from katana450.extensions.importers.shape_file import (
 from tests.exchange.compressed_gltf import draco_glb, meshopt_glb
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
-from tests.exchange.test_lines import lines_of_gltf
 from tests.exchange.test_several_files import ARTICULATED
 from tests.exchange.test_vrml_prototypes import JOINT
-from tests.exchange.test_x3dv import SETS
 
 resource = pytest.importorskip("resource")
 
@@ -46,12 +44,6 @@ SEEDS = {
     "colours.ply": PAINTED,
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
     "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
-    "sets.x3dv": SETS.encode(),
-    "lines.glb": lines_of_gltf(3, [0, 2, 1], paint=True),
-    "lines.wrl": (
-        f"{HEADER}\nShape {{ geometry IndexedLineSet {{ coordIndex [ 0 1 2 -1 1 0 ] color Color {{ "
-        "color [ 1 0 0, 0 1 0, 0 0 1 ] } coord Coordinate { point [ 0 0 0, 1 0 0, 0 1 0 ] } } }"
-    ).encode(),
     "draco.glb": draco_glb(),
     "meshopt.glb": meshopt_glb(),
 }

@@ -28,7 +28,6 @@ class Type(Enum):
     VECTOR_LIST = "MFVec3f"
     COLOR = "SFColor"
     COLOR_LIST = "MFColor"
-    RGBA_LIST = "MFColorRGBA"
     ROTATION = "SFRotation"
     ROTATION_LIST = "MFRotation"
     STRING = "SFString"
@@ -50,7 +49,6 @@ WIDTHS: Mapping[Type, int] = MappingProxyType(
         Type.VECTOR_LIST: 3,
         Type.COLOR: 3,
         Type.COLOR_LIST: 3,
-        Type.RGBA_LIST: 4,
         Type.ROTATION: 4,
         Type.ROTATION_LIST: 4,
     }
@@ -117,25 +115,6 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
     }
 )
 """Fields of each kind of node that the export writes, with their types."""
-
-EVENTS: Mapping[tuple[str, str], Type] = MappingProxyType(
-    {
-        ("TimeSensor", "fraction_changed"): Type.FLOAT,
-        ("OrientationInterpolator", "value_changed"): Type.ROTATION,
-        ("PositionInterpolator", "value_changed"): Type.VECTOR,
-    }
-)
-"""Types of the events that nodes send (eventOut), by kind of node and name of the event."""
-
-SETTERS: Mapping[tuple[str, str], Type] = MappingProxyType(
-    {
-        ("OrientationInterpolator", "set_fraction"): Type.FLOAT,
-        ("PositionInterpolator", "set_fraction"): Type.FLOAT,
-        ("Transform", "set_rotation"): Type.ROTATION,
-        ("Transform", "set_translation"): Type.VECTOR,
-    }
-)
-"""Types of the events that nodes receive (eventIn), by kind of node and name of the event."""
 
 KEYWORDS = frozenset(
     [

@@ -22,7 +22,7 @@ MAX_FILES = 1000
 COMPANION_SUFFIXES = ("bin", "mtl")
 """Suffixes of files that shape files name, and that are no shapes themselves."""
 
-NAMING = ("wrl", "x3dv", "gltf", "obj")
+NAMING = ("wrl", "gltf", "obj")
 """Suffixes of files that can name others."""
 
 EPOCH = (1980, 1, 1, 0, 0, 0)

@@ -27,12 +27,6 @@ class Companions:
         self.used: dict[str, None] = {}
         self.missing: dict[str, None] = {}
 
-    def beside(self, path: str) -> Companions:
-        """Return the same files for a file at ``path``, with the same lists."""
-        others = Companions(main=path)
-        others._files, others.used, others.missing = self._files, self.used, self.missing
-        return others
-
     def find(self, urls: Iterable[str], beside: str = "") -> tuple[str, bytes] | None:
         """Return path and content of the first of ``urls`` that is there.
 

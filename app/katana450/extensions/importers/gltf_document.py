@@ -20,8 +20,8 @@ from katana450.maths.geometry.arrays import FloatArray
 Natural = Annotated[int, msgspec.Meta(ge=0)]
 """A whole number from 0."""
 
-POINTS, LINES, LOOP, LINE_STRIP, TRIANGLES, STRIP, FAN = range(7)
-"""Modes of a primitive."""
+LINE_MODES, TRIANGLES, STRIP, FAN = range(4), 4, 5, 6
+"""Modes of a primitive: points and lines, and three of surfaces."""
 
 
 def pose(

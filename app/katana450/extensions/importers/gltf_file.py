@@ -14,10 +14,7 @@ from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.gltf_buffers import Buffers
 from katana450.extensions.importers.gltf_document import (
     FAN,
-    LINE_STRIP,
-    LINES,
-    LOOP,
-    POINTS,
+    LINE_MODES,
     STRIP,
     TRIANGLES,
     Document,
@@ -32,7 +29,6 @@ from katana450.extensions.importers.surface import (
     MeshReading,
     MeshSurface,
     check_triangles,
-    of_lines,
     of_polygons,
 )
 from katana450.maths.geometry.arrays import FloatArray, IntArray
@@ -140,8 +136,8 @@ class _File:
             for primitive in self._document.meshes[number].primitives:
                 if primitive.mode in (TRIANGLES, STRIP, FAN):
                     builder.add(self._surface(primitive))
-                elif primitive.mode in (POINTS, LINES, LOOP, LINE_STRIP):
-                    builder.add(self._lines(primitive))
+                elif primitive.mode in LINE_MODES:
+                    self._left_out["lines and points"] += 1
                 else:
                     self._left_out[f"primitives of mode {primitive.mode}"] += 1
             self._meshes[number] = builder.surface()
@@ -161,7 +157,12 @@ class _File:
                 own = self._buffers.scaled(found["COLOR_0"], primitive.attributes["COLOR_0"])
             mode = TRIANGLES
         else:
-            points, index, own = self._vertices(primitive)
+            points = self._buffers.numbers(primitive.attributes["POSITION"], 3)
+            index = np.arange(len(points))
+            if primitive.indices is not None:
+                index = self._buffers.rows(primitive.indices, 1).ravel().astype(np.int64)
+            colour = primitive.attributes.get("COLOR_0")
+            own = None if colour is None else self._buffers.numbers(colour, None)
         corners = self._corners(index, mode)
         if primitive.targets:
             self._left_out["changes of shape"] += 1
@@ -172,32 +173,6 @@ class _File:
             self._name,
             vertex_colours=self._colours(primitive, own, len(points)),
         )
-
-    def _vertices(self, primitive: Primitive) -> tuple[FloatArray, IntArray, FloatArray | None]:
-        """Return coordinates (n, 3), indices (k,) and own colours (n, 3 or 4) of the vertices."""
-        points = self._buffers.numbers(primitive.attributes["POSITION"], 3)
-        index = np.arange(len(points))
-        if primitive.indices is not None:
-            index = self._buffers.rows(primitive.indices, 1).ravel().astype(np.int64)
-        colour = primitive.attributes.get("COLOR_0")
-        return points, index, None if colour is None else self._buffers.numbers(colour, None)
-
-    def _lines(self, primitive: Primitive) -> MeshSurface:
-        if "POSITION" not in primitive.attributes:
-            return NOTHING
-        points, index, own = self._vertices(primitive)
-        match primitive.mode:
-            case mode if mode == POINTS:
-                ends = np.column_stack((index, index))
-            case mode if mode == LINES:
-                ends = index[: len(index) // 2 * 2].reshape(-1, 2)
-            case mode:
-                ahead = np.roll(index, -1)
-                ends = np.column_stack((index, ahead))[: None if mode == LOOP else -1]
-        colours = self._colours(primitive, own, len(points))
-        ends = ends[(ends < len(points)).all(axis=1)]
-        paint = None if colours is None else colours[ends].mean(axis=1)
-        return of_lines(points, ends, "lines and points", paint)
 
     def _corners(self, index: IntArray, mode: int) -> IntArray:
         """Return the corners (3 m,) of triangles, strips or fans."""

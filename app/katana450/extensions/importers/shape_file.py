@@ -19,7 +19,6 @@ from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, packed, unpacked
 from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.gltf_file import read_gltf
-from katana450.extensions.importers.lines import visible
 from katana450.extensions.importers.obj_file import read_obj
 from katana450.extensions.importers.off_file import read_off
 from katana450.extensions.importers.ply_file import read_ply
@@ -76,10 +75,10 @@ class Format(Enum):
     def of(cls, file: str) -> Format:
         """Return the format of a file by its name. Raises InputError.
 
-        .wrz is a compressed .wrl, .x3dv is X3D in its encoding, .zae is a .zip with a .dae.
+        .wrz is a compressed .wrl, .zae is a .zip with a .dae.
         """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        others = {"wrz": cls.WRL, "x3dv": cls.WRL, "zae": cls.ZIP}
+        others = {"wrz": cls.WRL, "zae": cls.ZIP}
         known = {each.value: each for each in cls} | others
         if suffix not in known:
             raise InputError(
@@ -89,7 +88,7 @@ class Format(Enum):
         return known[suffix]
 
 
-SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz", "x3dv")
+SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz")
 """Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
@@ -175,7 +174,7 @@ def read_shape(
     finally:
         if missing is not None:
             missing += companions.missing
-    reading = visible(_in_known_unit(reading, file), file)
+    reading = _in_known_unit(reading, file)
     surface = reading.surface.tidy()
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
@@ -250,15 +249,7 @@ def check_file(data: bytes, file: str, unit: float | None, format: Format) -> No
 def _read(data: bytes, format: Format, file: str, companions: Companions) -> MeshReading:
     match format:
         case Format.WRL:
-            return read_wrl(
-                data,
-                file,
-                MAX_FILE_BYTES,
-                companions,
-                lambda path, content: _read(
-                    content, Format.of(path), label(path), companions.beside(path)
-                ),
-            )
+            return read_wrl(data, file, MAX_FILE_BYTES, companions)
         case Format.STL:
             return read_stl(data, file)
         case Format.OBJ:

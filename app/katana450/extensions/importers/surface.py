@@ -28,21 +28,6 @@ MAX_COPIES = 40_000
 
 
 @dataclass(frozen=True, eq=False)
-class Strokes:
-    """Lines and points beside a surface.
-
-    Attributes:
-        ends: (k, 2) indices of its vertices; both are the same for a point.
-        kinds: names for them in messages.
-        colours: (k, 4) sRGB and opacity; None without colours.
-    """
-
-    ends: IntArray
-    kinds: tuple[str, ...]
-    colours: Colours | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class MeshSurface:
     """A surface of triangles.
 
@@ -50,18 +35,11 @@ class MeshSurface:
         vertices: (n, 3).
         faces: (m, 3) indices of vertices, counter-clockwise seen from outside.
         colours: (m, 4) sRGB and opacity of the faces; None if the file has none.
-        lines: lines and points beside it; None without any.
     """
 
     vertices: FloatArray
     faces: IntArray
     colours: Colours | None = None
-    lines: Strokes | None = None
-
-    @property
-    def is_empty(self) -> bool:
-        """Return whether there is neither a face nor a line."""
-        return not len(self.faces) and self.lines is None
 
     def moved(self, T: FloatArray) -> MeshSurface:
         """Return it under the affine map ``T`` (4, 4); a mirrored surface keeps its outside."""
@@ -73,14 +51,9 @@ class MeshSurface:
 
     def painted(self, colour: Sequence[float] | None) -> MeshSurface:
         """Return it in one colour (4,) 0..1, unless it has colours of its own."""
-        if colour is None:
+        if colour is None or self.colours is not None:
             return self
-        colours, lines = self.colours, self.lines
-        if colours is None:
-            colours = np.tile(as_bytes([colour]), (len(self.faces), 1))
-        if lines is not None and lines.colours is None:
-            lines = replace(lines, colours=np.tile(as_bytes([colour]), (len(lines.ends), 1)))
-        return replace(self, colours=colours, lines=lines)
+        return replace(self, colours=np.tile(as_bytes([colour]), (len(self.faces), 1)))
 
     def tidy(self) -> MeshSurface:
         """Return its faces without degenerate ones, with equal vertices merged."""
@@ -100,7 +73,7 @@ class MeshSurface:
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Return the vertices that ``faces`` (or lines) use, and ``faces`` with the new indices."""
+    """Return the vertices that ``faces`` use, and ``faces`` with the new indices."""
     used = np.zeros(len(vertices), dtype=bool)
     used[faces] = True
     return vertices[used], (np.cumsum(used) - 1)[faces]
@@ -143,10 +116,7 @@ class MeshBuilder:
 
     def surface(self) -> MeshSurface:
         """Return all parts as one surface, with colours if any part has them."""
-        coloured = any(
-            part.colours is not None or (part.lines is not None and part.lines.colours is not None)
-            for part in self._parts
-        )
+        coloured = any(part.colours is not None for part in self._parts)
         offsets = np.cumsum([0, *(len(part.vertices) for part in self._parts)])
         paint = [value / 255.0 for value in GREY]
         parts = [part.painted(paint if coloured else None) for part in self._parts]
@@ -159,21 +129,7 @@ class MeshBuilder:
             np.concatenate([part.colours for part in parts if part.colours is not None])
             if coloured
             else None,
-            _joined([part.lines for part in parts], offsets),
         )
-
-
-def _joined(found: Sequence[Strokes | None], offsets: IntArray) -> Strokes | None:
-    """Return all lines as one, each with its offset of vertices; None without any."""
-    pairs = [(each, at) for each, at in zip(found, offsets, strict=False) if each is not None]
-    if not pairs:
-        return None
-    colours = [each.colours for each, _ in pairs if each.colours is not None]
-    return Strokes(
-        np.concatenate([each.ends + at for each, at in pairs]),
-        tuple(dict.fromkeys(kind for each, _ in pairs for kind in each.kinds)),
-        np.concatenate(colours) if len(colours) == len(pairs) else None,
-    )
 
 
 def check_triangles(count: int, name: str) -> None:
@@ -224,21 +180,6 @@ def of_polygons(
     elif colours is not None:
         colours = colours[polygon]
     return MeshSurface(vertices, corners[triangles], colours)
-
-
-def of_lines(
-    vertices: FloatArray, ends: IntArray, kind: str, colours: FloatArray | None = None
-) -> MeshSurface:
-    """Return lines (k, 2) between those of the vertices (n, 3) that are there and finite.
-
-    ``kind`` is their name in messages; ``colours`` (k, 4) 0..1.
-    """
-    there = np.flatnonzero(((ends >= 0) & (ends < len(vertices))).all(axis=1))
-    kept = there[(np.abs(vertices[ends[there]]) < 1e30).all(axis=(1, 2))]
-    used, ends = _used(vertices, ends[kept])
-    paint = None if colours is None else as_bytes(colours[kept])
-    lines = Strokes(ends, (kind,), paint) if len(ends) else None
-    return MeshSurface(used, np.zeros((0, 3), dtype=np.int64), None, lines)
 
 
 def doubles(values: npt.NDArray[Any]) -> FloatArray:

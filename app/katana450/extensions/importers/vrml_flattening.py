@@ -10,32 +10,20 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Value
 from katana450.extensions.importers.surface import MAX_COPIES, MeshBuilder, MeshSurface
-from katana450.extensions.importers.vrml_lines import LINES
-from katana450.extensions.importers.vrml_shapes import MAKERS, surface_of
-from katana450.extensions.importers.vrml_solids import number, numbers, part, texts, unit
-from katana450.extensions.importers.vrml_standard import IGNORED_NODES, TEXTURES
+from katana450.extensions.importers.vrml_solids import (
+    number,
+    numbers,
+    part,
+    surface_of,
+    texts,
+    unit,
+)
+from katana450.extensions.importers.vrml_standard import IGNORED_NODES
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
-BASE_COLOURS = {
-    "Material": ("diffuseColor", 0.8),
-    "PhysicalMaterial": ("baseColor", 1.0),
-    "UnlitMaterial": ("emissiveColor", 1.0),
-}
-"""Field of the colour of each kind of material, and its default in all channels."""
-
-GROUPS = {
-    **dict.fromkeys(("Group", "StaticGroup", "Anchor", "Billboard", "Collision"), "children"),
-    **dict.fromkeys(("HAnimSegment", "CADAssembly", "CADLayer"), "children"),
-    "CADFace": "shape",
-}
-"""Field that is shown of each kind of group."""
-
-TRANSFORMS = {
-    **dict.fromkeys(("Transform", "HAnimJoint", "HAnimSite", "CADPart"), ("children",)),
-    "HAnimHumanoid": ("skeleton", "skin"),
-}
-"""Fields that are shown, at another place, of each kind of node with the fields of Transform."""
+GROUPS = ("Group", "Anchor", "Billboard", "Collision")
+"""Kinds of groups whose children are all shown at their place."""
 
 Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
@@ -44,15 +32,11 @@ Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 class Flattening:
     """A traversal of the visible nodes, with the pose of each."""
 
-    def __init__(
-        self, name: str, left_out: Counter[str], shown: Shown, hidden: bool = False
-    ) -> None:
+    def __init__(self, name: str, left_out: Counter[str], shown: Shown) -> None:
         """Prepare the file ``name``. ``left_out`` counts the parts that are not read.
 
-        ``shown`` returns the surface of another world. With ``hidden``, a Switch that shows nothing
-        shows its first choice.
+        ``shown`` returns the surface of another world.
         """
-        self._hidden = hidden
         self._name, self._left_out, self._shown_file = name, left_out, shown
         self._builder = MeshBuilder(name)
         self._surfaces: dict[int, MeshSurface | None] = {}
@@ -83,26 +67,20 @@ class Flattening:
         """Return the visible children of a node with their poses."""
         match node.kind:
             case kind if kind in GROUPS:
-                return [(child, T) for child in nodes(node.get(GROUPS[kind]))]
-            case kind if kind in TRANSFORMS:
+                return [(child, T) for child in nodes(node.get("children"))]
+            case "Transform":
                 with np.errstate(over="ignore", invalid="ignore"):
                     T_children = T @ placed(node)
-                inside = (child for field in TRANSFORMS[kind] for child in nodes(node.get(field)))
-                return [(child, T_children) for child in inside]
+                return [(child, T_children) for child in nodes(node.get("children"))]
             case "Switch":
                 chosen = int(number(node, "whichChoice", -1.0))
-                chosen = max(chosen, 0) if self._hidden else chosen
-                choice = nodes(node.get("choice")) or nodes(node.get("children"))
+                choice = nodes(node.get("choice"))
                 return [(choice[chosen], T)] if 0 <= chosen < len(choice) else []
             case "LOD":
-                levels = nodes(node.get("level")) or nodes(node.get("children"))
-                return [(child, T) for child in levels[:1]]
+                return [(child, T) for child in nodes(node.get("level"))[:1]]
             case "Shape" | "Inline":
                 pass
-            case kind if kind in MAKERS:
-                # A shape without its node Shape, which most programs show.
-                self._shape(Node("Shape", (("geometry", node),)), T)
-            case kind if kind not in IGNORED_NODES and kind not in TEXTURES:
+            case kind if kind not in IGNORED_NODES:
                 self._left_out[kind] += 1
         return []
 
@@ -114,8 +92,7 @@ class Flattening:
             self._surfaces[id(geometry)] = surface_of(geometry, self._name, self._left_out)
         surface = self._surfaces[id(geometry)]
         if surface is not None:
-            colour = _colour(node, glows=geometry.kind in LINES)
-            self._builder.add(surface.painted(colour).moved(T))
+            self._builder.add(surface.painted(_colour(node)).moved(T))
         elif geometry.kind != "NULL":
             self._left_out[geometry.kind] += 1
 
@@ -144,17 +121,13 @@ def rotation(node: Node, field: str) -> FloatArray:
     return so3.exp(unit(np.array((x, y, z))) * float(np.remainder(angle, 2.0 * np.pi)))
 
 
-def _colour(shape: Node, glows: bool) -> tuple[float, ...] | None:
-    """Return the colour (4,) 0..1 of its material; None without a material.
-
-    With ``glows``, as lines do, the shape reflects no light.
-    """
+def _colour(shape: Node) -> tuple[float, ...] | None:
+    """Return the colour (4,) 0..1 of its material; None without a material."""
     appearance = part(shape, "appearance")
     material = None if appearance is None else part(appearance, "material")
-    if material is None or material.kind not in BASE_COLOURS:
+    if material is None or material.kind != "Material":
         return None
-    field, default = BASE_COLOURS[material.kind]
-    diffuse = numbers(material, field, (default,) * 3)[:, 0]
+    diffuse = numbers(material, "diffuseColor", (0.8, 0.8, 0.8))[:, 0]
     glow = numbers(material, "emissiveColor", (0.0, 0.0, 0.0))[:, 0]
-    shown = glow if glow.any() and (glows or not diffuse.any()) else diffuse
+    shown = diffuse if diffuse.any() else glow
     return (*shown.tolist(), 1.0 - number(material, "transparency", 0.0))

@@ -1,11 +1,11 @@
 """Prototypes of VRML97, and their expansion into plain nodes.
 
-Source: ISO/IEC 14772-1:1997, 4.8 Prototype semantics, 4.9 External prototype semantics.
+Source: ISO/IEC 14772-1:1997, 4.8 Prototype semantics.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -30,33 +30,29 @@ class Prototype:
     """A declared kind of node.
 
     Attributes:
-        name: its name.
         types: type of each field; None for a type without a meaning for surfaces.
         defaults: values of the fields that an instance does not set.
-        body: the node it stands for, with placeholders; None if it is in another file.
-        urls: addresses of that file, the best first.
+        body: the node it stands for, with placeholders.
     """
 
-    name: str
     types: Mapping[str, Type | None]
-    defaults: Mapping[str, Value] = field(default_factory=dict)
-    body: Node | None = None
-    urls: tuple[str, ...] = ()
+    defaults: Mapping[str, Value]
+    body: Node
 
 
 @dataclass(frozen=True, eq=False)
 class Instance(Node):
     """A node of a declared kind, which is not expanded yet."""
 
-    prototype: Prototype = field(default_factory=lambda: Prototype("", {}))
+    prototype: Prototype = field(default_factory=lambda: Prototype({}, {}, Node("NULL")))
 
 
 class PrototypeExpansion:
     """Expands the instances in trees of nodes; what holds none is shared, not copied."""
 
-    def __init__(self, name: str, external: Callable[[Prototype], Prototype | None]) -> None:
-        """Prepare the file ``name``. ``external`` returns a prototype that is in another file."""
-        self._name, self._external = name, external
+    def __init__(self, name: str) -> None:
+        """Prepare the file ``name``."""
+        self._name = name
         self._count = 0
         self._plain: dict[int, bool] = {}
         self._done: dict[tuple[int, int], tuple[Node, Values, Node]] = {}
@@ -85,18 +81,12 @@ class PrototypeExpansion:
                 fields[name] = found
         if not isinstance(node, Instance):
             return Node(node.kind, tuple(fields.items()), node.name)
-        declared = node.prototype
-        prototype = declared if declared.body is not None else self._external(declared)
-        if prototype is None or prototype.body is None:
-            return Node(node.kind, (), node.name)
+        prototype = node.prototype
         inner: dict[str, tuple[Type | None, Value]] = {}
         for name, kind in prototype.types.items():
-            if name in fields and declared.types.get(name) is kind:
-                inner[name] = (kind, fields[name])
-            elif name in prototype.defaults:
-                default = self._value(prototype.defaults[name], NO_VALUES)
-                if default is not None:
-                    inner[name] = (kind, default)
+            given = fields.get(name, self._value(prototype.defaults[name], NO_VALUES))
+            if given is not None:
+                inner[name] = (kind, given)
         return self._resolved(prototype.body, inner)
 
     def _value(self, value: Value, values: Values) -> Value | None:

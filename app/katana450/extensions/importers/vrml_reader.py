@@ -1,27 +1,19 @@
-"""Strict parser for the text of VRML97, which reads what this project exports."""
+"""Parser of VRML97 worlds: nodes with their reused nodes in place, and instances of prototypes.
+
+Source: ISO/IEC 14772-1:1997, annex A, grammar. Nodes that it does not know are left out.
+"""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import (
-    EVENTS,
-    FIELDS,
-    KEYWORDS,
-    LISTS,
-    SETTERS,
-    WIDTHS,
-    Node,
-    Route,
-    Type,
-    Use,
-    Value,
-    World,
-)
+from katana450.extensions.export.vrml_node import LISTS, WIDTHS, Node, Type, Use, Value
+from katana450.extensions.importers.vrml_prototypes import IS, Instance, Prototype
+from katana450.extensions.importers.vrml_standard import STANDARD, TEXTURES
 
 T = TypeVar("T")
 N = TypeVar("N", int, float)
@@ -29,28 +21,46 @@ N = TypeVar("N", int, float)
 MAX_QUOTED_CHARACTERS = 160
 """Maximum length of a quotation from a file in an error message."""
 
-MAX_DEPTH = 200
+MAX_DEPTH = 150
 """Maximum nesting of nodes, within the limit of Python's stack."""
 
-VALUES = '["+-.0123456789'
-"""Beginnings of values that are no nodes."""
+CLOSERS = {"{": "}", "[": "]"}
+"""The closing token of each opening token."""
+
+EVENT_ACCESS = ("eventIn", "eventOut")
+"""Words before a part of an interface that has no value."""
+
+FIELD_ACCESS = ("field", "exposedField")
+"""Words before a part of an interface that has a value."""
+
+STATEMENTS = ("PROTO", "EXTERNPROTO", "ROUTE")
+"""First words of statements, which may also stand among the fields of a node."""
+
+TYPES = {kind.value: kind for kind in Type}
+"""Types by their names in an interface."""
 
 # Possessive quantifiers, so that a mismatch in an untrusted file fails without backtracking.
 _TOKEN = re.compile(
     r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# Normals are often no numbers; vertices that are used are checked later.
+_NUMBER = re.compile(
+    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?i:nan|inf(?:inity)?))"
+)
 _INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
 NUMBERS, INTEGERS = (
     re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
 )
-_NAME = re.compile(r"[^\x00-\x20\"#',.\[\]\\{}\x7f0-9+-][^\x00-\x20\"#',.\[\]\\{}\x7f]*")
 
 
 class Reader:
-    """A parser of the nodes in a table of fields; it refuses all others."""
+    """A parser of the text of one file.
 
-    fields = FIELDS
+    Attributes:
+        left_out: counts of the parts that are not read, by their names.
+    """
+
+    fields = STANDARD
 
     def __init__(self, text: str, name: str) -> None:
         """Parse ``text`` of the file ``name``, which is used in messages."""
@@ -58,21 +68,16 @@ class Reader:
         self._at = self._next = 0
         self._tokens = self._scan()
         self._ahead = next(self._tokens)
-        self._named: dict[str, Node | None] = {}
+        self._named: dict[str, Node] = {}
+        self._prototypes: dict[str, Prototype] = {}
+        self.left_out: Counter[str] = Counter()
 
-    def world(self) -> World:
-        """Return the content of the file. Raises InputError with the line of an error."""
-        nodes: list[Node] = []
-        routes: list[Route] = []
+    def nodes(self) -> tuple[Node | Use, ...]:
+        """Return the nodes of the file. Raises InputError with the line of an error."""
+        found: list[Node | Use] = []
         while self._ahead:
-            if self._ahead == "ROUTE":
-                routes.append(self._route())
-            else:
-                node = self._node(0)
-                if isinstance(node, Use):
-                    raise self._error("USE is not allowed at the top level")
-                nodes.append(node)
-        return World(tuple(nodes), tuple(routes))
+            found += self._statement(0)
+        return tuple(found)
 
     def _scan(self) -> Iterator[str]:
         self._next = len(self._text.partition("\n")[0])
@@ -101,93 +106,142 @@ class Reader:
         self._take()
 
     def _new_name(self) -> str:
+        # Names that the standard does not allow are common.
         name = self._take()
-        if not _NAME.fullmatch(name) or name in KEYWORDS:
+        if name[0] in '"[]{}':
             raise self._error(f"{name!r} is not a name")
         return name
 
-    def _node(self, depth: int, token: str = "") -> Node | Use:
-        """Return the next node, after its first ``token`` if that is taken already."""
+    def _statement(self, depth: int) -> list[Node | Use]:
+        """Parse a statement; return the node if it is one."""
+        if self._ahead not in STATEMENTS:
+            return [self._node(depth)]
+        match self._take():
+            case "PROTO":
+                self._prototype(depth)
+            case "EXTERNPROTO":
+                # Its nodes are unknown.
+                self._new_name()
+                self._skip_brackets()
+                list(self._items(self._string))
+            case _:
+                self._route()
+        return []
+
+    def _route(self) -> None:
+        """Parse a ROUTE after its first word; motion does not matter here."""
+        self._take()
+        self._expect("TO")
+        self._take()
+
+    def _node(self, depth: int) -> Node | Use:
         if depth > MAX_DEPTH:
             raise self._error(f"nodes are nested more than {MAX_DEPTH} deep")
-        name: str | None = None
-        token = token or self._take()
-        if token == "USE":
-            used = self._new_name()
-            node = self._named.get(used)
-            return self._undefined(used) if node is None else self._used(node, used)
-        if token == "DEF":
-            name = self._new_name()
-            self._define(name)
-            token = self._kind(name)
-        kinds = self.fields.get(token)
-        if kinds is None:
-            node = self._unknown(token, name, depth)
-            if name is not None:
-                self._named[name] = node
-            return node
-        self._expect("{")
-        fields: dict[str, Value] = {}
-        strays: list[Node] = []
-        while self._ahead != "}":
-            field = self._take()
-            if field not in kinds:
-                strays += self._stray(token, field, depth)
-                continue
-            if field in fields:
-                self._again(token, field)
-            fields[field] = self._value(kinds[field], depth)
-        self._take()
-        if strays:
-            fields["children"] = (*_nodes(fields.get("children")), *strays)
-        node = Node(token, tuple(fields.items()), name)
-        if name is not None:
-            self._named[name] = node
+        kind = self._take()
+        if kind == "NULL":
+            return Node(kind)
+        if kind == "USE":
+            return self._used(self._new_name())
+        if kind != "DEF":
+            return self._body(kind, None, depth)
+        name = self._new_name()
+        node = self._body(self._take(), name, depth)
+        self._named[name] = node
         return node
 
-    def _define(self, name: str) -> None:
-        if name in self._named:
-            raise self._error(f"{name!r} is defined twice")
-        self._named[name] = None
+    def _used(self, name: str) -> Node | Use:
+        if name not in self._named:
+            raise self._error(f"{name!r} is used before it is defined")
+        return self._named[name]
 
-    def _kind(self, _name: str) -> str:
-        """Take the kind of the node with the name ``_name``."""
-        return self._take()
+    def _body(self, kind: str, name: str | None, depth: int) -> Node:
+        """Parse a node after its kind."""
+        prototype = self._prototypes.get(kind)
+        types = self.fields.get(kind) if prototype is None else prototype.types
+        if types is None:
+            self._skip_brackets()
+            if kind in TEXTURES:
+                self.left_out["pictures on the surface"] += 1
+            return Node(kind, (), name)
+        fields: dict[str, Value] = {}
+        self._expect("{")
+        while self._ahead != "}":
+            if self._ahead in STATEMENTS:
+                self._statement(depth)
+                continue
+            field = self._take()
+            if field in types:
+                fields[field] = self._value(types[field], depth)
+            elif self._ahead == IS:
+                # An event of a prototype.
+                self._take()
+                self._take()
+            else:
+                raise self._error(f"{kind} has no field {field!r}")
+        self._take()
+        if prototype is None:
+            return Node(kind, tuple(fields.items()), name)
+        return Instance(kind, tuple(fields.items()), name, prototype)
 
-    def _used(self, _node: Node, name: str) -> Node | Use:
-        return Use(name)
+    def _prototype(self, depth: int) -> None:
+        """Parse a declaration after its first word."""
+        name = self._new_name()
+        types, defaults = self._interface(depth)
+        named, prototypes = self._named, self._prototypes
+        self._named, self._prototypes = {}, dict(prototypes)
+        self._expect("{")
+        body: list[Node | Use] = []
+        while self._ahead != "}":
+            body += self._statement(depth + 1)
+        self._take()
+        self._named, self._prototypes = named, prototypes
+        first = next((node for node in body if isinstance(node, Node)), Node("NULL"))
+        # What a file declares counts, also under a name of the standard.
+        self._prototypes[name] = Prototype(types, defaults, first)
 
-    def _undefined(self, name: str) -> Node:
-        """Return what stands for a node that is used but not defined."""
-        raise self._error(f"{name!r} is used before it is defined")
+    def _interface(self, depth: int) -> tuple[dict[str, Type | None], dict[str, Value]]:
+        """Return types and defaults of the fields of a prototype."""
+        types: dict[str, Type | None] = {}
+        defaults: dict[str, Value] = {}
+        self._expect("[")
+        while self._ahead != "]":
+            access = self._take()
+            if access not in (*EVENT_ACCESS, *FIELD_ACCESS):
+                raise self._error(f"{access!r} is not a part of the interface of a prototype")
+            kind, field = TYPES.get(self._take()), self._take()
+            if access in FIELD_ACCESS:
+                types[field] = kind
+                defaults[field] = self._value(kind, depth)
+        self._take()
+        return types, defaults
 
-    def _placeholder(self, _kind: Type) -> Value:
-        """Parse what stands for a field of a prototype."""
-        raise self._error("IS is not supported")
+    def _skip_brackets(self) -> None:
+        """Skip a part in brackets or braces; nodes that are named in it can be used later."""
+        if self._ahead not in CLOSERS:
+            raise self._error(f"expected '{{', not {self._ahead[:40]!r}")
+        closers: list[str] = []
+        while True:
+            token = self._take()
+            if token in CLOSERS:
+                closers.append(CLOSERS[token])
+            elif token in ("}", "]"):
+                if token != closers.pop():
+                    raise self._error(f"{token!r} closes nothing")
+                if not closers:
+                    return
+            elif token == "DEF":
+                name = self._new_name()
+                self._named[name] = Node(self._ahead, (), name)
 
-    def _no_node(self, _depth: int) -> Node:
-        """Parse a value in the place of a node."""
-        raise self._error(f"expected a node, not {self._ahead!r}")
-
-    def _again(self, kind: str, field: str) -> None:
-        """Decide about a field that is given a second time."""
-        raise self._error(f"the field {field} is given twice in one {kind}")
-
-    def _unknown(self, kind: str, _name: str | None, _depth: int) -> Node:
-        """Parse a node that is not in the table."""
-        raise self._error(f"the node {kind!r} is not supported")
-
-    def _stray(self, kind: str, field: str, _depth: int) -> list[Node]:
-        """Parse a token in the place of a field of a node ``kind``; return children in it."""
-        raise self._error(f"{kind} has no field {field!r}")
-
-    def _value(self, kind: Type, depth: int) -> Value:
-        if self._ahead == "IS":
-            return self._placeholder(kind)
+    def _value(self, kind: Type | None, depth: int) -> Value:
+        """Return the next value of a type; None stands for a type without a meaning here."""
+        if self._ahead == IS:
+            self._take()
+            return Node(IS, (("type", "" if kind is None else kind.value),), self._take())
         match kind:
+            case None:
+                return self._skipped()
             case Type.NODE:
-                if self._ahead[:1] in VALUES and self._ahead:
-                    return self._no_node(depth)
                 return self._node(depth + 1)
             case Type.NODE_LIST:
                 return tuple(self._items(lambda: self._node(depth + 1)))
@@ -203,18 +257,24 @@ class Reader:
                 whole = self._row(INTEGERS, int)
                 return tuple(self._items(self._integer)) if whole is None else whole
         width = WIDTHS[kind]
-        if kind not in LISTS:
-            row = tuple(self._float() for _ in range(width))
-            return row[0] if width == 1 else row
         # A list of one value may omit its brackets.
-        if self._ahead != "[":
-            return tuple(self._float() for _ in range(width))
+        if kind not in LISTS or self._ahead != "[":
+            row = tuple(self._float() for _ in range(width))
+            return row[0] if width == 1 and kind not in LISTS else row
         numbers = self._row(NUMBERS, float)
         if numbers is None:
             numbers = tuple(self._items(self._float))
         if len(numbers) % width:
             raise self._error(f"{len(numbers)} numbers do not form rows of {width}")
         return numbers
+
+    def _skipped(self) -> Value:
+        """Skip a value of numbers, such as an SFImage or MFTime."""
+        if self._ahead == "[":
+            self._skip_brackets()
+        while self._ahead[:1].isdigit() or self._ahead[:1] in ("+", "-", "."):
+            self._take()
+        return ()
 
     def _items(self, one: Callable[[], T]) -> Iterator[T]:
         if self._ahead != "[":
@@ -227,19 +287,14 @@ class Reader:
 
     def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
         """Return a list of plain numbers at once; None if the list is not that simple."""
-        if self._ahead != "[":
-            return None
         end = self._text.find("]", self._next)
         plain = self._text[self._next : end].replace(",", " ")
-        if end < 0 or not pattern.fullmatch(plain):
-            return None
-        numbers = tuple(map(one, plain.split()))
-        if not all(map(math.isfinite, numbers)):
+        if self._ahead != "[" or end < 0 or not pattern.fullmatch(plain):
             return None
         self._next = end
         self._take()
         self._take()
-        return numbers
+        return tuple(map(one, plain.split()))
 
     def _string(self) -> str:
         token = self._take()
@@ -250,45 +305,18 @@ class Reader:
 
     def _bool(self) -> bool:
         token = self._take()
-        if token not in ("TRUE", "FALSE"):
+        if token.upper() not in ("TRUE", "FALSE"):
             raise self._error(f"expected TRUE or FALSE, not {token!r}")
-        return token == "TRUE"
+        return token.upper() == "TRUE"
 
     def _float(self) -> float:
         token = self._take()
         if not _NUMBER.fullmatch(token):
             raise self._error(f"expected a number, not {token!r}")
-        value = float(token)
-        if not math.isfinite(value):
-            raise self._error(f"the number {token!r} is too large")
-        return value
+        return float(token)
 
     def _integer(self) -> int:
         token = self._take()
         if not _INTEGER.fullmatch(token):
             raise self._error(f"expected a whole number, not {token!r}")
         return int(token, 0) if "x" in token.lower() else int(token)
-
-    def _route(self) -> Route:
-        self._take()
-        source, out = self._end(EVENTS, "out of")
-        self._expect("TO")
-        target, into = self._end(SETTERS, "into")
-        kinds = {name: node.kind for name, node in self._named.items() if node is not None}
-        if EVENTS[kinds[source], out] is not SETTERS[kinds[target], into]:
-            raise self._error(f"{source}.{out} and {target}.{into} have different types")
-        return Route(source, out, target, into)
-
-    def _end(self, events: Mapping[tuple[str, str], Type], which: str) -> tuple[str, str]:
-        token = self._take()
-        name, _, event = token.partition(".")
-        node = self._named.get(name)
-        if node is None or (node.kind, event) not in events:
-            raise self._error(f"a route cannot go {which} {token!r}")
-        return name, event
-
-
-def _nodes(value: Value | None) -> list[Node | Use]:
-    """Return the nodes in a field."""
-    items = value if isinstance(value, tuple) else (value,)
-    return [each for each in items if isinstance(each, Node | Use)]

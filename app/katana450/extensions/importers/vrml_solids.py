@@ -1,7 +1,7 @@
-"""Surfaces of the geometry nodes of VRML97 and X3D, in their own frames.
+"""Surfaces of the geometry nodes of VRML97, in their own frames.
 
-Sources: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
-6.23 IndexedFaceSet, 6.42 Sphere; ISO/IEC 19775-1:2023, 11.4 and 32.4, sets of triangles and quads.
+Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
+6.23 IndexedFaceSet, 6.42 Sphere.
 """
 
 from __future__ import annotations
@@ -18,6 +18,17 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 ROUND = 32
 """Number of sides that approximate a circle."""
+
+NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+"""The surface of a node without a size."""
+
+LENGTHS = {
+    "Box": ("size",),
+    "Cone": ("bottomRadius", "height"),
+    "Cylinder": ("radius", "height"),
+    "Sphere": ("radius",),
+}
+"""Fields of a solid that must not be negative."""
 
 
 def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
@@ -110,7 +121,9 @@ def _turned(
 
 
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
-    points, table = coordinates(node), colour_table(node, left_out)
+    coord, table = part(node, "coord"), colour_table(node)
+    there = coord is not None and coord.kind == "Coordinate"
+    points = numbers(coord, "point", (), 3) if coord is not None and there else np.zeros((0, 3))
     index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
     corners, sizes = split(index)
     face_colours = corner_colours = None
@@ -126,78 +139,16 @@ def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
             face_colours = chosen_colours(table, places[: len(sizes)], fits, left_out)
     if face_colours is not None:
         corner_colours = np.repeat(face_colours, sizes, axis=0)
-    surface = _of_whole_faces(points, corners, sizes, corner_colours, name, left_out)
+    surface = of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
     return _facing(surface, not flag(node, "ccw"))
 
 
-def _set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
-    """Return the surface of a set of X3D: triangles, quadrangles, fans or strips."""
-    points, table = coordinates(node), colour_table(node, left_out)
-    kind = node.kind.removeprefix("Indexed")
-    indexed = kind != node.kind
-    index = numbers(node, "index", ())[:, 0].astype(np.int64) if indexed else np.arange(len(points))
-    if kind in ("TriangleSet", "QuadSet"):
-        size = 3 if kind == "TriangleSet" else 4
-        count = len(index) // size
-        corners, sizes = index[: count * size], np.full(count, size)
-    else:
-        fans = kind == "TriangleFanSet"
-        if indexed:
-            index, runs = split(index)
-        else:
-            runs = numbers(node, "fanCount" if fans else "stripCount", ())[:, 0].astype(np.int64)
-            # Points that are not there belong to no run.
-            ends = np.minimum(np.cumsum(np.maximum(runs, 0)), len(points))
-            runs = np.diff(ends, prepend=0)
-        check_triangles(int(runs.sum()) - 2 * len(runs), name)
-        first = np.repeat(np.cumsum(runs) - runs, runs)
-        last = np.flatnonzero(np.arange(len(first)) - first >= 2)
-        first = first[last]
-        # Every second triangle of a strip has the other orientation.
-        odd = (last - first) % 2
-        places = (first, last - 1, last) if fans else (last - 2 + odd, last - 1 - odd, last)
-        corners, sizes = index[np.column_stack(places).ravel()], np.full(len(last), 3)
-    colours = None if table is None else chosen_colours(table, corners, True, left_out)
-    surface = _of_whole_faces(points, corners, sizes, colours, name, left_out)
-    return _facing(surface, not flag(node, "ccw"))
-
-
-def _of_whole_faces(
-    points: FloatArray,
-    corners: IntArray,
-    sizes: IntArray,
-    corner_colours: FloatArray | None,
-    name: str,
-    left_out: Counter[str],
-) -> MeshSurface:
-    """Return the surface of the faces whose vertices are all there."""
-    owner = np.repeat(np.arange(len(sizes)), sizes)
-    whole = np.ones(len(sizes), dtype=bool)
-    whole[owner[(corners < 0) | (corners >= len(points))]] = False
-    if not whole.all():
-        left_out["faces whose vertices are missing"] += int((~whole).sum())
-        corner_colours = None if corner_colours is None else corner_colours[whole[owner]]
-        corners, sizes = corners[whole[owner]], sizes[whole]
-    return of_polygons(points, corners, sizes, name, corner_colours=corner_colours)
-
-
-def coordinates(node: Node) -> FloatArray:
-    """Return the coordinates (n, 3) of a geometry."""
-    coord = part(node, "coord")
-    if coord is None or coord.kind not in ("Coordinate", "CoordinateDouble"):
-        return np.zeros((0, 3))
-    return numbers(coord, "point", (), 3)
-
-
-def colour_table(node: Node, left_out: Counter[str]) -> FloatArray | None:
-    """Return the colours (c, 3 or 4) of a geometry; None if it has none."""
+def colour_table(node: Node) -> FloatArray | None:
+    """Return the colours (c, 3) of a geometry; None if it has none."""
     color = part(node, "color")
-    if color is None or color.kind == "NULL":
+    if color is None or color.kind != "Color":
         return None
-    if color.kind not in ("Color", "ColorRGBA"):
-        left_out["colours that do not match the faces"] += 1
-        return None
-    return numbers(color, "color", (), 4 if color.kind == "ColorRGBA" else 3)
+    return numbers(color, "color", (), 3)
 
 
 def split(index: IntArray) -> tuple[IntArray, IntArray]:
@@ -211,14 +162,11 @@ def split(index: IntArray) -> tuple[IntArray, IntArray]:
 def chosen_colours(
     table: FloatArray, places: IntArray, fits: bool, left_out: Counter[str]
 ) -> FloatArray | None:
-    """Return the colours (k, 4) at ``places`` of ``table`` (c, 3 or 4).
-
-    None if they do not match.
-    """
+    """Return the colours (k, 4) at ``places`` of ``table`` (c, 3); None if they do not match."""
     if not fits or (places < 0).any() or (places >= len(table)).any():
         left_out["colours that do not match the faces"] += 1
         return None
-    return np.column_stack((table[places], np.ones(len(places))))[:, :4]
+    return np.column_stack((table[places], np.ones(len(places))))
 
 
 def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
@@ -236,14 +184,14 @@ def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
         columns, rows = (columns, rows) if 0 < columns * rows < len(height) else (0, 0)
         height = height[: columns * rows]
     if min(columns, rows) < 2:
-        return of_polygons(np.zeros((0, 3)), np.arange(0), np.arange(0), name)
+        return NOTHING
     x = np.arange(columns) * number(node, "xSpacing", 1.0)
     z = np.arange(rows) * number(node, "zSpacing", 1.0)
     points = np.column_stack((np.tile(x, rows), height, np.repeat(z, columns)))
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     corners = np.column_stack((first, first + columns, first + columns + 1, first + 1)).ravel()
     corner_colours = None
-    table = colour_table(node, left_out)
+    table = colour_table(node)
     if table is not None:
         by_vertex = flag(node, "colorPerVertex")
         places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
@@ -263,7 +211,7 @@ def _extrusion(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     count, rows = len(section), len(spine)
     if count < 2 or rows < 2 or not len(scale) or not len(turns):
         left_out["Extrusion with too few points"] += 1
-        return MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+        return NOTHING
     check_triangles(2 * (count - 1) * (rows - 1), name)
     frames = _frames(spine)
     points = np.empty((rows, count, 3))
@@ -347,12 +295,20 @@ SOLIDS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Cylinder": _cylinder,
     "Sphere": _sphere,
     "IndexedFaceSet": _face_set,
-    **{
-        f"{prefix}{kind}Set": _set
-        for prefix in ("", "Indexed")
-        for kind in ("Triangle", "TriangleFan", "TriangleStrip", "Quad")
-    },
     "ElevationGrid": _grid,
     "Extrusion": _extrusion,
 }
 """The function that builds the surface, by the kind of a node."""
+
+
+def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | None:
+    """Return the surface of a geometry node; None for an unknown kind.
+
+    ``name`` is the name of the file; ``left_out`` counts what contradicts the rest.
+    """
+    if node.kind not in SOLIDS:
+        return None
+    if any((numbers(node, field, (1.0,)) < 0.0).any() for field in LENGTHS.get(node.kind, ())):
+        left_out[f"{node.kind} without a size"] += 1
+        return NOTHING
+    return SOLIDS[node.kind](node, name, left_out)
