@@ -1,7 +1,7 @@
 // Several files of one object: those that were dropped or chosen, as one .zip file without compression.
 
 // Suffixes of shapes, of files that shapes name, and of shapes that need no other file.
-const SHAPES = /\.(stl|obj|ply|off|glb|gltf|dae|3mf|wrl|wrz|x3d|x3dv|zip|zae)$/i;
+const SHAPES = /\.(stl|obj|ply|off|glb|gltf|dae|3mf|wrl|wrz|zip|zae)$/i;
 const OTHERS = /\.(bin|mtl)$/i;
 const ALONE = /\.(stl|ply|off|glb|dae|3mf|zip|zae)$/i;
 

@@ -69,11 +69,6 @@ def test_files_that_are_dropped_together_are_one_object(page: ViserPage, reader:
     drop(page, robot_wrl=f'{HEADER}\nInline {{ url "p/part.wrl" }}'.encode(), part_wrl=part)
     page.wait_until(lambda: "robot" in scales(reader), "the other object")
     assert "12 triangles" in shown(page)
-    plate = b"UNIT length cm 0.01 Shape { geometry QuadSet { coord Coordinate { point [ %s ] } } }"
-    world = b"#X3D V3.3 utf8\nPROFILE Full " + plate % b"0 0 0 4 0 0 4 4 0 0 4 0"
-    drop(page, plate_x3dv=world)
-    page.wait_until(lambda: "plate" in scales(reader), "the object in X3D")
-    assert "2 triangles, 40 × 0 × 40 mm; the unit is cm, as in the file" in shown(page)
 
 
 @pytest.mark.long

@@ -168,7 +168,7 @@ def _mesh() -> dict[str, Any]:
             _query("name", "The file's name, with its ending.", required=True),
             _query(
                 "format",
-                "wrl, x3d, x3dv, stl, obj, ply, off, glb, gltf, dae, 3mf or zip, for a name "
+                "wrl, stl, obj, ply, off, glb, gltf, dae, 3mf or zip, for a name "
                 "without an ending. A zip holds one such file and the files that it names.",
             ),
             _query("main", "Path in a zip of the file to read, if there are several."),
