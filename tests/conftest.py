@@ -48,11 +48,30 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect long tests unless all tests are requested."""
-    left_out = set() if LONG else {item for item in items if item.get_closest_marker("long")}
+    """Deselect what is long, and all but some cases of a test, unless all tests are requested."""
+    left_out = set() if LONG else _long(items)
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
+
+
+def _long(items: list[pytest.Item]) -> set[pytest.Item]:
+    """Return the items that `make test` leaves out.
+
+    Of a test with the marker ``cases(n)`` it runs n cases, spread evenly over those that are not
+    long by themselves.
+    """
+    left_out = {item for item in items if item.get_closest_marker("long")}
+    tests: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item not in left_out and item.get_closest_marker("cases"):
+            tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in tests.values():
+        marker = cases[0].get_closest_marker("cases")
+        number = min(marker.args[0], len(cases)) if marker is not None else len(cases)
+        chosen = {cases[len(cases) * place // number] for place in range(number)}
+        left_out.update(set(cases) - chosen)
+    return left_out
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -65,6 +65,7 @@ def test_pitch_and_roll_leave_the_yaw_to_the_arm(arm: MountedArm) -> None:
         assert same > 0
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("decimals", [6, 4, 3])
 def test_printed_quaternions_are_taken_and_their_rounding_reported(
     arm: MountedArm, decimals: int

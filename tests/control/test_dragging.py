@@ -204,6 +204,7 @@ def check_tick(
     return state
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
 def test_drags_keep_branch_limits_and_progress(
     arm: ArmModel, session: Session, priority: Priority
@@ -231,6 +232,7 @@ def other_arms() -> Iterator[tuple[str, Chain]]:
         yield f"member {seed} beside", limited.with_tool(chain.M @ random_pose(rng, 0.02))
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("chain", [pytest.param(chain, id=name) for name, chain in other_arms()])
 def test_drags_of_other_arms_keep_branch_limits_and_progress(chain: Chain) -> None:
     arm = ArmModel(chain, {"tool": chain.M}, "tool", NO_GRIPPER)

@@ -114,6 +114,7 @@ def jog(v: FloatArray, pitch: float = 0.0) -> cmd.Jog:
     return cmd.Jog(np.array([*v, pitch, 0.0]))
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     "case", [*QUICK, *(pytest.param(each, marks=pytest.mark.long) for each in MORE)]
 )

@@ -98,6 +98,7 @@ def lag_and_error(
     return lag, error
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("hz", [50.0, 100.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.003])
@@ -125,6 +126,7 @@ def test_sine_inside_the_limits_keeps_its_amplitude(
     assert error <= (0.012 if rates or not jitter else 0.04) * size
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("period", [0.8, 1.0, pytest.param(1.5, marks=pytest.mark.long), 2.0])
 def test_sine_beyond_the_limits_is_clipped_without_overshoot(
@@ -184,6 +186,7 @@ def test_time_of_another_clock_is_ignored(session: Session, state: State) -> Non
         cmd.Servo(session.ready, None, math.nan)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("every", [1, 2, 5])
 def test_feasible_stream_is_followed_closely(session: Session, every: int) -> None:
     stream = wave(session)
@@ -226,6 +229,7 @@ def test_ended_stream_rests_at_its_last_sample(session: Session) -> None:
     assert np.abs(state.setpoint - q).max() < 1e-9
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("rates", [False, True])
 @pytest.mark.parametrize("jitter", [0.0, 0.02])
 def test_slow_uneven_stream_is_followed_without_overshoot(

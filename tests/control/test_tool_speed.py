@@ -74,6 +74,7 @@ def test_repeated_jumps_keep_the_tool_speed(session: Session, kind: str) -> None
     assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("size", "longest", "seed"),
     [

@@ -75,6 +75,7 @@ def test_own_arm_is_solved_and_planned(tmp_path: Path) -> None:
     assert "1000 poses solved" in said
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("arm", ["youbot_arm", "pincherx_150"])
 def test_arm_of_another_file_is_solved_and_planned(tmp_path: Path, arm: str) -> None:
     said = run(
@@ -149,6 +150,7 @@ def stage(arm: MountedArm) -> Stage:
     return Stage(arm)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     "name",
     [

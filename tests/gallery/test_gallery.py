@@ -158,6 +158,7 @@ def test_address_of_a_real_arm_is_refused_where_only_names_are_possible(
     assert f"{address!r} is an address or a file" in capsys.readouterr().err
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("address", ["http://nowhere", "192.0.2.1"])
 def test_the_address_of_a_real_arm_is_no_name(
     address: str, capsys: pytest.CaptureFixture[str]

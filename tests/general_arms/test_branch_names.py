@@ -113,6 +113,7 @@ def test_home_has_the_name_of_what_is_seen(name: str) -> None:
     assert "-".join(name_of(chain, DrivenTool(chain).ready((), np.eye(4)))) == expected
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize(
     ("chain", "q", "expected"),
     [
@@ -138,6 +139,7 @@ def test_known_posture_has_the_name_of_what_is_seen(
     assert "-".join(name_of(chain, np.radians(q))) == expected
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("chain", [UR5E, PUMA_560], ids=["UR5e", "Puma 560"])
 def test_arm_is_left_or_right_of_axis_1_as_seen_from_there(chain: Chain) -> None:
     for q in postures(chain, 1):
@@ -156,6 +158,7 @@ def test_wrist_is_on_the_side_of_the_shoulder_or_behind_axis_1() -> None:
         assert name_of(KR_6, q)[0] == ("front" if side > 0.0 else "back")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("chain", FOUR.values(), ids=FOUR)
 def test_tool_is_on_the_side_to_which_four_axes_face(chain: Chain) -> None:
     for q in postures(chain, 3):

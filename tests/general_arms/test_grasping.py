@@ -97,6 +97,7 @@ def in_base(plan: Planned, state: State) -> FloatArray:
     return plan.session.environment.pose(state.held, state.x_setpoint)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", EVERY)
 def test_box_is_picked_carried_upright_and_placed(name: str, tmp_path: Path) -> None:
     bench = BENCHES[name]
@@ -132,6 +133,7 @@ def test_fingers_close_on_the_sides_that_the_grasp_chose(name: str, tmp_path: Pa
     assert max(gaps) - min(gaps) < 1e-4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OF_FREE_AXES)
 def test_object_is_turned_as_the_script_says(name: str, tmp_path: Path) -> None:
     box = item("part", "box", (40.0, 55.0, 60.0), (500.0, 100.0), 50.0)
@@ -142,6 +144,7 @@ def test_object_is_turned_as_the_script_says(name: str, tmp_path: Path) -> None:
     assert yaw(end) % 180.0 == pytest.approx(25.0, abs=1e-6)
 
 
+@pytest.mark.long
 def test_cylinder_is_grasped_from_the_front_and_set_down(tmp_path: Path) -> None:
     can = item("can", "cylinder", (25.0, 110.0), (450.0, -150.0))
     steps = ["grasp: {object: can, side: front}", "line: {by: {z: 80}}", "set_down:", "home"]
@@ -151,6 +154,7 @@ def test_cylinder_is_grasped_from_the_front_and_set_down(tmp_path: Path) -> None
     assert max(in_base(plan, state)[2, 3] for state in states if state.held) > 0.079
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["OpenMANIPULATOR-X", pytest.param("Panda", marks=pytest.mark.long)]
 )
@@ -167,6 +171,7 @@ def test_box_is_stacked_on_another(name: str, tmp_path: Path) -> None:
     assert place(b) == pytest.approx([*bench.near, size[2]], abs=1e-6)
 
 
+@pytest.mark.long
 def test_released_object_stands_on_what_is_below_it(tmp_path: Path) -> None:
     box = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
     steps = ["pick: part", "line: {by: {z: -53}}", "release", "home"]
@@ -174,6 +179,7 @@ def test_released_object_stands_on_what_is_below_it(tmp_path: Path) -> None:
     assert place(states[-1].objects[0]) == pytest.approx([500.0, 100.0, 0.0], abs=1e-6)
 
 
+@pytest.mark.long
 def test_low_box_is_held_by_the_fingertips(tmp_path: Path) -> None:
     steps = ["pick: plate", "place: {at: {x: 400, y: -200}}"]
     plan = planned(

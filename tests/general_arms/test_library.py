@@ -146,6 +146,7 @@ def test_two_axes_have_no_plans(tmp_path: Path, case: str) -> None:
         PLANS[case](arm)
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("frame", ["shoulder", "base"])
 def test_line_of_the_library_is_straight(urdf: Urdf, name: str, frame: str) -> None:
@@ -164,6 +165,7 @@ def test_line_of_the_library_is_straight(urdf: Urdf, name: str, frame: str) -> N
         np.testing.assert_allclose(back.end, plan.start, atol=1e-9)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["px100", "vx300s", "ur5", "seven"])
 def test_circle_of_the_library_closes(urdf: Urdf, name: str) -> None:
     arm = load(urdf(name), frame="base")

@@ -159,6 +159,7 @@ def _tilt(found: Pour, state: State) -> float:
     return float(np.degrees(np.arccos(np.clip(found.cup(state)[2, 2], -1.0, 1.0))))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("name", "left"), [pytest.param("UR5e", 140.0, marks=pytest.mark.long), ("four axes", 40.0)]
 )
@@ -172,12 +173,14 @@ def test_part_is_poured(name: str, left: float, tmp_path: Path) -> None:
     assert water.spilled == 0
 
 
+@pytest.mark.long
 def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
     why = "The cup cannot be emptied into basin: The path leaves the reach of the arm"
     with pytest.raises(ScriptError, match=why):
         planned(tmp_path, "four axes", "{into: basin, shake: 0}")
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["UR5e", "four axes"])
 @pytest.mark.parametrize(
     ("pour", "why"),
@@ -208,6 +211,7 @@ def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.M
         planned(tmp_path, "beside", "{into: basin, ml: 60}")
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("name", "ml", "rate"),
     [

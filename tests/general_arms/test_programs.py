@@ -109,6 +109,7 @@ def test_run_keeps_the_limits_of_every_joint(chain: Chain) -> None:
         assert (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max() <= 1.0 + 1e-6
 
 
+@pytest.mark.cases(2)
 @every(SOME, REST)
 @pytest.mark.parametrize("normal", ["x", "[0.2, 1, 1]"])
 def test_circle_closes_in_the_tool_and_in_the_joints(chain: Chain, normal: str) -> None:
@@ -128,6 +129,7 @@ def test_circle_closes_in_the_tool_and_in_the_joints(chain: Chain, normal: str) 
     assert path.turned_off(sigma, q).max() < 1e-9
 
 
+@pytest.mark.cases(2)
 @every(SOME, REST)
 def test_derivatives_of_the_joints_are_exact(chain: Chain) -> None:
     angles = "" if chain.n < 6 else f", {angles_beside(chain, (0.1, -0.1, 0.2))}"
@@ -143,6 +145,7 @@ def test_derivatives_of_the_joints_are_exact(chain: Chain) -> None:
     np.testing.assert_allclose(q, (ahead[0] + behind[0]) / 2 - h * h / 2 * second, atol=1e-8)
 
 
+@pytest.mark.cases(1)
 @every({"UR5e": UR5E, "KR 6": KR_6, "Panda": PANDA}, {"skewed 6": SKEWED_6})
 def test_pose_with_an_orientation_is_taken_and_the_line_turns_to_it(chain: Chain) -> None:
     T = pose(session_of(chain), begun(session_of(chain)))
@@ -184,6 +187,7 @@ def test_four_axes_have_a_pitch_wherever_the_tool_goes() -> None:
         assert abs(math.remainder(roll - now[0], math.tau)) < 1e-9
 
 
+@pytest.mark.cases(2)
 @every(SOME, {})
 def test_lines_arc_and_screw_are_planned(chain: Chain) -> None:
     p, d = middle(chain), 0.3 * length(chain)
@@ -232,6 +236,7 @@ def test_swivel_of_seven_axes_turns_where_it_must() -> None:
     assert PANDA.within_limits(path.end)
 
 
+@pytest.mark.cases(1)
 @every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"Panda": PANDA})
 def test_trajectory_of_all_joints_is_followed(chain: Chain) -> None:
     q = np.degrees(builder(chain).q)

@@ -161,6 +161,7 @@ def test_drags_keep_branch_and_limits(name: str) -> None:
         assert found.clear >= 2
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SEVEN)
 def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 52)

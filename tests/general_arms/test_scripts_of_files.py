@@ -47,6 +47,7 @@ def test_example_is_valid_for_editors() -> None:
     assert "$schema=../script.schema.json" in text
 
 
+@pytest.mark.long
 def test_example_keeps_to_its_curves_and_limits(ur5e_file: Path) -> None:
     plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
     simulation = run_by_clock(plan)
@@ -105,6 +106,7 @@ def test_example_runs_at_the_terminal_with_a_report(ur5e_file: Path, tmp_path: P
     assert {"report.html", "trace.csv", "path.png", "speeds.png", "tracing.png"} <= found
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "chain",
     [

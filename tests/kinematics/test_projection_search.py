@@ -58,6 +58,7 @@ NARROW = (
 )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(("lower", "upper"), NARROW)
 @pytest.mark.parametrize("branch", [None, FRONT_UP])
 def test_no_search_within_narrow_limits_beats_it(

@@ -34,6 +34,7 @@ def test_braked_agrees_with_the_limiter() -> None:
         )
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_limits_hold_for_any_stream(seed: int) -> None:
     """Also test ticks of uneven length."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +24,7 @@ def role(node: ast.ClassDef) -> str:
     return "step" if {"read", "build"} <= methods else ""
 
 
+@cache
 def defined_twice(package: Path) -> set[str]:
     """Return the names of public classes with several definitions at the top of modules.
 

@@ -61,6 +61,7 @@ def loads(path: Path, scaling: Scaling, bounds: Bounds) -> np.ndarray:
     )
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_hold_for_any_tau(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
@@ -79,6 +80,7 @@ def test_limits_hold_at_a_small_corner(bounds: Bounds, paths: dict[str, Path]) -
     assert loads(path, fastest(path, bounds), bounds).max() <= 1.0
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_duration_is_near_the_optimum(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str

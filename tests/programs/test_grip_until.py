@@ -50,6 +50,7 @@ def play(stage: Stage, steps: str, state: State) -> tuple[Run, State]:
     return run, states[-1]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("until", "wanted"), [("3 N", 3.0), ("0.8", 0.8)])
 def test_fingers_close_until_the_force_is_reached(
     stage: Stage, holding: State, until: str, wanted: float

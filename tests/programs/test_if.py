@@ -274,6 +274,7 @@ def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State
     assert refused.value.problems[0].line == 3
 
 
+@pytest.mark.long
 def test_grasp_before_an_if_is_tried_again(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     """The basin is so near that it can only be reached at another pitch than the first one."""
     monkeypatch.setattr(UntimedPath, "timed", lambda self: self)

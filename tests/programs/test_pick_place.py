@@ -73,6 +73,7 @@ def test_box_is_placed_where_the_script_says(stage: Stage, side: str) -> None:
     assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
 
 
+@pytest.mark.long
 def test_box_is_turned_as_the_script_says(stage: Stage) -> None:
     steps = "- pick: part\n- place: {at: {x: 230, y: -120, yaw: 25}}\n"
     end = played(stage, steps, box("part", NEAR, (30.0, 45.0, 60.0), yaw=50.0))
@@ -144,18 +145,21 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         # The pitch of the grasp has nothing to do with it.
-        (
+        pytest.param(
             "- pick: part\n- place: {at: {x: 230, y: 720}}\n",
             "nothing carries it there.*choose a place on it.$",
+            marks=pytest.mark.long,
         ),
-        (
+        pytest.param(
             "- pick: part\n- place: {at: {x: 100, y: -40}}\n",
             r"placed there: The path .* at \(100.0, -40.0, \d+.\d\) mm in the base frame",
+            marks=pytest.mark.long,
         ),
         ("- pick: part\n- place: {on: basin}\n", "basin is open at its top and cannot carry part"),
-        (
+        pytest.param(
             "- pick: part\n- place: {at: {x: 60, y: -200}}\n",
             "basin is open at its top and cannot carry part",
+            marks=pytest.mark.long,
         ),
         pytest.param(
             "- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n",
@@ -194,6 +198,7 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
         planned(stage, steps, *objects)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("steps", "stopped"),
     [
@@ -255,6 +260,7 @@ def summary(task: Task) -> tuple[str, float]:
     return type(task.action).__name__, 0.0 if plan is None else round(plan.duration, 9)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("command", [cmd.Stop(), cmd.Pause()])
 def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
     stage: Stage, command: cmd.Command
@@ -267,6 +273,7 @@ def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
     assert list(map(summary, program.tasks)) == list(map(summary, free.tasks))
 
 
+@pytest.mark.long
 def test_arm_that_reaches_over_its_shoulder_grasps_from_home(stage: Stage) -> None:
     backwards = np.radians((-169.0, -122.0, 123.0, -112.0, 167.0))
     start = replace(stage.session.begin(backwards, 0.0, 0.0), objects=(box("box", (330.0, 0.0)),))
@@ -280,6 +287,7 @@ def test_arm_that_reaches_over_its_shoulder_grasps_from_home(stage: Stage) -> No
     assert "grasp box: home" not in [task.name for task in begun.tasks]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("checked", [False, True])
 def test_run_fails_if_the_fingers_close_on_nothing(stage: Stage, checked: bool) -> None:
     """Somebody takes the object away while the arm approaches it."""

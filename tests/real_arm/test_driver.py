@@ -87,6 +87,7 @@ def test_motion_is_followed_over_a_connection() -> None:
         assert 0.0 < loop.report.round_trip < 0.1
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("fault", ["silence", "reset", "garbage", "half"])
 def test_loss_is_reported_in_half_a_second_and_nothing_is_repeated(fault: str) -> None:
     pieces: dict[str, Sequence[Piece]] = {

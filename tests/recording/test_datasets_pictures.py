@@ -176,6 +176,7 @@ def test_interrupted_export_leaves_nothing(run: Path, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "number", [1, *(pytest.param(n, marks=pytest.mark.long) for n in range(2, 12))]
 )

@@ -77,6 +77,7 @@ def test_killed_writer_loses_a_second_at_most(number: int, given: Path, tmp_path
     assert path.read_bytes() == content
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("damaged", ["content", "head"])
 def test_recovery_continues_after_a_damaged_chunk(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], damaged: str

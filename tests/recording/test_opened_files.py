@@ -122,6 +122,7 @@ def test_files_of_a_killed_server_are_removed_by_the_next(temporary: Path, tmp_p
     assert not list(temporary.iterdir())
 
 
+@pytest.mark.long
 def test_download_is_sent_in_parts_and_removed(
     temporary: Path, tmp_path: Path, content: bytes
 ) -> None:

@@ -141,6 +141,7 @@ def test_difference_is_stated_with_its_time_and_size(page: Page, tmp_path: Path)
     assert re.match(r"first difference at t = [0-9.]+ s, 0 rad; 1 of [0-9]+ ticks", state["words"])
 
 
+@pytest.mark.long
 def test_selection_is_exported(page: Page, server: AppServer, tmp_path: Path) -> None:
     path = tmp_path / "all.mcap"
     path.write_bytes(page.ask("")[1])

@@ -90,6 +90,7 @@ def test_the_expansion_agrees_with_the_program_xacro(monkeypatch: pytest.MonkeyP
     assert read_urdf(FILE).decode() == stock.stdout.rstrip("\n")
 
 
+@pytest.mark.long
 def test_every_command_takes_xacro(
     tmp_path: Path, package: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -166,6 +167,7 @@ def test_an_older_file_needs_no_prefix_at_its_top(tmp_path: Path) -> None:
     assert read_robot(path).require_arm().chain.n == 5
 
 
+@pytest.mark.cases(8)
 @pytest.mark.parametrize(
     ("line", "expected"),
     [

@@ -13,6 +13,7 @@ from katana450.extensions.xacro.xacro_process import FORBIDDEN, FileGuard
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize(
     "expression",
     [

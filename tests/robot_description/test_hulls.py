@@ -166,6 +166,7 @@ def outside_hulls(link: str) -> Manifold:
     return functools.reduce(lambda a, b: a - b, hulls(link), solid(link))
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("link", [link for link in LINKS if link != "pan_link"])
 def test_hulls_enclose_the_whole_link(link: str) -> None:
     # Rounding leaves thin skins where the faces of hull and solid coincide.

@@ -147,6 +147,7 @@ def height_in_hand(session: Session, state: State) -> float:
     return in_base - float(se3.inverse(palm)[2, 3])
 
 
+@pytest.mark.long
 def test_weak_grip_lets_the_cup_slide_down_to_the_table(
     session: Session, arm: MountedArm, model: TouchModel, holding: State
 ) -> None:
