@@ -188,6 +188,7 @@ def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
     assert turned[4] == pytest.approx(-0.5, abs=0.01)
 
 
+@pytest.mark.long
 def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artefacts: Path) -> None:
     shown = robot.page.drag_slider("1 base turn", 60.0)
     assert shown == pytest.approx(60.0, abs=4.0)
@@ -308,6 +309,7 @@ def test_arm_stops_before_the_table_with_reason_and_warning_colour(
     assert not last.body["visible"]
 
 
+@pytest.mark.long
 def test_typed_pose_reports_the_impossible_yaw(robot: Robot) -> None:
     page = robot.page
     for label, values in (("x, y, z", (350.0, 0.0, 0.0)), ("r, p, y", (0.0, 30.0, 23.0))):

@@ -94,6 +94,7 @@ def sized(window: ViserPage) -> Iterator[Page]:
     window.page.emulate_media(color_scheme="light")
 
 
+@pytest.mark.cases(1)
 @in_sizes_and_schemes(SIZES, ("phone", "dark"), ("tablet", "light"), ("desk", "light"))
 def test_stop_is_always_visible_and_the_largest_button(
     page: ViserPage, sized: Page, truth: Truth, artefacts: Path, size: str, scheme: str
@@ -204,6 +205,7 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
     assert page.errors == []
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("size", "scheme"),
     [
@@ -250,6 +252,7 @@ def test_long_name_of_a_program_leaves_its_step_and_time(
         arm.ask(requests.Resume())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_refusals_can_be_read(window: ViserPage, sized: Page, scheme: str) -> None:
     take(window)

@@ -154,6 +154,7 @@ def test_the_map_of_another_arm_is_refused(tmp_path: Path) -> None:
         AppServer((*APP, "--workspace", str(path))).start()
 
 
+@pytest.mark.long
 def test_priority_applies_to_every_window(
     page: ViserPage, server: AppServer, open_page: OpenPage
 ) -> None:

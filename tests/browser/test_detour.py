@@ -74,6 +74,7 @@ def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
         )
 
 
+@pytest.mark.long
 def test_reason_names_the_joint(page: ViserPage, server: AppServer, artefacts: Path) -> None:
     with connect(server.url, "Driver") as driver:
         driver.ask(requests.Joint(axis=5, value=30.0))

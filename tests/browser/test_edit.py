@@ -62,6 +62,7 @@ def pixel_of(page: ViserPage, reader: Client, name: str) -> tuple[float, float]:
     return page.project(T[:3, 3] + (0.0, 0.0, 0.5 * found.size[-1]))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("document", ["scene", pytest.param("page", marks=pytest.mark.long)])
 def test_dropped_file_is_put_on_the_table(page: ViserPage, reader: Client, document: str) -> None:
     before = names(reader)
@@ -79,6 +80,7 @@ def test_dropped_file_is_put_on_the_table(page: ViserPage, reader: Client, docum
     assert page.errors == []
 
 
+@pytest.mark.long
 def test_file_lands_on_the_table_where_it_was_dropped(
     page: ViserPage, reader: Client, artefacts: Path
 ) -> None:

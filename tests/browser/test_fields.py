@@ -220,6 +220,7 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
     assert watch.sent == [80]
 
 
+@pytest.mark.long
 def test_pose_form_converts_units_and_copies_the_present_pose(page: ViserPage) -> None:
     def numbers(label: str) -> list[float]:
         return [float(page.number_box(label, index=i).input_value()) for i in range(3)]

@@ -80,6 +80,7 @@ def done(page: ViserPage, label: str) -> bool:
     return "done" in step.inner_text()
 
 
+@pytest.mark.long
 def test_first_drag_is_asked_for_and_noticed(visit: ViserPage, artefacts: Path) -> None:
     press(visit, "Drag the arrows")
     ring = visit.page.locator("#pulse").bounding_box()

@@ -62,6 +62,7 @@ def _rotation_vector(T: Matrix) -> Matrix:
     return vtf.SO3.from_matrix(T[:3, :3]).log()
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(("axis", "metres"), [("x", -0.06), ("y", 0.05), ("z", 0.07)])
 def test_an_arrow_moves_the_box_along_its_axis(page: ViserPage, axis: Axis, metres: float) -> None:
     page.drag_arrow(MOVE, axis, metres)
@@ -74,6 +75,7 @@ def test_an_arrow_moves_the_box_along_its_axis(page: ViserPage, axis: Axis, metr
     assert np.delete(moved(), along) == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("node", "axis", "radians"), [(PITCH, "y", 0.5), (PITCH, "y", -0.7), (ROLL, "x", 0.6)]
 )
@@ -88,6 +90,7 @@ def test_a_ring_turns_the_box_about_its_axis(
     assert page.node_pose(BOX)[:3, 3] == pytest.approx(START, abs=1e-6)
 
 
+@pytest.mark.long
 def test_a_slider_is_dragged_by_mouse(page: ViserPage) -> None:
     for degrees in (75.0, -120.0):
         shown = page.drag_slider("Axis 1", degrees)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
@@ -21,6 +23,7 @@ def rate(page: ViserPage) -> float:
     return 1e3 * float(after[0] - before[0]) / float(after[1] - before[1])
 
 
+@pytest.mark.long
 def test_heartbeats_are_seldom_only_while_nothing_can_move(open_page: OpenPage) -> None:
     with AppServer(APP) as server:
         truth = Truth(server)

@@ -151,6 +151,7 @@ def test_knob_of_a_spectator_springs_back_with_the_reason(
         other.ask(requests.ReleaseLease())
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("key", ["Space", pytest.param("Escape", marks=pytest.mark.long)])
 def test_stop_keys_work_on_a_knob(page: ViserPage, truth: Truth, key: str) -> None:
     pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
@@ -193,6 +194,7 @@ def test_gauges_show_the_values_of_the_server(page: ViserPage, truth: Truth) -> 
     page.wait_until(lambda: shows("tool-speed") == 0.0, "the tool to rest")
 
 
+@pytest.mark.long
 def test_plot_can_be_read_and_paused_and_stops_while_closed(page: ViserPage, truth: Truth) -> None:
     turn(page, "axis-1", 30.0)
     truth.wait(10.0, mood="ok")
@@ -226,6 +228,7 @@ def test_plot_can_be_read_and_paused_and_stops_while_closed(page: ViserPage, tru
     assert np.median(np.diff(kept["t [s]"])) < 0.06
 
 
+@pytest.mark.long
 def test_layout_is_arranged_by_mouse_and_keys_and_kept(page: ViserPage) -> None:
     first, elbow = places(page), goal(page, "axis-3")
     arrange(page)
@@ -318,6 +321,7 @@ def test_slow_connection_shows_few_but_no_old_states(
     context.close()
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("size", SIZES)
 def test_instruments_fit_the_page(page: ViserPage, artefacts: Path, size: str) -> None:
     before = page.page.viewport_size

@@ -56,6 +56,7 @@ def test_a_held_key_moves_the_tool_along_one_axis(
     assert np.allclose(camera(page), looked, atol=1e-6)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("between", ["Control", "#own-name"])
 def test_released_key_ends_its_jog_whatever_was_pressed_or_has_the_focus(
     page: ViserPage, truth: Truth, between: str
@@ -144,6 +145,7 @@ def test_gamepad_moves_only_with_its_shoulder_button(page: ViserPage, truth: Tru
     clear_stop(page, truth)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("by", ["key", "gamepad"])
 def test_what_is_held_when_a_stop_is_cleared_moves_nothing(
     page: ViserPage, server: AppServer, truth: Truth, by: str

@@ -91,6 +91,7 @@ def test_key_held_while_a_step_is_chosen_is_released(sheet: ViserPage, truth: Tr
     assert np.allclose(tool(truth), start, atol=EXACT)
 
 
+@pytest.mark.long
 def test_joints_move_by_steps(sheet: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["q"])
     choose(sheet, "frame", "joints")

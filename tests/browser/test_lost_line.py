@@ -63,6 +63,7 @@ def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefa
         robot.settle()
 
 
+@pytest.mark.long
 def test_lost_page_offers_nothing_that_needs_the_arm(open_page: OpenPage) -> None:
     with AppServer() as server:
         page = open_page(server.url, nodes=("/arm", MOVE))

@@ -110,6 +110,7 @@ def test_a_chosen_folder_is_one_object(page: ViserPage, reader: Client, tmp_path
     page.press_in_bar("Objects")
 
 
+@pytest.mark.long
 def test_a_large_object_is_placed_with_a_scale(
     page: ViserPage, reader: Client, artefacts: Path
 ) -> None:

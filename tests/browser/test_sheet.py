@@ -128,6 +128,7 @@ def test_finger_moves_the_panel_between_three_heights(
     wait_state(phone, "folded")
 
 
+@pytest.mark.long
 def test_keys_and_screen_readers_change_the_height(phone: ViserPage, server: AppServer) -> None:
     truth = Truth(server)
     button = phone.frame.get_by_role("button", name="Controls, folded", exact=True)

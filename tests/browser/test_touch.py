@@ -118,6 +118,7 @@ def felt(page: Page) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.long
 def test_devices_vibrate_only_after_they_were_turned_on(page: Page, arm: Client) -> None:
     grip(arm, OPEN)
     page.click("#more-button")
@@ -165,6 +166,7 @@ def state(*reasons: str, **values: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("found", "strong", "weak"),
     [
