@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import json
 import os
 import re
@@ -37,7 +38,7 @@ objects:
 """
 
 # Languages that a test below runs or reads; tests/exchange/test_c_kinematics.py compiles C.
-CHECKED = {"c", "console", "csv", "json", "python", "sh", "toml", "yaml"}
+CHECKED = {"c", "console", "csv", "json", "pycon", "python", "sh", "toml", "yaml"}
 # Other languages, and why nothing runs them.
 NOT_CHECKED = {
     "text": "a diagram, or a summary of options, which is compared with the help",
@@ -154,6 +155,22 @@ def test_python_runs(block: CodeBlock, folder: Path, server: AppServer) -> None:
         assert [command.name for command in extension.commands] == (
             ["weather"] if extension.name == "weather" else []
         )
+
+
+@pytest.mark.parametrize("block", code_blocks("pycon"), ids=identifier)
+def test_output_of_python_is_as_printed(block: CodeBlock) -> None:
+    session = doctest.DocTestParser().get_doctest(
+        block.text, {}, str(block), block.document, block.line
+    )
+    reports: list[str] = []
+    doctest.DocTestRunner().run(session, out=reports.append)
+    assert session.examples
+    assert not reports, "".join(reports)
+
+
+def test_readme_shows_python_with_its_output_on_one_screen() -> None:
+    assert "README.md" in {block.document for block in code_blocks("pycon")}
+    assert (ROOT / "README.md").read_bytes().count(b"\n") <= 90
 
 
 @pytest.mark.usefixtures("folder")
