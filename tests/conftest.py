@@ -36,7 +36,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(LowestPriority() if in_worker else Completeness())
     # A shell has what it runs in the background ignore Ctrl-C, and so would all it starts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    # Servers that the tests start keep their event logs out of the user's folders.
+    # Servers that the tests start open no browser.
+    os.environ.pop("BROWSER", None)
+    # They keep their event logs out of the user's folders.
     state = tempfile.mkdtemp(prefix="katana450-")
     os.environ["XDG_STATE_HOME"] = state
     atexit.register(shutil.rmtree, state, ignore_errors=True)

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # APP therefore has longer timeouts than ATTENTIVE_APP, which has the default ones.
 # SIMULATION_APP pauses after silence; the others stop, as with a real arm.
 # RECORDING_APP is the app as people start it. The others save the time of recording and planning.
-RECORDING_APP = (sys.executable, "-m", "katana450", "serve", "--port", "{port}")
+RECORDING_APP = (sys.executable, "-m", "katana450", "serve", "--no-browser", "--port", "{port}")
 SIMULATION_APP = (*RECORDING_APP, "--no-record", "--no-idle-planning")
 ATTENTIVE_APP = (*SIMULATION_APP, "--strict-silence")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")

@@ -26,6 +26,7 @@ from katana450.assembly.output import say
 from katana450.assembly.stop_process import StopConfig, run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
+from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError
 from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
 from katana450.platform_support import (
@@ -139,6 +140,9 @@ def serve(
         supervisor.wait_for(FRONT_END, OPEN)
         if not stopping.is_set():
             say(f"Open {url} in a browser.")
+            # With access links each person has an address of their own.
+            if options and not options.no_browser and settings.access is None:
+                show_page(url, listening.getsockname()[1], stop_port)
         supervisor.wait_for(STOP, READY)
         supervisor.wait_for(FRONT_END, READY)
         if not stopping.is_set():

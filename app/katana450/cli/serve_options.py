@@ -97,6 +97,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="who may clear a stop: the driver (or any operator while nobody drives), or only the "
         "person who pressed STOP and admins (default: %(default)s)",
     )
+    parser.add_argument("--no-browser", action="store_true", help="do not open the page by itself")
     for part in serve_extensions():
         if part.add_options is not None:
             part.add_options(parser)

@@ -189,7 +189,7 @@ def server_at(script: Script, options: Namespace) -> Iterator[str]:
     port = str(urlsplit(options.url).port)
     # -P: Python does not search the current folder, which may contain an `app.py`.
     python = [sys.executable, "-P", "-m", "katana450"]
-    command = [*python, "serve", "--port", port, "--urdf", str(options.urdf)]
+    command = [*python, "serve", "--no-browser", "--port", port, "--urdf", str(options.urdf)]
     if script.bare:
         command.append("--bare")
     if options.plant is not None:

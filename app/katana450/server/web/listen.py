@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import socket
+from contextlib import suppress
 from ipaddress import ip_address
 
 from katana450.errors import ConfigurationError
@@ -104,10 +105,12 @@ def reaches_beyond(listening: socket.socket) -> bool:
 
 def _refused(host: str, port: int, error: OSError, option: str) -> str:
     if error.errno == errno.EADDRINUSE:
-        return (
-            f"Port {port} on {host} is in use by another program. "
-            f"Stop it, or choose another port: {option} {port + 1}"
-        )
+        another = f"{option} {port + 2}"
+        with suppress(OSError), socket.create_connection((host, port), timeout=1.0) as server:
+            server.sendall(b"GET / HTTP/1.0\r\nHost: localhost\r\n\r\n")
+            if b"<title>Katana450" in server.makefile("rb").read(8192):
+                return f"katana450 already runs on port {port}. Open its page, or add {another}"
+        return f"Port {port} on {host} is in use. Choose another one: {another}"
     if error.errno == errno.EACCES:
         return f"Port {port} may not be opened by this user. Choose one above 1023 with {option}."
     return f"Cannot listen on {host}: {error.strerror}. Choose another with --host."
