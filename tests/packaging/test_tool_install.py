@@ -1,4 +1,4 @@
-"""An installation by `uv tool install`, without make, has a working command and serves the page."""
+"""Installations without make have a working command, serve the page and move the arm."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ import os
 import shutil
 import subprocess
 import sys
+import tarfile
 import urllib.request
+import venv
+import zipfile
 from pathlib import Path
 
 import pytest
 
+from katana450.client import connect
+from katana450.server.api import answers
 from tests.browser.server import AppServer
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.packaging.conftest import ROOT, build
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +57,26 @@ def test_tool_computes_and_serves(command: Path, tmp_path: Path) -> None:
         with urllib.request.urlopen(server.url, timeout=30) as answer:
             assert b"katana450" in answer.read().lower()
         assert server.running
+
+
+@pytest.mark.long
+def test_wheel_from_the_source_distribution_moves_an_arm(wheel: Path, tmp_path: Path) -> None:
+    """Install it by pip into an empty environment, with the newest dependencies that it allows."""
+    with tarfile.open(build("sdist", ROOT, tmp_path)) as source:
+        source.extractall(tmp_path / "source", filter="data")
+    (folder,) = (tmp_path / "source").iterdir()
+    built = build("wheel", folder, tmp_path / "dist")
+    first, second = (set(zipfile.ZipFile(each).namelist()) for each in (wheel, built))
+    assert first == second
+    assert list((folder / "docs" / "images").glob("*.webp"))
+
+    python = tmp_path / "empty" / "bin" / "python"
+    venv.create(tmp_path / "empty", with_pip=True)
+    pip = [str(python), "-m", "pip", "install", "--quiet", str(built)]
+    done = subprocess.run(pip, capture_output=True, text=True, check=False, timeout=900)
+    assert done.returncode == 0, done.stderr
+    command = [str(python.with_name("katana450")), "serve", "--no-browser", "--port", "{port}"]
+    with AppServer(command, folder=tmp_path) as server, connect(server.url) as arm:
+        target = [0.4, -1.0, 1.4, 0.3, 0.0]
+        assert arm.joints(target).why == ""
+        assert arm.query(answers.State).q == pytest.approx(target, abs=1e-3)
