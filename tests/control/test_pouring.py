@@ -21,7 +21,6 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.liquid import HONEY
 from katana450.maths.water.units import ML, counted
 from katana450.settings import Settings
 
@@ -79,7 +78,7 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     """The film agrees with that of short steps, also when the cup begins to move between two."""
     state = held_level(session, full)
     assert state.poured is not None
-    water = replace(state.poured.water, film=8 * 10**12, liquid=HONEY)
+    water = replace(state.poured.water, film=8 * 10**12)
     state = replace(state, poured=replace(state.poured, water=water))
     start, seen = state.t, []
     for _ in range(1050):

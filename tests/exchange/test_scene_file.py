@@ -32,7 +32,6 @@ from katana450.extensions.programs.scene_reader import parsed
 from katana450.extensions.scene.text import written
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.water.liquid import LIQUIDS, WATER
 
 T_PALM_TOOL = frozen(se3.from_rotation_translation(so3.exp((0.1, 0.2, 0.3)), (0.01, -0.02, 0.15)))
 NAMES = st.text(
@@ -98,7 +97,6 @@ def scenes(draw: st.DrawFn) -> Scene:
         tuple(draw(objects(name)) for name in names),
         draw(st.none() | st.floats(0.0, 2e-4)),
         None if joints is None else np.array(joints),
-        draw(st.sampled_from(tuple(LIQUIDS.values()))),
     )
 
 
@@ -112,7 +110,6 @@ def test_a_written_scene_is_read_back(scene: Scene) -> None:
     assert written(back, {SOLID.key: file}, T_PALM_TOOL) == text
     assert (back.water is None) == (scene.water is None)
     assert (back.water or 0.0) == pytest.approx(scene.water or 0.0, abs=1e-12)
-    assert back.liquid == (WATER if scene.water is None else scene.liquid)
     if scene.joints is not None:
         assert back.joints is not None
         np.testing.assert_allclose(back.joints, scene.joints, atol=1e-10)
@@ -245,7 +242,6 @@ THINGS = "scene: 1\nobjects:\n"
         (THINGS + ball() + "# " + "-" * 70_000, "at most 64 KB"),
         ("scene: 1\nobjects: &a []\n", "Anchors"),
         ("scene: 1\nwater: -1\n", "line 2.*not between"),
-        ("scene: 1\nwater: 1\nliquid: milk\n", "line 3.*one of water, oil, honey"),
         (MESH.format(file="gone.stl"), "line 3.*gone.stl"),
         (MESH.format(file="it.exe"), "line 3.*it.exe"),
         (MESH.format(file="scene.yaml"), "line 3.*scene.yaml has an unknown format"),

@@ -21,11 +21,14 @@ from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.modes import IDLE
+from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.stop_cause import pressed
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.water import water_environment
 from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
@@ -41,6 +44,8 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import plan
 from katana450.maths.planning.scaling import Bounds
+from katana450.maths.water.course import Course
+from katana450.maths.water.flow import WaterFlow
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.control.test_session_machine import ArmRules, bounded
@@ -117,6 +122,20 @@ def test_every_command_survives_to_the_bit(
         back = copied(cmd.Command, each)
         assert type(back) is type(each)
         assert text_of(cmd.Command, back) == text_of(cmd.Command, each), each
+
+
+def test_water_of_older_versions_is_read_and_other_liquids_are_refused(state: State) -> None:
+    """They wrote the liquid in the cup, which counts in the digests of their states."""
+    fill = cmd.Fill(1e-4)
+    form = Codec().encoded(cmd.Command, fill)
+    liquid = ["water", 998.2, 0.0010016, 0.07274, [74, 148, 192]]
+    assert Codec().decoded(cmd.Command, {**form, "liquid": liquid}) == fill
+    honey = ["honey", 1421.0, 19.0, 0.055, [194, 116, 0]]
+    with pytest.raises(FormError, match="Fill has no field 'liquid'"):
+        Codec().decoded(cmd.Command, {**form, "liquid": honey})
+    water = WaterFlow(water_environment(load_props())).begin(1e-4, np.eye(4))
+    full = replace(state, poured=MotionWithWater(water, Course(), (0.0, 0.0, 0.0)))
+    assert b"liquid" in Digester().content(full)
 
 
 def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:

@@ -18,8 +18,8 @@ from katana450.arm.robot.water import water_environment
 from katana450.extensions.water.nodes import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.liquid import HONEY, LIQUIDS, OIL, WATER
 from katana450.maths.water.puddle import THICKNESS, Puddle
+from katana450.maths.water.surface import COLOUR
 from katana450.srgb import to_srgb
 from tests.viser_bridge.internals import nodes, outlet
 from tests.water.motions import NO_ACCELERATION, over_basin, placed, poured, turned_to
@@ -132,22 +132,19 @@ def test_a_puddle_lies_where_water_fell_and_grows(recorded: Recorded) -> None:
     assert not recorded.node("puddle0").visible
 
 
-def test_each_liquid_has_its_colour(recorded: Recorded) -> None:
-    T = placed(0.3, -0.2, 0.1)
-    for liquid in (HONEY, WATER, OIL):
-        water = FLOW.begin(2e-4, T, liquid)
-        recorded.nodes.show(water)
-        assert recorded.node("cup").color == recorded.node("stream").color == liquid.colour
-        assert not recorded.node("basin").visible
-        water = replace(water, basin=10**14, puddles=(Puddle((0.3, 0.0, 0.0), 10**12),))
-        recorded.nodes.show(water)
-        for name in ("basin", "puddle0"):
-            node = recorded.node(name)
-            assert node.visible
-            assert drawn(node.glb_data) == pytest.approx(liquid.colour, abs=2.0)
-        level = FLOW.water_environment.basin.level(1e-4)
-        assert recorded.node("basin").scale[2] == pytest.approx(level)
-    assert len({each.colour for each in LIQUIDS.values()}) == len(LIQUIDS)
+def test_water_has_one_colour_everywhere(recorded: Recorded) -> None:
+    water = FLOW.begin(2e-4, placed(0.3, -0.2, 0.1))
+    recorded.nodes.show(water)
+    assert recorded.node("cup").color == recorded.node("stream").color == COLOUR
+    assert not recorded.node("basin").visible
+    water = replace(water, basin=10**14, puddles=(Puddle((0.3, 0.0, 0.0), 10**12),))
+    recorded.nodes.show(water)
+    for name in ("basin", "puddle0"):
+        node = recorded.node(name)
+        assert node.visible
+        assert drawn(node.glb_data) == pytest.approx(COLOUR, abs=2.0)
+    level = FLOW.water_environment.basin.level(1e-4)
+    assert recorded.node("basin").scale[2] == pytest.approx(level)
 
 
 def drawn(glb: bytes) -> list[float]:

@@ -275,9 +275,9 @@ class ScriptWriter:
         """Set an object to another place on the table [mm], without the arm."""
         self._add("put", {"object": name, "x": x, "y": y})
 
-    def fill(self, ml: Number, of: str | None = None) -> None:
-        """Fill the cup [ml] with "water", "oil" or "honey"; with water unless given."""
-        self._add("fill", ml if of is None else {"ml": ml, "of": of})
+    def fill(self, ml: Number) -> None:
+        """Fill the cup with water [ml]."""
+        self._add("fill", ml)
 
     def grasp(
         self,

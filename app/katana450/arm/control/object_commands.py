@@ -14,7 +14,6 @@ from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.errors import InputError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.water.liquid import WATER, Liquid
 
 SCENE_TRAITS = CommandTraits(while_stopped=True, supersedes=False, passive=True, joints_only=True)
 """Traits of the commands about objects, water and appearance."""
@@ -37,12 +36,11 @@ class PlaceObject(BaseCommand):
 
 @dataclass(frozen=True)
 class Fill(BaseCommand):
-    """Fill the cup with ``volume`` [m^3] of ``liquid``, and remove all other liquid."""
+    """Fill the cup with ``volume`` [m^3], and remove all other water."""
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
     volume: float
-    liquid: Liquid = WATER
 
     def __post_init__(self) -> None:
         check_finite("The volume", self.volume)
@@ -126,14 +124,12 @@ class ReplaceScene(BaseCommand):
     Attributes:
         objects: the new objects.
         volume: volume in the cup [m^3]; None for no water anywhere.
-        liquid: the liquid in the cup.
     """
 
     traits: ClassVar[CommandTraits] = SCENE_TRAITS
 
     objects: tuple[SceneObject, ...]
     volume: float | None = None
-    liquid: Liquid = WATER
 
     def __post_init__(self) -> None:
         names = {scene_object.name for scene_object in self.objects}

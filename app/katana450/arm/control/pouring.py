@@ -12,7 +12,6 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.course import Course
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.vectors import Vector, scale, sub, vector
 
 CUP, BASIN = "cup", "basin"
@@ -65,16 +64,16 @@ class Pouring:
         self._flow(()).begin(volume, np.eye(4))
 
     def fill(
-        self, volume: float, objects: Sequence[SceneObject], x: FloatArray, liquid: Liquid = WATER
+        self, volume: float, objects: Sequence[SceneObject], x: FloatArray
     ) -> MotionWithWater | None:
-        """Return ``volume`` [m^3] of ``liquid`` in the cup and none elsewhere; None without a cup.
+        """Return ``volume`` [m^3] in the cup and none elsewhere; None without a cup.
 
         x: (k,) joints and finger joint [rad]. Raises InputError for more than the cup holds.
         """
         T = self._pose(objects, x)
         if T is None:
             return None
-        water = self._flow(objects).begin(volume, T, liquid)
+        water = self._flow(objects).begin(volume, T)
         return MotionWithWater(water, Course(), self._middle(T))
 
     def step(

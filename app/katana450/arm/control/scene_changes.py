@@ -19,7 +19,6 @@ from katana450.arm.control.scene_objects import (
     with_replaced,
 )
 from katana450.arm.control.state import State
-from katana450.maths.water.liquid import Liquid
 
 
 def with_scene_change(
@@ -42,22 +41,20 @@ def with_scene_change(
                 for each in state.objects
             )
             return replace(state, objects=mounted)
-        case cmd.ReplaceScene(objects=objects, volume=volume, liquid=liquid):
+        case cmd.ReplaceScene(objects=objects, volume=volume):
             replaced = replace(state, objects=with_replaced(state.objects, objects))
-            return with_water(pouring, replaced, volume, liquid)
-        case cmd.Fill(volume=volume, liquid=liquid):
-            return with_water(pouring, state, volume, liquid)
+            return with_water(pouring, replaced, volume)
+        case cmd.Fill(volume=volume):
+            return with_water(pouring, state, volume)
     raise AssertionError(f"The table of transitions has no rule for {command!r}.")
 
 
-def with_water(
-    pouring: Pouring | None, state: State, volume: float | None, liquid: Liquid
-) -> State:
-    """Return ``state`` with ``volume`` [m^3] of ``liquid`` in the cup; None for no water."""
+def with_water(pouring: Pouring | None, state: State, volume: float | None) -> State:
+    """Return ``state`` with ``volume`` [m^3] in the cup; None for no water."""
     if volume is None:
         return replace(state, poured=None)
     assert pouring is not None
-    return replace(state, poured=pouring.fill(volume, state.objects, state.x_setpoint, liquid))
+    return replace(state, poured=pouring.fill(volume, state.objects, state.x_setpoint))
 
 
 def removed(state: State, name: str) -> State:

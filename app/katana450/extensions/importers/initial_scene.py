@@ -34,7 +34,7 @@ def initial_scene(
 ) -> InitialScene:
     """Return the initial scene. Raises InputError; see ``load_initial_scene``."""
     stored, notes = load_initial_scene(session, scene, object_files)
-    command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water, stored.scene.liquid)
+    command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water)
     return InitialScene(command, stored.scene.joints, stored.meshes, notes)
 
 

@@ -10,7 +10,6 @@ from katana450.errors import LeaseError
 from katana450.extensions.importers.scene_file import StoredScene, scene_zip
 from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
 from katana450.extensions.programs.scene_draft import Scene
-from katana450.maths.water.liquid import WATER
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.service.arm_handle import ArmHandle
@@ -36,9 +35,7 @@ def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmHandle) -> an
     """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
     key = hashlib.sha256(data).hexdigest()[:32]
     scene = stored.scene
-    scenes_of(hub).keep(
-        key, cmd.ReplaceScene(scene.objects, scene.water, scene.liquid), stored.meshes, arm
-    )
+    scenes_of(hub).keep(key, cmd.ReplaceScene(scene.objects, scene.water), stored.meshes, arm)
     names = [scene_object.name for scene_object in scene.objects]
     text = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
     if scene.joints is not None:
@@ -59,10 +56,9 @@ def _stored(hub: Hub, arm: ArmHandle) -> StoredScene:
         raise LeaseError(
             f"{held.name!r} is held. Set it down first: a scene cannot have held objects."
         )
-    water, liquid = None, WATER
+    water = None
     if state.poured is not None:
         water = ML * state.poured.water.kept / MILLILITRE
-        liquid = state.poured.water.liquid
     keys = dict.fromkeys(t.solid.key for t in state.objects if t.solid is not None)
     meshes = tuple(hub.meshes.need(key) for key in keys)
-    return StoredScene(Scene(state.objects, water, state.q, liquid), meshes)
+    return StoredScene(Scene(state.objects, water, state.q), meshes)

@@ -1,4 +1,4 @@
-"""Water in a picture: the shapes of the page, in the translucent colour of the liquid."""
+"""Water in a picture: the shapes of the page, in its translucent colour."""
 
 from __future__ import annotations
 
@@ -22,9 +22,17 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.parcel import landing
-from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
+from katana450.maths.water.surface import (
+    BODY_FACES,
+    COLOUR,
+    STREAM_FACES,
+    Faces,
+    blob,
+    body,
+    disc,
+    stream,
+)
 from katana450.maths.water.units import FEMTOLITRE
 
 CUP, STREAM, BASIN, PUDDLE = (
@@ -35,44 +43,42 @@ CUP, STREAM, BASIN, PUDDLE = (
 )
 """Names of the items of water."""
 
+RED, GREEN, BLUE = COLOUR
+MATERIAL = Material("water", (RED / 255.0, GREEN / 255.0, BLUE / 255.0), 0.0, ROUGH)
+"""Material of all water."""
+
 
 def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[Translucent]:
     """Return all visible parts of the water."""
     found: list[Translucent] = []
-    material = _material(water.liquid)
     basin, level = water_environment.basin, water_environment.basin.level(water.basin * FEMTOLITRE)
     if water.cup >= WORTH_SHOWING:
         up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, water_environment.cup.floor))
         corners = (
             body(water_environment.cup.inside, WaterFlow(water_environment).surface(water)) * INSET
         )
-        shape = _shape(material, corners, BODY_FACES)
+        shape = _shape(corners, BODY_FACES)
         found.append(Translucent(Item(CUP, shape, water.T_base_cup @ up), IN_VESSEL))
     if water.parcels:
         end = landing(water.parcels[0], water_environment, level).age
         corners = stream(water.parcels, water_environment.cup.inside.radius, end)
-        shape = _shape(material, corners, STREAM_FACES)
+        shape = _shape(corners, STREAM_FACES)
         found.append(Translucent(Item(STREAM, shape, np.eye(4)), IN_AIR))
     if water.basin >= WORTH_SHOWING:
         level = max(level, CLEAR)
         radius, (x, y, z) = basin.radius(level), basin.at
         corners, faces = disc()
-        shape = _shape(material, corners * (radius, radius, level), faces)
+        shape = _shape(corners * (radius, radius, level), faces)
         T = se3.from_rotation_translation(np.eye(3), (x, y, z + basin.floor))
         found.append(Translucent(Item(BASIN, shape, T), IN_VESSEL))
     for number, puddle in enumerate(water.puddles):
         corners, faces = blob()
         scaled = corners * (puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0))
         T = se3.from_rotation_translation(so3.rotation_z(TWIST * number), puddle.at)
-        found.append(Translucent(Item(PUDDLE, _shape(material, scaled, faces), T), ON_TABLE))
+        found.append(Translucent(Item(PUDDLE, _shape(scaled, faces), T), ON_TABLE))
     return found
 
 
-def _material(liquid: Liquid) -> Material:
-    red, green, blue = liquid.colour
-    return Material(liquid.name, (red / 255.0, green / 255.0, blue / 255.0), 0.0, ROUGH)
-
-
-def _shape(material: Material, corners: FloatArray, faces: Faces) -> VisualMesh:
+def _shape(corners: FloatArray, faces: Faces) -> VisualMesh:
     whole = faces.astype(np.int64)
-    return VisualMesh(material, corners, smooth(corners, whole), whole)
+    return VisualMesh(MATERIAL, corners, smooth(corners, whole), whole)

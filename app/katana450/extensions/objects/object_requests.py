@@ -15,7 +15,6 @@ from katana450.errors import InputError
 from katana450.extensions.free_place import free_place
 from katana450.extensions.objects.scenes import scenes_of
 from katana450.maths.geometry import se3
-from katana450.maths.water.liquid import LIQUIDS
 from katana450.maths.water.units import ML
 from katana450.server.api import requests
 from katana450.server.service.participants import Participant
@@ -41,8 +40,8 @@ class ObjectRequests(RequestHandler):
                 return self._attached(request)
             case requests.Load(scene=key):
                 return scenes_of(self.hub).load_command(key, self.hub.present())
-            case requests.Fill(ml=ml, of=name):
-                return cmd.Fill(ML * ml, LIQUIDS[name])
+            case requests.Fill(ml=ml):
+                return cmd.Fill(ML * ml)
             case requests.Remove(name=name):
                 self._known(name)
                 return cmd.Remove(name)

@@ -13,7 +13,6 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan
-from katana450.maths.water.liquid import Liquid
 
 ACTION_TIMEOUT = 10.0
 """[s] Timeout of a finger motion, and of an arm that is blocked."""
@@ -114,14 +113,13 @@ class MoveFingers:
 
 @dataclass(frozen=True)
 class FillCup:
-    """Fill the cup with ``volume`` [m^3] of ``liquid``."""
+    """Fill the cup with ``volume`` [m^3] of water."""
 
     volume: float
-    liquid: Liquid
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that fills the cup."""
-        return (cmd.Fill(self.volume, self.liquid),)
+        return (cmd.Fill(self.volume),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return True. Raises InputError if there is no cup."""

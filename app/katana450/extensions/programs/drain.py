@@ -11,7 +11,7 @@ from katana450.maths.water.flow import Water
 from katana450.maths.water.units import FEMTOLITRE, ML
 
 MAX_DRAIN = 180.0
-"""[s] Maximum time to wait for a viscous liquid."""
+"""[s] Maximum time to wait."""
 
 END_FLOW = 0.2 * ML
 """[m^3/s] Flow at which a cup counts as emptied."""

@@ -354,7 +354,7 @@ class PlanBuilder:
         self.taken, self.given_up = None, ()
 
     def predict_water(self, volume: float) -> None:
-        """Continue with ``volume`` [m^3] of the liquid in the cup."""
+        """Continue with ``volume`` [m^3] of water in the cup."""
         self.state = self._with_still_water(self.state, volume)
 
     def _with_still_water(self, state: State, volume: float | None = None) -> State:
@@ -364,7 +364,7 @@ class PlanBuilder:
             return state
         water = state.poured.water
         volume = water.kept * FEMTOLITRE if volume is None else volume
-        still = pouring.fill(volume, state.objects, state.x_setpoint, water.liquid)
+        still = pouring.fill(volume, state.objects, state.x_setpoint)
         return replace(state, poured=still)
 
     def joints_at(self, place: StepTarget) -> FloatArray:

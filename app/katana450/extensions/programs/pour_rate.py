@@ -11,7 +11,6 @@ from numpy.polynomial.polynomial import polyfit
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.units import ML
 
 RAMP_FRACTION = 0.3
@@ -91,7 +90,7 @@ class RatePlan:
         grown = self.ramp * (s**3 - 0.5 * s**4)
         return self.low * t + (self.rate - self.low) * (grown + max(t - self.ramp, 0.0))
 
-    def tilts(self, held: float, liquid: Liquid, cup: Cylinder) -> RatedTilt:
+    def tilts(self, held: float, cup: Cylinder) -> RatedTilt:
         """Return the tilts of a cup with ``held`` [m^3] at first.
 
         At each time the tilt is that at which the rest, without the film on the wall, has the flow.
@@ -101,6 +100,6 @@ class RatePlan:
         tilts = []
         for t in times.tolist():
             out = self.poured(t)
-            film = film_after(out, held - out, t, liquid, cup) if t > 0.0 else 0.0
-            tilts.append(tilt_for(self.flow(t), max(held - out - film, 0.0), liquid, cup))
+            film = film_after(out, held - out, t, cup) if t > 0.0 else 0.0
+            tilts.append(tilt_for(self.flow(t), max(held - out - film, 0.0), cup))
         return RatedTilt(self.duration, times, np.array(tilts))

@@ -9,26 +9,25 @@ import math
 
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.film import withdrawn_thickness
-from katana450.maths.water.lip import thinning_time, viscous_flow, weir_flow
-from katana450.maths.water.liquid import Liquid
+from katana450.maths.water.lip import THINNING_TIME, viscous_flow, weir_flow
 from katana450.maths.water.units import GRAVITY
 
 HALVINGS = 40
 """Number of halvings of the interval that contains the tilt: to 3e-12 rad."""
 
 
-def flow_at(tilt: float, volume: float, liquid: Liquid, cup: Cylinder) -> float:
+def flow_at(tilt: float, volume: float, cup: Cylinder) -> float:
     """Return the flow [m^3/s] out of a cup with ``volume`` [m^3] at ``tilt`` [rad]."""
     over = volume - cup.holds(tilt)
     head = -cup.margin(tilt, cup.level(tilt, volume))
     if over <= 0.0 or head <= 0.0:
         return 0.0
     weir = weir_flow(cup.radius, tilt, head, GRAVITY)
-    thick = viscous_flow(liquid, cup.radius, tilt, head, GRAVITY)
-    return min(weir, thick) + over / thinning_time(liquid)
+    thick = viscous_flow(cup.radius, tilt, head, GRAVITY)
+    return min(weir, thick) + over / THINNING_TIME
 
 
-def tilt_for(flow: float, volume: float, liquid: Liquid, cup: Cylinder) -> float:
+def tilt_for(flow: float, volume: float, cup: Cylinder) -> float:
     """Return the tilt [rad] at which a cup with ``volume`` [m^3] pours ``flow`` [m^3/s].
 
     The flow grows with the tilt. The result is pi if the flow is not reached.
@@ -36,7 +35,7 @@ def tilt_for(flow: float, volume: float, liquid: Liquid, cup: Cylinder) -> float
     low, high = 0.0, math.pi
     for _ in range(HALVINGS):
         tilt = 0.5 * (low + high)
-        if flow_at(tilt, volume, liquid, cup) < flow:
+        if flow_at(tilt, volume, cup) < flow:
             low = tilt
         else:
             high = tilt
@@ -61,7 +60,7 @@ def spill_tilt(cup: Cylinder, volume: float) -> float:
     return low
 
 
-def film_after(poured: float, rest: float, time: float, liquid: Liquid, cup: Cylinder) -> float:
+def film_after(poured: float, rest: float, time: float, cup: Cylinder) -> float:
     """Return the volume [m^3] of the film when ``poured`` [m^3] has flowed out in ``time`` [s].
 
     ``rest`` [m^3] stays in the cup. The surface falls evenly from that of the upright cup to that
@@ -71,4 +70,4 @@ def film_after(poured: float, rest: float, time: float, liquid: Liquid, cup: Cyl
     tilt = spill_tilt(cup, rest)
     bared = max(full - cup.wetted(tilt, cup.level(tilt, rest)), 0.0)
     speed = bared / (math.tau * cup.radius * time)
-    return 2.0 / 3.0 * bared * withdrawn_thickness(liquid, speed, GRAVITY)
+    return 2.0 / 3.0 * bared * withdrawn_thickness(speed, GRAVITY)

@@ -198,9 +198,8 @@ class Pour:
         if self.volume is None or pouring is None or poured is None:
             return EMPTY_TILT
         inside = pouring.water_environment(builder.state.objects).cup.inside
-        liquid = poured.water.liquid
-        film = film_after(self.volume, rest, PART_TIME, liquid, inside)
-        return float(tilt_for(PART_FLOW, rest - film, liquid, inside))
+        film = film_after(self.volume, rest, PART_TIME, inside)
+        return float(tilt_for(PART_FLOW, rest - film, inside))
 
     def _pour_about_the_lip(
         self, builder: PlanBuilder, cup: SceneObject, basin: SceneObject, rest: float
@@ -275,7 +274,7 @@ class Pour:
         inside = pouring.water_environment(builder.state.objects).cup.inside
         held = poured.water.kept * FEMTOLITRE
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
-        return RatePlan.of(out, self.rate).tilts(held, poured.water.liquid, inside)
+        return RatePlan.of(out, self.rate).tilts(held, inside)
 
     def _pour(
         self,

@@ -10,7 +10,6 @@ from katana450.arm.control.solid import ObjectAppearance, Solid
 from katana450.errors import InputError
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.liquid import WATER, Liquid
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,13 +20,11 @@ class Scene:
         objects: the objects; the fingers hold none of them.
         water: volume of the water in the cup [m^3]; None for no water.
         joints: (n,) posture of the arm [rad]; None if not given.
-        liquid: the liquid in the cup.
     """
 
     objects: tuple[SceneObject, ...]
     water: float | None = None
     joints: FloatArray | None = None
-    liquid: Liquid = WATER
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,6 @@ class SceneDraft:
     entries: tuple[SceneEntry, ...]
     water: float | None
     joints: FloatArray | None
-    liquid: Liquid = WATER
 
     def scene(self, solids: Mapping[MeshFile, Solid], T_palm_tool: FloatArray | None) -> Scene:
         """Return the scene, with the solid of each mesh file from ``solids``.
@@ -114,4 +110,4 @@ class SceneDraft:
                 problems += entry.at.wrong(str(error)).problems
         if problems:
             raise ScriptError(tuple(problems))
-        return Scene(tuple(objects), self.water, self.joints, self.liquid)
+        return Scene(tuple(objects), self.water, self.joints)

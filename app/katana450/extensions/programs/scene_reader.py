@@ -20,7 +20,6 @@ from katana450.extensions.programs.scene_draft import MeshFile, SceneDraft, Scen
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue, read
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.liquid import LIQUIDS, WATER
 from katana450.maths.water.units import ML
 
 VERSION = 1
@@ -55,14 +54,12 @@ def scene_draft(value: YamlValue, *, versioned: bool) -> SceneDraft:
         raise fields.value.wrong(f"The version must be {VERSION}, not {version:g}.")
     joints = fields.take("joints", listed(read_degrees(), 1, 16), None)
     water = fields.take("water", number(0.0, 10_000.0, "ml"), None)
-    liquid = fields.take("liquid", choice(*LIQUIDS), WATER.name)
     entries = fields.take("objects", scene_entries, ())
     fields.done()
     return SceneDraft(
         entries,
         None if water is None else ML * water,
         None if joints is None else np.array(joints),
-        LIQUIDS[liquid],
     )
 
 

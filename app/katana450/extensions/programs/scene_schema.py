@@ -16,7 +16,6 @@ from katana450.extensions.programs.schema_parts import (
     mapping,
     number_or_text,
 )
-from katana450.maths.water.liquid import LIQUIDS
 
 SIZE = number_or_text(0.0, MAX_WRITTEN_SIZE, "mm")
 
@@ -67,8 +66,7 @@ SCENE: Schema = any_of(
         {
             "scene": {"const": VERSION, "description": "Version of the format"},
             "joints": {**list_of(ANGLE, 1, 16), "description": "Posture at the start, deg"},
-            "water": number_or_text(0.0, 10_000.0, "Liquid in the cup, ml"),
-            "liquid": {"enum": list(LIQUIDS), "description": "The liquid, water unless given"},
+            "water": number_or_text(0.0, 10_000.0, "Water in the cup, ml"),
             "objects": OBJECTS,
         },
     ),

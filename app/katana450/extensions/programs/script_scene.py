@@ -103,12 +103,8 @@ class ScriptScene:
                 return f"there is also {name}"
         wanted, poured = (self.draft.water or 0.0) / ML, state.poured
         cup = 0.0 if poured is None else poured.water.kept / MILLILITRE
-        liquid = self.draft.liquid if poured is None or not wanted else poured.water.liquid
-        if abs(wanted - cup) > SAME_VOLUME or liquid != self.draft.liquid:
-            return (
-                f"the cup has {cup:.1f} ml of {liquid.name}, "
-                f"not {wanted:.1f} ml of {self.draft.liquid.name}"
-            )
+        if abs(wanted - cup) > SAME_VOLUME:
+            return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
         return ""
 
 
@@ -117,9 +113,7 @@ def begun(session: Session, scene: Scene) -> State:
     check_scene(session, scene)
     q = session.ready if scene.joints is None else scene.joints
     start = session.begin(q, session.require_arm().gripper.clamp(0.0), 0.0)
-    return session.step(
-        start, (cmd.ReplaceScene(scene.objects, scene.water, scene.liquid),), start.t
-    )
+    return session.step(start, (cmd.ReplaceScene(scene.objects, scene.water),), start.t)
 
 
 def check_scene(session: Session, scene: Scene) -> None:
@@ -135,7 +129,7 @@ def check_scene(session: Session, scene: Scene) -> None:
             raise InputError("The joints lie outside the limits of this arm.")
     if scene.water is not None and all(each.name != CUP for each in scene.objects):
         raise InputError("There is water, but no cup.")
-    session.check(cmd.ReplaceScene(scene.objects, scene.water, scene.liquid))
+    session.check(cmd.ReplaceScene(scene.objects, scene.water))
 
 
 def _object_difference(

@@ -21,7 +21,6 @@ from katana450.extensions.programs.schema_parts import (
     LENGTH,
     OBJECT,
     Schema,
-    any_of,
     mapping,
     number_or_text,
 )
@@ -29,47 +28,27 @@ from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.geometry import se3
-from katana450.maths.water.liquid import LIQUIDS, WATER, Liquid
 from katana450.maths.water.units import ML
 
 
 @dataclass(frozen=True)
 class Fill:
-    """Fill the cup with ``volume`` [m^3] of ``liquid``."""
+    """Fill the cup with ``volume`` [m^3] of water."""
 
-    schema: ClassVar[Schema] = any_of(
-        "Fill the cup with water, ml, or with another liquid",
-        number_or_text(0.0, 1000.0, "Volume of water, ml"),
-        mapping(
-            "A volume, and of which liquid",
-            "ml",
-            {
-                "ml": number_or_text(0.0, 1000.0, "Volume, ml"),
-                "of": {"enum": list(LIQUIDS), "description": "The liquid, water unless given"},
-            },
-        ),
-    )
+    schema: ClassVar[Schema] = number_or_text(0.0, 1000.0, "Fill the cup with water, ml")
 
     volume: float
-    liquid: Liquid = WATER
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read a volume [ml], or {ml, of}. Raises ScriptError."""
-        volume = read.number(0.0, 1000.0, "ml")
-        if value.kind != "mapping":
-            return cls(ML * volume(value))
-        fields = Fields(value, "a fill")
-        ml = fields.need("ml", volume, 0.0)
-        name = fields.take("of", read.choice(*LIQUIDS), WATER.name)
-        fields.done()
-        return cls(ML * ml, LIQUIDS[name])
+        """Read a volume [ml]. Raises ScriptError."""
+        return cls(ML * read.number(0.0, 1000.0, "ml")(value))
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the filling. Raises InputError if the cup is absent or too small."""
-        command = cmd.Fill(self.volume, self.liquid)
+        command = cmd.Fill(self.volume)
         builder.plan_context.session.check(command)
-        filled = FillCup(self.volume, self.liquid)
+        filled = FillCup(self.volume)
         builder.note("fill", filled, builder.after(command, ticks=1))
 
 

@@ -45,7 +45,6 @@ from katana450.maths.planning.plan import Nearest, Plan, Segment
 from katana450.maths.planning.scaling import Scaling
 from katana450.maths.water.course import Course
 from katana450.maths.water.flow import Water
-from katana450.maths.water.liquid import Liquid
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
@@ -67,7 +66,7 @@ ENUMS: Final[tuple[type, ...]] = (
 )
 """Enumerations whose members a recording can hold."""
 
-ROWS: Final[tuple[type, ...]] = (Liquid, Parcel, Puddle)
+ROWS: Final[tuple[type, ...]] = (Parcel, Puddle)
 """Named tuples, which are written as rows."""
 
 CLASSES: Final[tuple[type, ...]] = (

@@ -14,6 +14,11 @@ from katana450.extensions.recording.simple_forms import MAX_ITEMS, Coder
 TAG = "is"
 """Name of the item with the name of the class; no field of a class can have it."""
 
+FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
+"""Fields that older versions wrote, each with the only form that is still read. They could fill the
+cup with other liquids than water.
+"""
+
 ROUNDING = 1e-9
 """[1] Largest change of a number by a constructor that counts as rounding."""
 
@@ -128,7 +133,7 @@ class ClassCoder:
         for name, each in form.items():
             coder = self.fields.get(name)
             if coder is None:
-                if name == TAG:
+                if name == TAG or FORMER.get(name) == each:
                     continue
                 raise FormError(f"{self.kind.__name__} has no field {shown(name)}")
             try:

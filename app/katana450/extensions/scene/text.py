@@ -12,7 +12,6 @@ from katana450.extensions.programs.scene_draft import MeshFile, Scene
 from katana450.extensions.programs.scene_reader import VERSION
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.liquid import WATER
 from katana450.maths.water.units import ML
 
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 9
@@ -32,8 +31,6 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
         entry["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
     if scene.water is not None:
         entry["water"] = _round(scene.water / ML, LENGTH_DIGITS)
-        if scene.liquid != WATER:
-            entry["liquid"] = scene.liquid.name
     entry["objects"] = [
         _object_entry(scene_object, files, T_palm_tool) for scene_object in scene.objects
     ]

@@ -13,6 +13,7 @@ from katana450.arm.control.state import State
 from katana450.arm.control.support import surface_below
 from katana450.extensions.touch.solid_body import body_of
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import DENSITY as WATER_DENSITY
 from katana450.maths.water.units import FEMTOLITRE
 
 FRICTION = 0.8
@@ -43,7 +44,7 @@ def mass(scene_object: SceneObject, state: State, masses: Mapping[str, float]) -
         return DENSITY * body_of(scene_object).volume
     if scene_object.name == CUP and state.poured is not None:
         water = state.poured.water
-        return found + water.liquid.density * FEMTOLITRE * water.kept
+        return found + WATER_DENSITY * FEMTOLITRE * water.kept
     return found
 
 

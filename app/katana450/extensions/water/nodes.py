@@ -1,4 +1,4 @@
-"""The liquid in the scene: in the cup, in the air, in the basin and on the table."""
+"""The water in the scene: in the cup, in the air, in the basin and on the table."""
 
 from __future__ import annotations
 
@@ -13,9 +13,17 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import Water, WaterFlow
-from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import landing
-from katana450.maths.water.surface import BODY_FACES, STREAM_FACES, Faces, blob, body, disc, stream
+from katana450.maths.water.surface import (
+    BODY_FACES,
+    COLOUR,
+    STREAM_FACES,
+    Faces,
+    blob,
+    body,
+    disc,
+    stream,
+)
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
 from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.scene import Window
@@ -84,7 +92,7 @@ class WaterNodes:
         self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
         self._body: FloatArray | None = None
-        self._level, self._liquid = 0.0, WATER
+        self._level = 0.0
         inside = water_environment.cup.inside
         self._root = server.scene.add_frame(path, show_axes=False, visible=False)
         surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
@@ -96,17 +104,6 @@ class WaterNodes:
         # Made on first use: a good run spills nothing.
         self._puddles: list[viser.GlbHandle] = []
 
-    def _use(self, liquid: Liquid) -> None:
-        """Draw in the colour of ``liquid`` from now on."""
-        self._liquid, self._level = liquid, -1.0
-        self._cup.color = self._stream.color = liquid.colour
-        # The colour of these is in their files, which are sent once.
-        for node in (self._basin, *self._puddles):
-            node.remove()
-        self._puddles.clear()
-        self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
-        self.stand(self._water_environment)
-
     def stand(self, water_environment: WaterEnvironment) -> None:
         """Use the cup and the basin of ``water_environment`` from now on."""
         self._water_environment, self._flow = water_environment, WaterFlow(water_environment)
@@ -117,8 +114,6 @@ class WaterNodes:
         """Draw ``water``."""
         last, self._shown = self._shown, water
         if water is not last:
-            if water.liquid != self._liquid:
-                self._use(water.liquid)
             if last is None or not _same_in_cup(water, last):
                 self._show_cup(water)
             self._show_stream(water)
@@ -178,7 +173,7 @@ class WaterNodes:
         """Add water of a fixed shape as GLB, which mirrors the room; viser's meshes cannot."""
         return self._server.scene.add_glb(
             f"{self._path}/{name}",
-            _glossy(corners, faces, (*self._liquid.colour, opacity)),
+            _glossy(corners, faces, (*COLOUR, opacity)),
             cast_shadow=False,
             receive_shadow=False,
         )
@@ -190,7 +185,7 @@ class WaterNodes:
             f"{self._path}/{name}",
             corners,
             faces,
-            color=self._liquid.colour,
+            color=COLOUR,
             opacity=opacity,
             cast_shadow=False,
             receive_shadow=False,

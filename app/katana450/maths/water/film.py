@@ -1,4 +1,4 @@
-"""The film of liquid on the wall of a vessel that is emptied.
+"""The film of water on the wall of a vessel that is emptied.
 
 A falling surface leaves a film, which drains under gravity. Films are thin and slow, so viscosity
 alone resists them. The film counts as one volume: its profile over the wall is that of a film that
@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from katana450.maths.water.liquid import Liquid
-from katana450.maths.water.units import REST_FLOW
+from katana450.maths.water.units import DENSITY, REST_FLOW, SURFACE_TENSION, VISCOSITY
 
 LANDAU_LEVICH = 0.944
 """Factor [1] of the law of Landau and Levich. Their thickness divided by that of Derjaguin is this
@@ -18,7 +17,7 @@ factor times the sixth root of the capillary number.
 """
 
 
-def withdrawn_thickness(liquid: Liquid, speed: float, g: float) -> float:
+def withdrawn_thickness(speed: float, g: float) -> float:
     """Return the thickness [m] of the film that a surface leaves as it recedes along a wall.
 
     A thick film is limited by gravity, (mu U / rho g)^(1/2) (Derjaguin, C. R. Acad. Sci. URSS 39,
@@ -27,14 +26,12 @@ def withdrawn_thickness(liquid: Liquid, speed: float, g: float) -> float:
 
     ``speed`` U [m/s] along the wall; ``g`` [m/s^2] along the wall, above 0.
     """
-    capillary = liquid.viscosity * speed / liquid.surface_tension
+    capillary = VISCOSITY * speed / SURFACE_TENSION
     limited: float = min(LANDAU_LEVICH * capillary ** (1.0 / 6.0), 1.0)
-    return limited * math.sqrt(liquid.viscosity * speed / (liquid.density * g))
+    return limited * math.sqrt(VISCOSITY * speed / (DENSITY * g))
 
 
-def drained_film(
-    volume: float, liquid: Liquid, width: float, length: float, g: float, dt: float
-) -> float:
+def drained_film(volume: float, width: float, length: float, g: float, dt: float) -> float:
     """Return what is left of a film of ``volume`` [m^3] after ``dt`` [s].
 
     A film that drains for the time t down a wall has the thickness (mu z / (rho g t))^(1/2) at the
@@ -45,8 +42,8 @@ def drained_film(
 
     ``width`` and ``length`` [m] of the wall across and along the flow, ``g`` [m/s^2] along it.
     """
-    rate = liquid.density * g * volume * volume
+    rate = DENSITY * g * volume * volume
     if rate == 0.0 or length == 0.0:
         return 0.0 if length == 0.0 else volume
-    age = 4.0 / 9.0 * width**2 * length**3 * liquid.viscosity / rate
+    age = 4.0 / 9.0 * width**2 * length**3 * VISCOSITY / rate
     return volume if volume < 2.0 * age * REST_FLOW else volume / math.sqrt(1.0 + dt / age)

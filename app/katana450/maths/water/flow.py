@@ -3,7 +3,7 @@
 Water that a tilted cup cannot hold leaves over the lip, flies in parcels and lands in the basin, in
 the cup again, on the table or on the floor. A film stays on the wall where the surface has fallen,
 and drains into the rest. Volumes are whole femtolitres that are only moved, so their sum is
-constant. "Water" stands for any liquid here.
+constant.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.film import drained_film, withdrawn_thickness
 from katana450.maths.water.lip import DROP_VOLUME, left_over, lip_speed, viscous_flow, weir_flow
-from katana450.maths.water.liquid import WATER, Liquid
 from katana450.maths.water.parcel import Ground, Parcel, landing
 from katana450.maths.water.puddle import Puddle, spill
 from katana450.maths.water.slosh import Slosh, damping, frequency
@@ -49,7 +48,6 @@ class Water:
         T_base_cup: pose (4, 4) of the cup [m].
         film: volume on the wall of the cup.
         wetted: area [m^2] of wall and floor below the surface in the cup.
-        liquid: the liquid.
     """
 
     cup: int
@@ -60,7 +58,6 @@ class Water:
     T_base_cup: FloatArray
     film: int = 0
     wetted: float = 0.0
-    liquid: Liquid = WATER
 
     @property
     def kept(self) -> int:
@@ -109,8 +106,8 @@ class WaterFlow:
         inside = water_environment.cup.inside
         self._wall = math.pi * inside.radius * (2.0 * inside.depth + inside.radius)
 
-    def begin(self, volume: float, T_base_cup: npt.ArrayLike, liquid: Liquid = WATER) -> Water:
-        """Return ``volume`` [m^3] of ``liquid`` at rest in the cup, and none elsewhere.
+    def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
+        """Return ``volume`` [m^3] at rest in the cup, and none elsewhere.
 
         Raises InputError when the upright cup does not hold it, or the pose is invalid.
         """
@@ -120,7 +117,7 @@ class WaterFlow:
                 f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {maximum:.1f} ml."
             )
         T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
-        water = Water(counted(volume), 0, (), (), Slosh(), T, liquid=liquid)
+        water = Water(counted(volume), 0, (), (), Slosh(), T)
         return replace(water, wetted=self._wetted(water))
 
     def step(
@@ -139,7 +136,7 @@ class WaterFlow:
             return replace(water, T_base_cup=T)
         inside = self.water_environment.cup.inside
         omega = frequency(inside, water.cup * FEMTOLITRE)
-        slosh = water.slosh.after(pull, omega, damping(inside, water.liquid), dt)
+        slosh = water.slosh.after(pull, omega, damping(inside), dt)
         flown = self._fly(replace(water, slosh=slosh), T, dt)
         return self._drain(self._pour(flown, T, dt), _along_wall(T, pull), dt)
 
@@ -148,7 +145,7 @@ class WaterFlow:
         width, length = self._film_size(water.wetted)
         film = water.film * FEMTOLITRE
         g = _along_wall(water.T_base_cup, (0.0, 0.0, 0.0))
-        return drained_film(film, water.liquid, width, length, g, 1.0) == film
+        return drained_film(film, width, length, g, 1.0) == film
 
     def surface(self, water: Water) -> WaterSurface:
         """Return the surface in the cup."""
@@ -172,8 +169,8 @@ class WaterFlow:
         head = max(-cup.margin(tilt, cup.level(tilt, water.cup * FEMTOLITRE)), 0.0)
         g = GRAVITY * weight
         weir = weir_flow(cup.radius, tilt, head, g)
-        viscous = viscous_flow(water.liquid, cup.radius, tilt, head, g)
-        gone = over - left_over(over, weir, viscous, water.liquid, dt)
+        viscous = viscous_flow(cup.radius, tilt, head, g)
+        gone = over - left_over(over, weir, viscous, dt)
         if gone == 0:
             return replace(water, T_base_cup=T)
         point = (
@@ -183,7 +180,7 @@ class WaterFlow:
         )
         lip = _moved(T, point)
         carried = scale(1.0 / dt, sub(lip, _moved(water.T_base_cup, point)))
-        speed = lip_speed(water.liquid, head, g)
+        speed = lip_speed(head, g)
         velocity = add(carried, scale(speed, _outwards(T, tilt, downhill)))
         return replace(
             water,
@@ -204,14 +201,14 @@ class WaterFlow:
         inside, film = self.water_environment.cup.inside, water.film
         if fallen > 0.0:
             speed = fallen / (math.tau * inside.radius * dt)
-            thickness = withdrawn_thickness(water.liquid, speed, g)
+            thickness = withdrawn_thickness(speed, g)
             film += min(counted(fallen * min(thickness, MAX_FILM * inside.radius)), water.cup)
         else:
             dry = self._wall - water.wetted
             film -= min(int(film * -fallen / dry), film) if dry > 0.0 else film
         width, length = self._film_size(wetted)
         volume = film * FEMTOLITRE
-        left = drained_film(volume, water.liquid, width, length, g, dt)
+        left = drained_film(volume, width, length, g, dt)
         film = film if left == volume else min(counted(left), film)
         return replace(water, cup=water.kept - film, film=film, wetted=wetted)
 

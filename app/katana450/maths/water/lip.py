@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 
-from katana450.maths.water.liquid import WATER, Liquid
-from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, REST_FLOW
+from katana450.maths.water.units import DENSITY, FEMTOLITRE, MILLILITRE, REST_FLOW, VISCOSITY
 
 DISCHARGE = 0.61
 """Discharge coefficient [1] in Poleni's rule for a sharp edge: Kirchhoff's pi / (pi + 2)."""
 
 THINNING_TIME = 0.25
 """Time [s] in which water left over the lip thins to a third. An assumption: the rules for a flow
-would give an endless trickle. For another liquid the time is in proportion to the kinematic
-viscosity, as that in which a film thins.
+would give an endless trickle.
 """
 
 DROP_VOLUME = MILLILITRE // 20
@@ -37,40 +35,35 @@ def weir_flow(radius: float, tilt: float, head: float, g: float) -> float:
     return rule * _wet_width(radius, tilt, head, WEIR_PARABOLA)
 
 
-def viscous_flow(liquid: Liquid, radius: float, tilt: float, head: float, g: float) -> float:
-    """Return the maximum flow over the lip [m^3/s] that the viscosity of ``liquid`` allows.
+def viscous_flow(radius: float, tilt: float, head: float, g: float) -> float:
+    """Return the maximum flow over the lip [m^3/s] that its viscosity allows.
 
     A film as thick as the head runs down the outside of the lip: rho g head^3 / (3 mu) per metre of
     edge (Nusselt, 1916; Bird, Stewart and Lightfoot, Transport Phenomena, 2nd ed., ch. 2.2),
     summed as for ``weir_flow``.
     """
-    rule = liquid.density * g * head**3 / (3.0 * liquid.viscosity)
+    rule = DENSITY * g * head**3 / (3.0 * VISCOSITY)
     return rule * _wet_width(radius, tilt, head, FILM_PARABOLA)
 
 
-def lip_speed(liquid: Liquid, head: float, g: float) -> float:
+def lip_speed(head: float, g: float) -> float:
     """Return the mean speed [m/s] at the lowest point of the lip, by the slower of both rules."""
-    film = liquid.density * g * head**2 / (3.0 * liquid.viscosity)
+    film = DENSITY * g * head**2 / (3.0 * VISCOSITY)
     return min(2.0 / 3.0 * DISCHARGE * math.sqrt(2.0 * g * head), film)
 
 
-def thinning_time(liquid: Liquid) -> float:
-    """Return the time [s] in which ``liquid`` left over the lip thins to a third."""
-    return THINNING_TIME * liquid.viscosity / liquid.density * WATER.density / WATER.viscosity
-
-
-def left_over(over: int, weir: float, viscous: float, liquid: Liquid, dt: float) -> int:
+def left_over(over: int, weir: float, viscous: float, dt: float) -> int:
     """Return the part of ``over`` [fl] that is still above the lip after ``dt`` [s].
 
     The flow ``weir`` [m^3/s] falls with the square of the volume above the lip, and the ``viscous``
     flow with its power 3.5; the slower one holds. Besides, what is left thins.
     """
-    time, volume = thinning_time(liquid), over * FEMTOLITRE
-    if viscous + volume / time < REST_FLOW:
+    volume = over * FEMTOLITRE
+    if viscous + volume / THINNING_TIME < REST_FLOW:
         return over
     left = over * max(
-        _remaining(weir / volume * time, 1.0, dt / time),
-        _remaining(viscous / volume * time, 2.5, dt / time),
+        _remaining(weir / volume * THINNING_TIME, 1.0, dt / THINNING_TIME),
+        _remaining(viscous / volume * THINNING_TIME, 2.5, dt / THINNING_TIME),
     )
     return int(left) if left > DROP_VOLUME else 0
 

@@ -12,8 +12,7 @@ import math
 from dataclasses import dataclass
 
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.liquid import Liquid
-from katana450.maths.water.units import GRAVITY
+from katana450.maths.water.units import DENSITY, GRAVITY, VISCOSITY
 from katana450.maths.water.vectors import Vector
 
 FIRST_MODE = 1.8412
@@ -23,9 +22,6 @@ WALL_DAMPING = 0.014
 """Damping [1] relative to critical damping: an allowance for the wall, which is wetted again in
 every swing.
 """
-
-MAX_DAMPING = 0.95
-"""Maximum damping [1]. Abramson's rule is for light damping; with honey the surface creeps."""
 
 SHALLOWEST = 0.25
 """Depth [radius] below which the frequency falls no more: so little water lies in a corner of a
@@ -91,12 +87,12 @@ def frequency(cup: Cylinder, volume: float) -> float:
     return math.sqrt(GRAVITY * k * math.tanh(k * depth))
 
 
-def damping(cup: Cylinder, liquid: Liquid) -> float:
+def damping(cup: Cylinder) -> float:
     """Return the damping [1] of the first mode relative to critical damping.
 
     The viscosity gives 4.98 nu^1/2 r^-3/4 g^-1/4 over 2 pi (Abramson, NASA SP-106, 1966): 0.006 for
     water in a cup of 3 cm radius.
     """
-    nu = liquid.viscosity / liquid.density
+    nu = VISCOSITY / DENSITY
     viscous: float = 4.98 / math.tau * math.sqrt(nu) * cup.radius**-0.75 * GRAVITY**-0.25
-    return min(WALL_DAMPING + viscous, MAX_DAMPING)
+    return WALL_DAMPING + viscous

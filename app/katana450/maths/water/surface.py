@@ -20,6 +20,9 @@ from katana450.maths.water.units import FEMTOLITRE, GRAVITY
 
 Faces = npt.NDArray[np.uint32]
 
+COLOUR = (74, 148, 192)
+"""Red, green and blue (0 to 255, sRGB) in which water is drawn."""
+
 RUNGS = 20
 """Number of steps from the lowest to the highest side of the water in a cup."""
 

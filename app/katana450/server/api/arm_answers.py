@@ -1,4 +1,4 @@
-"""Parts of the answer ``state``: margins, liquid, and the measurements of a real arm."""
+"""Parts of the answer ``state``: margins, water, and the measurements of a real arm."""
 
 from __future__ import annotations
 
@@ -34,10 +34,9 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Water(msgspec.Struct, frozen=True, kw_only=True):
-    """Water, or another liquid, by its place.
+    """Water by its place.
 
     Attributes:
-        liquid: Name of the liquid.
         cup_ml: Volume in the cup, without the film on its wall [ml].
         film_ml: Volume of the film on the wall of the cup [ml].
         basin_ml: Volume in the basin [ml].
@@ -46,7 +45,6 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
         margin_to_rim: Height of the cup's lip above the water [m]; negative while water flows out.
     """
 
-    liquid: str
     cup_ml: float
     film_ml: float
     basin_ml: float

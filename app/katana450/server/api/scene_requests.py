@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import msgspec
 from msgspec import Meta
@@ -105,17 +105,15 @@ class Remove(Request, frozen=True, kw_only=True):
 
 
 class Fill(Request, frozen=True, kw_only=True):
-    """Fill the cup with a liquid, and remove all liquid elsewhere.
+    """Fill the cup with water, and remove all water elsewhere.
 
     Attributes:
         ml: Volume in the cup [ml].
-        of: The liquid.
     """
 
     traits: ClassVar[RequestTraits] = COMMAND
 
     ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
-    of: Literal["water", "oil", "honey"] = "water"
 
 
 class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -204,7 +204,6 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
         return None
     water = now.poured.water
     return answers.Water(
-        liquid=water.liquid.name,
         cup_ml=water.cup / MILLILITRE,
         film_ml=water.film / MILLILITRE,
         basin_ml=water.basin / MILLILITRE,
