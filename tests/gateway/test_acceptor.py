@@ -124,8 +124,9 @@ def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
 
     async def act(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(asyncio.get_running_loop(), "sock_accept", fail)
+        monkeypatch.setattr(acceptors, "BACK_OFF", 0.02)
         async with _accepting():
-            await asyncio.sleep(1.0)
+            await asyncio.sleep(0.1)
 
     with caplog.at_level(logging.WARNING), pytest.MonkeyPatch.context() as monkeypatch:
         asyncio.run(act(monkeypatch))

@@ -11,139 +11,123 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from websockets.exceptions import ConnectionClosed
 
 from katana450.arm.control.lease import Role
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.main import main
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, ROOT, AppServer, free_port
-from tests.gateway.client import HOUR, ask, controlling, enter, opened
+from tests.gateway.client import HOUR, enter
+from tests.gateway.virtual import VirtualServer
 
 
-@pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[AppServer, Path]]:
-    """Start a server that requires links; yield it and the access file."""
-    path = tmp_path_factory.mktemp("access") / "access.json"
-    AccessFile.create(path)
-    with AppServer((*APP, "--access", str(path))) as server:
-        yield server, path
+@pytest.fixture
+def file(tmp_path: Path) -> AccessFile:
+    return AccessFile.create(tmp_path / "access.json")
 
 
-def give(path: Path, role: Role, seconds: float = HOUR) -> str:
-    return AccessFile.open(path).give(role.value.title(), role, time.time() + seconds)
+@pytest.fixture
+def guarded(described: DescribedRobot, file: AccessFile) -> Iterator[VirtualServer]:
+    """Start a server that requires links."""
+    with VirtualServer(described, access=file) as server:
+        yield server
 
 
-async def newest_line(url: str, cookie: str) -> Any:
-    """Return the newest line of the event log once there is one; it follows the state."""
-    async with asyncio.timeout(10.0):
-        while True:
-            status, _, body = ask(f"{url}/api/v1/event_log", Cookie=cookie)
-            assert status == 200
-            if lines := json.loads(body)["lines"]:
-                return lines[-1]
-            await asyncio.sleep(0.02)
+def give(file: AccessFile, role: Role, seconds: float = HOUR) -> str:
+    return file.give(role.value.title(), role, time.time() + seconds)
 
 
-def test_visitor_without_a_link_gets_the_explaining_page(guarded: tuple[AppServer, Path]) -> None:
-    server, _ = guarded
-    assert ask(server.url)[0] == 200
-    assert ask(f"{server.url}/health")[2] == b"ok\n"
+def test_visitor_without_a_link_gets_the_explaining_page(guarded: VirtualServer) -> None:
+    assert guarded.ask("/")[0] == 200
+    assert guarded.ask("/health")[2] == b"ok\n"
     for token in ("", "guess"):
         body = json.dumps({"token": token}).encode()
-        status, headers, _ = ask(f"{server.url}/enter", data=body, Origin=server.url)
+        status, headers, _ = guarded.ask("/enter", data=body, Origin=guarded.url)
         assert status == 401
         assert "set-cookie" not in headers
     for path in ("/api/v1/state", "/api/v1/event_log", "/api/v1/phone"):
-        assert ask(server.url + path, Cookie=f"katana450-{server.port}={'a' * 22}")[0] == 401
+        assert guarded.ask(path, Cookie=f"katana450-9={'a' * 22}")[0] == 401
 
 
-def test_guessing_access_links_is_rate_limited_per_client(guarded: tuple[AppServer, Path]) -> None:
-    server, path = guarded
-
+def test_guessing_access_links_is_rate_limited(guarded: VirtualServer, file: AccessFile) -> None:
     def guess() -> int:
         body = json.dumps({"token": "guess"}).encode()
-        return ask(f"{server.url}/enter", data=body, Origin=server.url)[0]
+        return guarded.ask("/enter", data=body, Origin=guarded.url)[0]
 
     assert 429 in [guess() for _ in range(40)]
-    assert enter(server.url, give(path, Role.VIEWER))
+    # A valid link is accepted even while others guess.
+    assert guarded.run(guarded.enter(give(file, Role.VIEWER)))
 
 
-def test_roles_grant_exactly_their_rights(guarded: tuple[AppServer, Path]) -> None:
-    server, path = guarded
-
+def test_roles_grant_exactly_their_rights(guarded: VirtualServer, file: AccessFile) -> None:
     async def act() -> None:
-        viewer, operator, admin = (give(path, role) for role in Role)
-        async with (
-            opened(server.url, viewer) as (watching, watcher),
-            opened(server.url, operator) as (driving, driver),
-            opened(server.url, admin) as (_, boss),
-        ):
-            for request in ("acquire", "take", "ask"):
-                await watcher.say(request)
-                assert "only watch" in (await watcher.notice("refused"))["why"]
-            await watching.set("1 base turn", value=20.0)
+        cookies = [await guarded.enter(give(file, role)) for role in Role]
+        watcher, driver, boss = [await guarded.control(cookie) for cookie in cookies]
+        for request in ("acquire", "take", "ask", "home"):
+            await watcher.say(request)
             assert "only watch" in (await watcher.notice("refused"))["why"]
-            await driving.set("1 base turn", value=10.0)
-            assert (await watcher.wait(holder="Operator"))["role"] == "viewer"
-            async with asyncio.timeout(5.0):
-                while not any(
-                    message["type"] == "SetOrientationMessage"
-                    for message in await watching.listen()
-                ):
-                    pass
-            await boss.say("take")
-            await watcher.wait(holder="Admin")
-            await driver.say("take")
-            assert "Only an admin" in (await driver.notice("refused"))["why"]
-            await driver.say("ask")
-            (asking,) = (await boss.wait(asking=[{"number": 2, "name": "Operator"}]))["asking"]
-            await boss.say("give", to=asking["number"])
-            await watcher.wait(holder="Operator")
-            await watcher.say("stop")
-            assert "Viewer pressed STOP" in (await driver.wait(mood="stopped"))["stopped"]
-            last = await newest_line(server.url, enter(server.url, viewer))
-            assert (last["finding"]["reason"], last["who"]) == ("stopped", "Viewer")
-            await watcher.say("clear_stop")
-            await watcher.notice("refused")
-            await driver.clear_stop()
-            await watcher.wait(stopped=None)
+        await driver.say("joint", axis=1, value=0.2)
+        assert (await watcher.wait(holder="Operator"))["role"] == "viewer"
+        await boss.say("take")
+        await watcher.wait(holder="Admin")
+        await driver.say("take")
+        assert "Only an admin" in (await driver.notice("refused"))["why"]
+        await driver.say("ask")
+        (asking,) = (await boss.wait(asking=[{"number": 2, "name": "Operator"}]))["asking"]
+        await boss.say("give", to=asking["number"])
+        await watcher.wait(holder="Operator")
+        await watcher.say("stop")
+        assert "Viewer pressed STOP" in (await driver.wait(mood="stopped"))["stopped"]
+        _, _, body = await guarded.request("/api/v1/event_log", Cookie=cookies[0])
+        last = json.loads(body)["lines"][-1]
+        assert (last["finding"]["reason"], last["who"]) == ("stopped", "Viewer")
+        # Rest, and the time in which a stop cannot be cleared, are over.
+        await driver.wait(wait="")
+        await watcher.say("clear_stop")
+        assert "only watch" in (await watcher.notice("refused"))["why"]
+        assert watcher.status["stopped"] is not None
+        await driver.clear_stop()
+        await watcher.wait(stopped=None)
+        for each in (watcher, driver, boss):
+            await each.close()
 
-    asyncio.run(act())
+    guarded.run(act())
 
 
-def test_revoked_identity_is_disconnected(guarded: tuple[AppServer, Path]) -> None:
-    server, path = guarded
+def test_identity_whose_link_ends_is_disconnected(
+    guarded: VirtualServer, file: AccessFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, ahead = time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: now() + ahead[0])
 
-    async def stay(token: str, end: object) -> None:
-        cookie = enter(server.url, token)
-        async with controlling(server.url, cookie) as control:
-            await control.wait(mood="ok", seconds=10.0)
-            assert end is None or main(["access", "revoke", str(end), "--file", str(path)]) == 0
-            async with asyncio.timeout(20.0):
-                with suppress(ConnectionClosed):
-                    await control.socket.wait_closed()
-            assert control.socket.close_code == 4401
+    async def stay(token: str, end: Callable[[], object]) -> None:
+        control = await guarded.control(await guarded.enter(token))
+        await control.wait(mood="ok")
+        end()
+        async with asyncio.timeout(2.0):
+            await control.socket.wait_closed()
+        assert control.socket.close_code == 4401
 
-    asyncio.run(stay(give(path, Role.ADMIN, 4.0), None))
-    token = give(path, Role.ADMIN)
-    known = AccessFile.open(path).check(token, time.time())
+    token = give(file, Role.ADMIN)
+    known = file.check(token, time.time())
     assert known is not None
-    asyncio.run(stay(token, known[0]))
+    command = ["access", "revoke", known[0], "--file", str(file.path)]
+    guarded.run(stay(token, lambda: main(command)))
+    guarded.run(stay(give(file, Role.ADMIN), lambda: ahead.insert(0, 2.0 * HOUR)))
 
 
-def test_no_link_is_in_the_log(guarded: tuple[AppServer, Path]) -> None:
-    server, path = guarded
-    token = give(path, Role.VIEWER)
-    enter(server.url, token)
-    ask(f"{server.url}/?{token}")
-    assert token not in server.output
-    assert json.loads(path.read_text())["secret"] not in server.output
+def test_no_link_is_in_the_log(
+    guarded: VirtualServer, file: AccessFile, caplog: pytest.LogCaptureFixture
+) -> None:
+    token = give(file, Role.VIEWER)
+    guarded.run(guarded.enter(token))
+    guarded.ask(f"/?{token}")
+    assert token not in caplog.text
+    assert json.loads(file.path.read_text())["secret"] not in caplog.text
 
 
 def test_access_commands_give_list_and_revoke(
@@ -169,21 +153,9 @@ def test_access_commands_give_list_and_revoke(
         main([*give_anna[:4], "--for", "forever", *options])
 
 
-def test_public_server_needs_links_or_an_explicit_option() -> None:
-    command = [sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0"]
-    done = subprocess.run(
-        [*command, "--port", str(free_port())],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "--access" in done.stderr
-    assert "--insecure" in done.stderr
-    assert "Traceback" not in done.stderr
-    with AppServer((*command, "--port", "{port}", "--insecure")) as server:
+def test_public_server_without_links_is_well() -> None:
+    command = (sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0", "--port", "{port}")
+    with AppServer((*command, "--insecure")) as server:
         assert enter(server.url)
         check_health(server.pid, f"{server.url} is well.")
 
@@ -242,6 +214,8 @@ def test_server_uses_https(tmp_path: Path) -> None:
         (("--tls-cert", "/nowhere", "--tls-key", "/nowhere"), "are not a certificate and its key"),
         (("--access", "/nowhere"), "access give"),
         (("--public-url", "arm"), "looks like"),
+        (("--host", "0.0.0.0"), "--insecure"),
+        (("--host", "0.0.0.0"), "--access access.json"),
     ],
 )
 def test_invalid_setting_is_reported(

@@ -81,6 +81,7 @@ async def taken_by(control: Control) -> None:
     await control.wait(mine=True)
 
 
+@pytest.mark.long
 def test_handle_moved_by_a_spectator_springs_back(
     server: AppServer,
 ) -> None:
@@ -182,6 +183,7 @@ def test_drag_from_before_a_stop_moves_nothing_after_clear_stop(server: AppServe
     asyncio.run(drag())
 
 
+@pytest.mark.long
 def test_first_control_used_acquires_the_free_lease_and_is_logged(
     server: AppServer,
 ) -> None:

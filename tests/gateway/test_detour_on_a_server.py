@@ -1,4 +1,4 @@
-"""A detour on a real server: offered by the state, taken by a request, a command or a setting."""
+"""A detour: offered by the state, taken by a request, a command on a server, or a setting."""
 
 from __future__ import annotations
 
@@ -11,19 +11,25 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from katana450.client import Client, RefusedError, connect
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from tests.browser.server import APP, AppServer
+from tests.browser.server import AppServer
+from tests.gateway.virtual import VirtualServer
 
 TARGET = (0.008, 0.025, 0.443)
 """[m] A point above the shoulder. A drag there from the ready posture ends at limits."""
 
-PATIENCE = 20.0
-"""[s] Timeout of a step on a busy machine."""
+
+@pytest.fixture
+def local(described: DescribedRobot) -> Iterator[VirtualServer]:
+    """Return a server that offers detours."""
+    with VirtualServer(described, detours=True) as server:
+        yield server
 
 
 def wait_for(program: Client, holds: Callable[[answers.State], bool]) -> answers.State:
-    deadline = time.monotonic() + PATIENCE
+    deadline = time.monotonic() + 60.0
     while not holds(state := program.query(answers.State)):
         assert time.monotonic() < deadline, state
         time.sleep(0.02)
@@ -58,7 +64,6 @@ def test_offered_detour_is_taken_by_go(program: Client) -> None:
     assert arrived.detour is None
 
 
-@pytest.mark.long
 def test_go_is_refused_without_an_offer_and_after_a_change(program: Client) -> None:
     program.go(requests.Home())
     with pytest.raises(RefusedError, match="No detour is offered"):
@@ -92,9 +97,9 @@ def test_new_offer_follows_a_change_of_the_world(program: Client) -> None:
 
 
 @pytest.mark.long
-def test_command_line_takes_the_detour(program: Client, server: AppServer) -> None:
-    program.go(requests.Home())
-    program.ask(requests.ReleaseLease())
+def test_command_line_takes_the_detour(live_program: Client, server: AppServer) -> None:
+    live_program.go(requests.Home())
+    live_program.ask(requests.ReleaseLease())
     place = ",".join(f"{1e3 * x:g}" for x in TARGET)
     done = subprocess.run(
         [sys.executable, "-m", "katana450", "go", place, "--url", server.url],
@@ -105,18 +110,18 @@ def test_command_line_takes_the_detour(program: Client, server: AppServer) -> No
     )
     assert done.returncode == 0, done.stderr
     assert "Taking a 2.9 s detour." in done.stdout
-    assert distance(program.query(answers.State)) < 1e-6
+    assert distance(live_program.query(answers.State)) < 1e-6
 
 
-@pytest.fixture(scope="module")
-def automatic() -> Iterator[AppServer]:
-    with AppServer((*APP, "--go-on-release")) as server:
+@pytest.fixture
+def automatic(described: DescribedRobot) -> Iterator[VirtualServer]:
+    with VirtualServer(described, "--go-on-release", detours=True) as server:
         yield server
 
 
 @pytest.mark.long
-def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: AppServer) -> None:
-    with connect(automatic.url, "Test") as program:
+def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: VirtualServer) -> None:
+    with automatic.connect("Test") as program:
         state = held_at_the_gap(program)
         time.sleep(0.5)
         # A hand that rests is not a hand that lets go.
@@ -127,8 +132,8 @@ def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: AppServer) ->
 
 
 @pytest.mark.long
-def test_setting_takes_no_detour_after_a_stop(automatic: AppServer) -> None:
-    with connect(automatic.url, "Test") as program:
+def test_setting_takes_no_detour_after_a_stop(automatic: VirtualServer) -> None:
+    with automatic.connect("Test") as program:
         state = held_at_the_gap(program)
         program.ask(requests.EndDrag())
         program.ask(requests.Stop())

@@ -6,7 +6,6 @@ import asyncio
 import json
 import socket
 import time
-from collections.abc import Iterator
 from contextlib import AsyncExitStack, suppress
 from typing import Any
 
@@ -28,12 +27,6 @@ from tests.gateway.client import (
     websocket,
 )
 from tests.gateway.hostile import BRIEF, moves_the_arm, peers
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 @pytest.mark.long
@@ -82,10 +75,10 @@ def test_flooding_client_is_closed_without_effect_on_others(server: AppServer) -
                             await asyncio.sleep(0)
 
                 flooding = asyncio.create_task(flood())
-                trips = [await round_trip(control) for _ in range(20)]
+                trips = [await round_trip(control) for _ in range(10)]
                 async with asyncio.timeout(10.0):
                     await flooding
-            assert sorted(trips)[10] < 0.1
+            assert sorted(trips)[5] < 0.1
             heard = await moves_the_arm(good, 2.0)
             assert any(m["type"] == "SetOrientationMessage" for m in heard)
 
@@ -128,7 +121,7 @@ def test_client_that_never_reads_does_not_delay_others(server: AppServer) -> Non
                     )
                 )
                 bad.transport.pause_reading()
-            for degrees in (5.0, 10.0, 0.0):
+            for degrees in (5.0, 0.0):
                 started = time.perf_counter()
                 heard = await moves_the_arm(good, degrees)
                 assert any(m["type"] == "SetOrientationMessage" for m in heard)

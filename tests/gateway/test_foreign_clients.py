@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,12 +14,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.browser.server import AppServer
 from tests.gateway.client import SUBPROTOCOL, ask, enter, opened, page_name, websocket
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
+from tests.gateway.lines import Lines
 
 
 def refusal(opening: connect) -> int:
@@ -85,7 +79,7 @@ def viser_port(server: AppServer) -> int:
     }
     rows = [line.split() for line in Path("/proc/net/tcp").read_text().splitlines()[1:]]
     ports = [int(row[1][9:], 16) for row in rows if row[3] == "0A" and row[9] in inodes]
-    (port,) = [port for port in ports if port != server.port]
+    (port,) = {*ports} - {server.port, Lines.port(server)}
     return port
 
 

@@ -135,7 +135,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
     ("text", "words"),
     [
         (FATAL, "The arm's process ended with status 1"),
-        (MUTE, "no longer reaches the page's server"),
+        pytest.param(MUTE, "no longer reaches the page's server", marks=pytest.mark.long),
     ],
     ids=["its loop has ended", "its states reach no page"],
 )

@@ -15,9 +15,12 @@ from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask, websocket
 from tests.gateway.postures import FAR
 
-pytestmark = pytest.mark.skipif(
-    sys.platform != "linux", reason="finds the server's processes as Linux lists them"
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        sys.platform != "linux", reason="finds the server's processes as Linux lists them"
+    ),
+]
 
 SILENCE = 1.0
 HELD_UP = 0.6
@@ -29,9 +32,7 @@ LOADED = 3.0
 
 # With a dead driver the server is awake for less than two checks. With a live one it is awake for
 # long enough to send a heartbeat to the arm.
-@pytest.mark.parametrize(
-    ("alive", "awake"), [(False, 0.01), pytest.param(True, 0.1, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize(("alive", "awake"), [(False, 0.01), (True, 0.1)])
 def test_only_a_dead_driver_is_silent(alive: bool, awake: float) -> None:
     async def act(server: AppServer) -> None:
         async with websocket(server.url, "/api/v1/socket?name=Driver") as driver:

@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -23,12 +22,6 @@ from tests.gateway.postures import FAR
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
 )
-
-
-@pytest.fixture
-def server() -> Iterator[AppServer]:
-    with AppServer(APP) as server:
-        yield server
 
 
 def under_way(arm: Client) -> answers.State:
@@ -54,10 +47,17 @@ def again(server: AppServer, seconds: float = 60.0) -> answers.State:
         time.sleep(0.2)
 
 
-def test_killed_front_end_is_restarted_with_an_arm_at_rest(server: AppServer) -> None:
+def test_killed_front_end_is_restarted_with_an_arm_at_rest() -> None:
+    with AppServer(APP) as server:
+        check_restart(server)
+
+
+def check_restart(server: AppServer) -> None:
     killed = server.front
     with suppress(LostError), connect(server.url, "Driver") as arm:
         before = under_way(arm)
+        # Once somebody drives, everything has started.
+        check_priorities(server)
         os.kill(killed, signal.SIGKILL)
         arm.go(requests.Home())
     state = again(server)
@@ -74,6 +74,7 @@ def test_killed_front_end_is_restarted_with_an_arm_at_rest(server: AppServer) ->
         assert there.status == "ok"
 
 
+@pytest.mark.long
 def test_frozen_front_end_causes_a_stop_in_time() -> None:
     with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Driver") as arm:
         before = under_way(arm)
@@ -91,15 +92,6 @@ def test_frozen_front_end_causes_a_stop_in_time() -> None:
         assert "STOP" in server.output
 
 
-def test_front_end_ends_with_the_supervisor(server: AppServer) -> None:
-    front = server.front
-    os.kill(server.pid, signal.SIGKILL)
-    end = time.monotonic() + 10.0
-    while Path(f"/proc/{front}").exists() and "Z" not in process_state(front):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
 def may_have_real_time() -> bool:
     """Return whether the system lets a process of this user have a real-time priority."""
     before = os.sched_getscheduler(0), os.sched_getparam(0)
@@ -111,10 +103,8 @@ def may_have_real_time() -> bool:
     return True
 
 
-def test_control_and_stop_threads_preempt_everything(server: AppServer) -> None:
-    # Once somebody drives, everything has started.
-    with connect(server.url, "Driver") as arm:
-        under_way(arm)
+def check_priorities(server: AppServer) -> None:
+    """Check that the threads of control and STOP preempt everything."""
     threads = [int(task.name) for task in Path(f"/proc/{server.arm}/task").iterdir()]
     policies = [os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK for thread in threads]
     # The control thread, and the one that takes STOP. All others can wait.

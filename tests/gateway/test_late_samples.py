@@ -241,6 +241,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_arm_rests_when_a_hand_lets_go_on_a_line_that_has_become_slow(server: AppServer) -> None:
     """A hand jogs, while the line becomes 0.8 s slower without any silence."""
 

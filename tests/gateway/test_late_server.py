@@ -84,6 +84,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the front end as Linux lists processes")
 def test_program_reaches_its_end_although_the_server_was_late(
     server: AppServer, tmp_path: Path

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import logging
 import re
 import time
+from typing import Any
+from urllib.parse import quote
 
 import pytest
 
 from katana450.assembly.log_lines import LineFormatter, RepetitionFilter, printable
 from katana450.client import connect
 from katana450.server.api import requests
-from tests.browser.server import APP, AppServer
-from tests.gateway.client import ask, websocket
-from tests.gateway.lines import Lines
+from tests.browser.server import AppServer
+from tests.gateway.virtual import VirtualServer
 
 FORGED = "2026-01-01 00:00:00,000 WARNING Stopped: Eve pressed STOP."
 
@@ -25,15 +25,14 @@ BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1b[2K\x1b[31m", "\x85", "\u2028", "
 ENTRY = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} [A-Z]+ ")
 
 
-@pytest.mark.parametrize("each", BREAKS)
-def test_message_stays_on_its_line(each: str) -> None:
-    record = logging.LogRecord(
-        "katana450", logging.INFO, "", 0, "%s asks.", (f"Eve{each}{FORGED}",), None
-    )
-    line = LineFormatter().format(record)
-    assert line.isprintable()
-    assert len(line.splitlines()) == 1
-    assert FORGED in line
+def test_message_stays_on_its_line() -> None:
+    for each in BREAKS:
+        evil = (f"Eve{each}{FORGED}",)
+        record = logging.LogRecord("katana450", logging.INFO, "", 0, "%s asks.", evil, None)
+        line = LineFormatter().format(record)
+        assert line.isprintable()
+        assert len(line.splitlines()) == 1
+        assert FORGED in line
 
 
 def test_traceback_follows_on_marked_lines() -> None:
@@ -73,8 +72,8 @@ def test_printable_text_is_left_as_it_is() -> None:
         assert printable(text) == text
 
 
-def test_log_names_the_person_who_stopped_the_arm() -> None:
-    with AppServer() as server, connect(server.url, "Anna") as arm:
+def test_log_names_the_person_who_stopped_the_arm(server: AppServer) -> None:
+    with connect(server.url, "Anna") as arm:
         arm.ask(requests.Stop())
         end = time.monotonic() + 10.0
         while " INFO Anna (websocket, anybody may stop the arm), Stop: " not in server.output:
@@ -82,33 +81,27 @@ def test_log_names_the_person_who_stopped_the_arm() -> None:
             time.sleep(0.02)
 
 
-def test_requests_cannot_forge_a_line_of_the_log() -> None:
+def test_requests_cannot_forge_a_line_of_the_log(
+    local: VirtualServer, caplog: pytest.LogCaptureFixture
+) -> None:
     """Send fields, values, names, headers and paths through every channel."""
-    with AppServer((*APP, "--lines", "0")) as server:
-        for each in BREAKS:
-            evil = f"x{each}{FORGED}"
-            asked = [{"do": evil}, {"do": "stop", evil: 1}, {"do": "tool", "name": evil}]
-            asyncio.run(_say(server, [json.dumps(request) for request in asked]))
-            lines = Lines(server)
-            with lines.socket, lines.reader:
-                lines.say(do="hello", name=f"x{each}y")
-                lines.hear()
-                lines.say(**{"do": "stop", evil: 1})
-                assert lines.hear()["is"] == "refused"
-        ask(f"{server.url}/api/v1/do", data=json.dumps({"do": FORGED}).encode(), X_Program="k" * 16)
-        ask(f"{server.url}/enter", data=f"\n{FORGED}".encode(), Origin=server.url)
-        time.sleep(0.3)
-        output = server.output
-    assert "Invalid request from" in output
-    for line in output.splitlines():
-        if FORGED in line:
-            assert ENTRY.match(line), line
-            assert not line.startswith(FORGED), line
-
-
-async def _say(server: AppServer, texts: list[str]) -> None:
-    async with websocket(server.url, "/api/v1/socket?name=Eve") as socket:
-        await socket.recv()
-        for text in texts:
-            await socket.send(text)
-            await socket.recv()
+    for each in BREAKS:
+        evil = f"x{each}{FORGED}"
+        asked: list[dict[str, Any]] = [
+            {"do": evil},
+            {"do": "stop", evil: 1},
+            {"do": "tool", "name": evil},
+        ]
+        with local.speaking(quote(f"x{each}y")) as rows:
+            for request in asked:
+                rows.say(**request)
+                assert rows.hear()["is"] == "refused"
+    forged = json.dumps({"do": FORGED}).encode()
+    local.ask("/api/v1/do", data=forged, X_Program="k" * 16)
+    local.ask("/enter", data=f"\n{FORGED}".encode(), Origin=local.url)
+    lines = [LineFormatter().format(record) for record in caplog.records]
+    assert any("Invalid request from" in line for line in lines)
+    for line in lines:
+        assert len(line.splitlines()) == 1
+        assert ENTRY.match(line), line
+        assert not line.startswith(FORGED), line

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import signal
@@ -18,8 +17,9 @@ import pytest
 
 from katana450.extensions.programs.extension import OWNER_SILENCE
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
-from tests.gateway.client import ask, websocket
+from tests.gateway.client import ask
 from tests.gateway.lines import post
+from tests.gateway.virtual import VirtualServer
 
 SCRIPT = """\
 name: Wave
@@ -68,6 +68,7 @@ def clear_stop(server: AppServer) -> None:
         assert post(server, do="release_lease")[0] == 200
 
 
+@pytest.mark.long
 def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:
     script = tmp_path / "wave.yaml"
     script.write_text(SCRIPT)
@@ -96,25 +97,20 @@ def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path)
     clear_stop(server)
 
 
-def test_silent_owner_on_an_open_socket_ends_its_program(server: AppServer) -> None:
-    async def act() -> tuple[float, dict[str, Any]]:
-        async with websocket(server.url, "/api/v1/socket?name=Owner") as owner:
-
-            async def say(**request: Any) -> None:
-                await owner.send(json.dumps(request))
-
-            await say(do="program", text=SCRIPT)
-            end = time.monotonic() + 20.0
-            while (await asyncio.to_thread(state_of, server))["program"]["status"] != "ready":
-                assert time.monotonic() < end
-                await say(do="heartbeat")
-                await asyncio.sleep(0.05)
-            await say(do="steer", order="run")
-            began = time.monotonic()
-            state = await asyncio.to_thread(wait, server, "stopped")
-            return time.monotonic() - began, state
-
-    took, state = asyncio.run(act())
-    assert OWNER_SILENCE <= took < OWNER_SILENCE + BRAKING
-    assert "Owner sends no heartbeats" in state["program"]["why"]
-    clear_stop(server)
+def test_silent_owner_on_an_open_socket_ends_its_program(local: VirtualServer) -> None:
+    with local.speaking("Owner") as owner:
+        owner.say(do="program", text=SCRIPT)
+        while owner.answer(do="query")["program"]["status"] != "ready":
+            local.sleep(0.05)
+        owner.say(do="steer", order="run")
+        began = time.monotonic()
+        while (program := local.state().program) is not None and program.status != "stopped":
+            local.sleep(0.02)
+        assert OWNER_SILENCE <= time.monotonic() - began < OWNER_SILENCE + 0.1
+    assert program is not None
+    assert "Owner sends no heartbeats" in program.why
+    # The arm rests on its path. It is not stopped, and the lease is free.
+    local.sleep(1.0)
+    state = local.state()
+    assert (state.stopped, state.holder, state.moving) == (None, None, False)
+    assert 0.05 < state.q[0] < np.deg2rad(100) - 0.05

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
+from pathlib import Path
 
 import pytest
 from websockets.exceptions import InvalidStatus
 
 from katana450.arm.control.lease import Role
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.server.viser_bridge.proxy import MAX_BROWSERS, MAX_BROWSERS_EACH
+from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.program_socket import LINES, LINES_EACH
 from tests.gateway.client import (
+    HOUR,
     SUBPROTOCOL,
     Control,
     Peer,
@@ -25,6 +30,7 @@ from tests.gateway.client import (
 )
 from tests.gateway.lines import Lines
 from tests.gateway.site import Site, open_site
+from tests.gateway.virtual import VirtualServer
 
 
 @pytest.fixture
@@ -89,31 +95,47 @@ async def driving(site: Site, cookie: str) -> AsyncIterator[Control]:
         yield control
 
 
-async def is_refused(site: Site, cookie: str) -> bool:
-    async with websocket(site.server.url, f"/control?page={page_name()}", cookie) as socket:
-        async with asyncio.timeout(5.0):
-            await socket.wait_closed()
-        return socket.close_code == LIMIT_CLOSE_CODE
+def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(
+    described: DescribedRobot, tmp_path: Path
+) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+
+    async def act(server: VirtualServer) -> None:
+        async def cookie(role: Role) -> str:
+            return await server.enter(file.give(role.value, role, time.time() + HOUR))
+
+        async def welcome(cookie: str) -> bool:
+            control = await server.control(cookie)
+            await asyncio.sleep(0.1)
+            crowd.append(control)
+            assert control.socket.close_code in (None, LIMIT_CLOSE_CODE)
+            return control.socket.close_code is None
+
+        crowd: list[Control] = []
+        driver, admin = await cookie(Role.OPERATOR), await cookie(Role.ADMIN)
+        driving = await server.control(driver)
+        await driving.wait(mood="ok")
+        await driving.say("acquire")
+        await driving.wait(mine=True)
+        for _ in range(SOCKETS // SOCKETS_EACH):
+            viewer = await cookie(Role.VIEWER)
+            for _ in range(SOCKETS_EACH):
+                crowd.append(await server.control(viewer))
+        assert not await welcome(await cookie(Role.VIEWER))
+        # An operator who does not drive has no place reserved.
+        assert not await welcome(await cookie(Role.OPERATOR))
+        assert await welcome(admin)
+        assert await welcome(driver)
+        await driving.say("stop")
+        await driving.wait(stop="confirmed")
+        for each in (driving, *crowd):
+            await each.close()
+
+    with VirtualServer(described, access=file) as server:
+        server.run(act(server))
 
 
 @pytest.mark.long
-def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(site: Site) -> None:
-    async def act() -> None:
-        driver, admin = site.cookie(Role.OPERATOR), site.cookie(Role.ADMIN)
-        async with driving(site, driver) as driver_page, AsyncExitStack() as stack:
-            links = SOCKETS // SOCKETS_EACH
-            await crowd_in(site, stack, "/control", links, SOCKETS_EACH)
-            assert await is_refused(site, site.cookie(Role.VIEWER))
-            # An operator who does not drive has no place reserved.
-            assert await is_refused(site, site.cookie(Role.OPERATOR))
-            await whole_page(site, admin)
-            await whole_page(site, driver)
-            await driver_page.say("stop")
-            await driver_page.wait(stop="confirmed")
-
-    asyncio.run(act())
-
-
 def test_admin_gets_in_while_viewers_hold_the_tcp_port(site: Site) -> None:
     def welcomed(stack: ExitStack, token: str) -> bool:
         lines = Lines(site.server)

@@ -24,7 +24,7 @@ from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
 from katana450.settings import Settings
-from tests.browser.server import ATTENTIVE_APP, SIMULATION_APP, AppServer
+from tests.browser.server import SIMULATION_APP, AppServer
 from tests.gateway.test_hub import PAGES, Table, moves
 from tests.gateway.test_isolation import under_way
 
@@ -176,6 +176,7 @@ def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Part
     assert table.hub.stopped is None
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the front end as Linux lists processes")
 def test_frozen_front_end_pauses_a_simulated_arm() -> None:
     with AppServer(SIMULATION_APP) as server, connect(server.url, "Driver") as arm:
@@ -197,6 +198,6 @@ def test_frozen_front_end_pauses_a_simulated_arm() -> None:
         assert arm.joints(there).status == "ok"
 
 
-def test_profile_of_a_real_arm_can_be_forced() -> None:
-    with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Driver") as arm:
+def test_profile_of_a_real_arm_can_be_forced(server: AppServer) -> None:
+    with connect(server.url, "Driver") as arm:
         assert arm.query(answers.State).silence_profile == "real arm"

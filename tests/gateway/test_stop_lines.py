@@ -57,7 +57,7 @@ def test_two_lines_stop_a_moving_arm(server: AppServer) -> None:
         program.ask(requests.ReleaseLease())
 
 
-@pytest.mark.parametrize("end", [b"\n", b""])
+@pytest.mark.parametrize("end", [pytest.param(b"\n", marks=pytest.mark.long), b""])
 def test_sender_that_ends_its_half_is_answered(server: AppServer, end: bytes) -> None:
     host, port = server.stop_url.removeprefix("http://").split(":")
     with connect(server.url, "Driver") as program:
@@ -72,9 +72,8 @@ def test_sender_that_ends_its_half_is_answered(server: AppServer, end: bytes) ->
         program.ask(requests.ReleaseLease())
 
 
-@pytest.mark.parametrize(
-    ("lines", "why"),
-    [
+def test_other_lines_are_refused_and_stop_nothing(server: AppServer) -> None:
+    for lines, why in (
         (HELLO + HELLO, "hello"),
         (STOP + HELLO, "stop"),
         (b'{"do": "hello"}\n' + STOP, "name"),
@@ -82,19 +81,16 @@ def test_sender_that_ends_its_half_is_answered(server: AppServer, end: bytes) ->
         (b'{"do": "hello", "name": "\xff"}\n' + STOP, "utf-8"),
         (HELLO + b'{"do": "stop", "press": 1}\n', "press"),
         (b"{" + MAX_HEAD_BYTES * b" ", "too long"),
-    ],
-)
-def test_other_lines_are_refused_and_stop_nothing(
-    server: AppServer, lines: bytes, why: str
-) -> None:
-    refused = answer(server, lines)
-    assert refused["stop"] == "refused"
-    assert why in refused["why"]
-    assert '{"do": "stop"}' in refused["why"]
+    ):
+        refused = answer(server, lines)
+        assert refused["stop"] == "refused"
+        assert why in refused["why"]
+        assert '{"do": "stop"}' in refused["why"]
     with connect(server.url, "Watcher") as program:
         assert program.query(answers.State).stopped is None
 
 
+@pytest.mark.long
 def test_lines_need_a_token_where_pages_need_one(tmp_path: Path) -> None:
     path = tmp_path / "access.json"
     token = AccessFile.create(path).give("Vera", Role.VIEWER, time.time() + HOUR)

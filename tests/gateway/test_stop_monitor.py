@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from katana450.server.service.stop_path import StopPath
+from katana450.server.web import stop_monitor
 from katana450.server.web.stop_monitor import watch_stop_path
 from tests.browser.server import AppServer, ServerError
 from tests.gateway.client import ask
@@ -70,12 +71,14 @@ async def problem_with(answer: bytes, arm_age: float) -> str:
     ],
 )
 def test_port_serves_stop_only_if_it_reaches_the_arm(
-    answer: bytes, arm_age: float, serves: bool
+    monkeypatch: pytest.MonkeyPatch, answer: bytes, arm_age: float, serves: bool
 ) -> None:
+    monkeypatch.setattr(stop_monitor, "CHECK_EVERY", 0.01)
     problem = asyncio.run(problem_with(answer, arm_age))
     assert bool(problem) != serves
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="finds the server's processes by their names")
 def test_stop_process_that_no_longer_reads_from_the_arm_is_replaced(tmp_path: Path) -> None:
     app, fuse = tmp_path / "fatal.py", tmp_path / "fuse"

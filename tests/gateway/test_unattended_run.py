@@ -23,9 +23,8 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
-@pytest.mark.parametrize(
-    "end", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.long)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL])
 def test_unattended_program_outlives_its_terminal(
     server: AppServer, tmp_path: Path, end: signal.Signals
 ) -> None:

@@ -94,11 +94,11 @@ def test_other_requests_wait_for_the_application(web: WebServer) -> None:
     with ThreadPoolExecutor(1) as pool:
         asked: Future[int] = pool.submit(lambda: ask(f"{url_of(web)}/health")[0])
         with pytest.raises(FutureTimeoutError):
-            asked.result(0.3)
+            asked.result(0.1)
         answer = PlainTextResponse("ok", 203)
         web.loop.call_soon_threadsafe(web.show, answer)
         with pytest.raises(FutureTimeoutError):
-            asked.result(0.3)
+            asked.result(0.1)
         web.loop.call_soon_threadsafe(web.complete)
         assert asked.result(10.0) == 203
 
@@ -111,13 +111,13 @@ def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(web: WebS
     async def trial() -> None:
         path, cookie = f"/control?page={page_name()}", enter(url_of(web))
         opening = asyncio.create_task(websocket(url_of(web), path, cookie).__aenter__())
-        await asyncio.sleep(0.3)
+        await asyncio.sleep(0.1)
         assert not opening.done()
         web.loop.call_soon_threadsafe(web.show, app)
         socket = await asyncio.wait_for(opening, 5.0)
         await socket.send(json.dumps({"do": "heartbeat", "n": 7}))
         with pytest.raises(TimeoutError):
-            await asyncio.wait_for(socket.recv(), 0.3)
+            await asyncio.wait_for(socket.recv(), 0.1)
         web.loop.call_soon_threadsafe(web.complete)
         async with asyncio.timeout(5.0):
             while json.loads(await socket.recv()) != {"is": "echo", "n": 7}:

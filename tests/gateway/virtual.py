@@ -16,10 +16,10 @@ import time
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from types import SimpleNamespace
 from typing import Any, Self, TypeVar, cast
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import pytest
 from starlette.applications import Starlette
@@ -30,6 +30,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.planning_worker import PlanningWorker
@@ -137,8 +138,11 @@ class _Pipe:
 
     age = 0.0
 
-    def __init__(self, found: DescribedRobot, clock: VirtualClock, profile: SilenceProfile) -> None:
+    def __init__(
+        self, found: DescribedRobot, loop: _Loop, clock: VirtualClock, profile: SilenceProfile
+    ) -> None:
         robot, session, _ = found
+        self._loop = loop
         arm = robot.joint_group if robot.arm is None else robot.arm
         self._mailbox = Mailbox(session.check)
         driver = SimulatedDriver(arm, session.ready, 0.0)
@@ -156,7 +160,8 @@ class _Pipe:
         if isinstance(command, cmd.Servo):
             command = replace(command, t=self._clock.t)
         ticket = self._mailbox.put(command, actor)
-        self._woken.set()
+        # Also from threads that plan.
+        self._loop.call_soon_threadsafe(self._woken.set)
         return ticket
 
     def heartbeat(self, drivers: tuple[str, ...]) -> None:
@@ -348,8 +353,12 @@ class VirtualServer:
         *words: str,
         access: AccessFile | None = None,
         profile: SilenceProfile = SilenceProfile.REAL_ARM,
+        detours: bool = False,
     ) -> None:
-        """Start a server with the robot ``found`` and the options ``words`` of `serve`."""
+        """Start a server with the robot ``found`` and the options ``words`` of `serve`.
+
+        ``detours``: whether detours are planned, for which the time passes more slowly.
+        """
         self.clock = VirtualClock()
         self.loop = _Loop(self.clock)
         options, settings, now = _options(words), Settings(), self.clock.now
@@ -382,7 +391,7 @@ class VirtualServer:
         acceptor = cast(Any, SimpleNamespace(kept=lambda _client: nullcontext()))
         admission = Admission(app, hub, self.authenticator, acceptor)
         self.app = SecurityMiddleware(admission, address)
-        self.arm = _Pipe(found, self.clock, profile)
+        self.arm = _Pipe(found, self.loop, self.clock, profile)
         pipe = cast(Any, self.arm)
         worker = PlanningWorker(session, self.arm.state_publisher, pipe)
         worker.notify = lambda why: self._soon(hub.announce, why)
@@ -390,6 +399,11 @@ class VirtualServer:
         nodes = next((part.nodes for part in parts if part.nodes is not None), None)
         values = Nodes(robot) if nodes is None else nodes(robot, session.environment)
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
+        self._detours: DetourPlanner | None = None
+        if detours:
+            go = partial(hub.gate.submit, cmd.Go()) if options.go_on_release else None
+            self._detours = DetourPlanner(session, self.arm.state_publisher, worker, go)
+            self._detours.start()
         self._tasks = [self.loop.create_task(each) for each in (self.arm.run(hub), self._watch())]
 
     def _soon(self, act: Any, *arguments: Any) -> None:
@@ -418,6 +432,8 @@ class VirtualServer:
 
     def __exit__(self, *_error: object) -> None:
         """End all that runs."""
+        if self._detours is not None:
+            self._detours.stop()
         tasks = asyncio.all_tasks(self.loop)
         for task in tasks:
             task.cancel()
@@ -445,7 +461,7 @@ class VirtualServer:
         named.setdefault("host", HOST)
         return {
             "type": "http",
-            "path": parts.path,
+            "path": unquote(parts.path),
             "raw_path": parts.path.encode(),
             "query_string": parts.query.encode(),
             "headers": [(name.encode(), text.encode()) for name, text in named.items()],

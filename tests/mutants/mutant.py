@@ -21,7 +21,7 @@ TABLE = Path(__file__).with_name("faults.toml")
 TIMEOUT = 240.0
 """[s] Time after which tests that a fault has brought to a standstill count as failed."""
 
-PASSED, FAILED = 0, 1
+PASSED, FAILED, NO_TESTS = 0, 1, 5
 """Exit status of pytest."""
 
 FAILING = re.compile(r"^(?:FAILED|ERROR) tests/(\S+)", re.MULTILINE)
@@ -97,7 +97,7 @@ class Copy:
             )
         except subprocess.TimeoutExpired:
             return f"no end within {TIMEOUT:g} s"
-        if done.returncode == PASSED:
+        if done.returncode in (PASSED, NO_TESTS):
             return None
         failing = FAILING.search(done.stdout)
         if done.returncode != FAILED or failing is None:
