@@ -65,7 +65,7 @@ def test_old_film_rests_and_a_covered_wall_has_none() -> None:
 
 
 def test_withdrawal_follows_landau_levich_or_derjaguin() -> None:
-    slow, fast = 1e-3, 100.0
+    slow, fast = 1e-3, 200.0
     length = math.sqrt(SURFACE_TENSION / (DENSITY * GRAVITY))
     capillary = VISCOSITY * slow / SURFACE_TENSION
     thin = withdrawn_thickness(slow, GRAVITY)
