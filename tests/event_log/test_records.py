@@ -165,7 +165,7 @@ def test_values_are_bounded_and_without_secrets() -> None:
     person = replace(ANNA.person, name="A\n\u2028\x1b[31m\ud800" * 200_000)
     (found,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
     assert found["what"]["count"] == 1000
-    assert len(encoded(1, found, "0" * 64)) <= MAX_LINE_BYTES
+    assert len(encoded(1, found)) <= MAX_LINE_BYTES
     assert compact_command(cmd.SetPose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
 
 

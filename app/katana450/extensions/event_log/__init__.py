@@ -1,1 +1,1 @@
-"""The event log on disk: chained records, their files, their writer, and their verification."""
+"""The event log on disk: records, their files, their writer, and the command that shows them."""

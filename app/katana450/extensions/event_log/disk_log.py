@@ -31,10 +31,8 @@ class DiskLog(ServerLog):
 
     @property
     def description(self) -> tuple[str, ...]:
-        """Folder and last record, as a line for the terminal."""
-        head = self._writer.head
-        last = f" (record {head.seq}, sha256 {head.hash})" if head.seq else ""
-        return (f"Event log: {self._writer.folder}{last}",)
+        """The folder, as a line for the terminal."""
+        return (f"Event log: {self._writer.folder}",)
 
     def attach(self, pipe: Connection) -> None:
         """Write the records that another process sends by ``pipe``."""

@@ -54,6 +54,6 @@ def _log(options: Namespace) -> int:
 
 EXTENSION = Extension(
     "event_log",
-    (CliCommand("log", "verify and show the event log of a server", add_log_options, _log),),
+    (CliCommand("log", "show the event log of a server", add_log_options, _log),),
     ServeExtension(add_serve_options, server_log=_server_log, send_records=_send_records),
 )

@@ -1,51 +1,24 @@
-"""``katana450 log``: verify and show the event log of a server."""
+"""``katana450 log``: show the event log of a server."""
 
 from __future__ import annotations
 
 import json
 import sys
 from argparse import Namespace
-from pathlib import Path
 
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError
 from katana450.extensions.event_log.disk_log import default_folder
+from katana450.extensions.event_log.folder import lines_of
 from katana450.extensions.event_log.records import Record
-from katana450.extensions.event_log.verification import lines_of, verified
-
-MAX_SHOWN_FAULTS = 100
-"""Maximum number of faults that are printed one by one."""
 
 
 def log(options: Namespace) -> int:
-    """Run ``katana450 log`` and return the exit status: 1 for a log that was changed or cut."""
+    """Run ``katana450 log`` and return the exit status: 1 if a line is not a record."""
     folder = options.folder or default_folder(options.port)
     if options.folder is None and not folder.is_dir() and folder.parent.is_dir():
         found = ", ".join(str(each) for each in sorted(folder.parent.iterdir()))
         raise InputError(f"There is no event log in {folder}. Name one of: {found or 'none'}.")
-    return _verify(folder) if options.act == "verify" else _show(folder, options)
-
-
-def _verify(folder: Path) -> int:
-    report = verified(folder)
-    for text in (*report.notes, *report.faults[:MAX_SHOWN_FAULTS]):
-        print(printable(text))
-    if len(report.faults) > MAX_SHOWN_FAULTS:
-        print(f"... and {len(report.faults) - MAX_SHOWN_FAULTS} more.")
-    if report.first is not None and report.last is not None:
-        print(
-            f"{report.records} records in {report.files} files, numbers {report.first['seq']} to "
-            f"{report.head.seq}, {_text(report.first, 'time')} to {_text(report.last, 'time')}."
-        )
-        print(f"Last record: {report.head.seq}, sha256 {report.head.hash}")
-    if report.faults:
-        print(f"The log was changed or cut: {len(report.faults)} faults.")
-        return 1
-    print("The chain is intact.")
-    return 0
-
-
-def _show(folder: Path, options: Namespace) -> int:
     status = 0
     for line in lines_of(folder):
         if line.record is None:

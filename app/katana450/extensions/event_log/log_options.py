@@ -15,19 +15,17 @@ SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400}
 
 
 def add_log_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommands verify and show to ``parser``."""
-    acts = parser.add_subparsers(dest="act", required=True, metavar="verify | show")
-    verify = acts.add_parser("verify", help="check that no record was changed or cut")
+    """Add the subcommand show to ``parser``."""
+    acts = parser.add_subparsers(dest="act", required=True, metavar="show")
     show = acts.add_parser("show", help="print records, the oldest first")
-    for each in (verify, show):
-        each.add_argument(
-            "folder",
-            type=Path,
-            nargs="?",
-            metavar="FOLDER",
-            help="folder of the log (default: that of the server on --port)",
-        )
-        each.add_argument("--port", type=int, default=Settings.port, help=argparse.SUPPRESS)
+    show.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        metavar="FOLDER",
+        help="folder of the log (default: that of the server on --port)",
+    )
+    show.add_argument("--port", type=int, default=Settings.port, help=argparse.SUPPRESS)
     show.add_argument(
         "--since",
         type=_since,

@@ -1,8 +1,7 @@
-"""Records of the event log: one JSON object per line, each with the hash of the line before."""
+"""Records of the event log: one JSON object per line."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 from datetime import UTC, datetime
@@ -10,10 +9,7 @@ from typing import Any
 
 Record = dict[str, Any]
 """A record: ``time``, ``t`` and ``kind``, and those of ``who``, ``what``, ``grounds``, ``outcome``
-and ``why`` that are known. ``LogFolder`` adds ``seq`` and ``prev``."""
-
-FIRST_HASH = "0" * 64
-"""Value of ``prev`` in the first record of a log."""
+and ``why`` that are known. ``LogFolder`` adds ``seq``."""
 
 MAX_LINE_BYTES = 4096
 """Maximum length of a line. The content of a longer record is replaced by its length."""
@@ -32,36 +28,29 @@ def record(kind: str, what: Any = None, **more: Any) -> Record:
     return made | more
 
 
-def encoded(seq: int, content: Record, previous: str) -> bytes:
+def encoded(seq: int, content: Record) -> bytes:
     """Return ``content`` as a line without line feed.
 
     The line is plain ASCII whatever the texts in it: ``json`` escapes line breaks, control
     characters, lone surrogates, and everything else beyond ASCII.
     """
-    line = _dumped({"seq": seq, **content, "prev": previous})
+    line = _dumped({"seq": seq, **content})
     if len(line) > MAX_LINE_BYTES:
         short: Record = {key: content[key] for key in ("time", "t", "kind") if key in content}
-        line = _dumped(
-            {"seq": seq, **short, "what": {"omitted_bytes": len(line)}, "prev": previous}
-        )
+        line = _dumped({"seq": seq, **short, "what": {"omitted_bytes": len(line)}})
     return line
 
 
 def decoded(line: bytes) -> Record | None:
     """Return the record in ``line``; None if it is not a record."""
     try:
-        found = json.loads(line)
+        content = json.loads(line)
     except (ValueError, RecursionError):
         return None
-    if not isinstance(found, dict) or not isinstance(found.get("prev"), str):
+    if not isinstance(content, dict):
         return None
-    seq = found.get("seq")
-    return found if isinstance(seq, int) and not isinstance(seq, bool) else None
-
-
-def hash_of(line: bytes) -> str:
-    """Return the SHA-256 of ``line``, which has no line feed, as hexadecimal digits."""
-    return hashlib.sha256(line).hexdigest()
+    seq = content.get("seq")
+    return content if isinstance(seq, int) and not isinstance(seq, bool) else None
 
 
 def _dumped(content: Record) -> bytes:

@@ -14,11 +14,10 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Any
 
 from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
-from katana450.extensions.event_log.folder import MAX_FILE_BYTES, MAX_FILES, LogFolder, LogHead
+from katana450.extensions.event_log.folder import MAX_FILE_BYTES, MAX_FILES, LogFolder
 from katana450.extensions.event_log.records import Record, record
 
 log = logging.getLogger(__name__)
@@ -35,9 +34,6 @@ RETRY_INTERVAL = 1.0
 SYNC_INTERVAL = 1.0
 """[s] Maximum time after which a record is on the disk itself, and not only with the system."""
 
-HEAD_INTERVAL = 3600.0
-"""[s] Time between two log messages with the hash of the last record."""
-
 
 class LogWriter:
     """Writes records to a folder. Every method returns at once, and may be called in any thread."""
@@ -51,7 +47,7 @@ class LogWriter:
         self._kept: deque[Record] = deque()
         self._lost = self._dropped = 0
         self._failing: str | None = None
-        self._retry_at = self._sync_at = self._head_at = 0.0
+        self._retry_at = self._sync_at = 0.0
         self._finding_t = float("-inf")
         self._pipes: list[Connection] = []
         self._listeners: list[threading.Thread] = []
@@ -60,9 +56,9 @@ class LogWriter:
         self._thread.start()
 
     @property
-    def head(self) -> LogHead:
-        """The last record on disk, with the number 0 before the first."""
-        return self._folder.head
+    def seq(self) -> int:
+        """Number of the last record that was written; 0 before the first."""
+        return self._folder.seq
 
     @property
     def folder(self) -> Path:
@@ -156,30 +152,26 @@ class LogWriter:
             log.exception("The event log met an error; it continues with the next record.")
             lost = record("lost", {"count": len(self._kept)}, why="The event log met an error.")
             self._kept = deque([lost])
-            # The next record states again what was found when the log was opened.
             self._folder.close()
         else:
-            self._note_success(now)
+            self._note_success()
 
     def _append_all(self) -> None:
         """Write the kept records, and how many were lost. Raises OSError."""
         folder = self._folder
-        after = None if folder.is_open else folder.open()
+        if not folder.is_open:
+            folder.open()
         while self._kept or self._lost:
             if self._kept:
                 content = self._kept[0]
             else:
                 why = self._failing or "Too many events came at once."
                 content = record("lost", {"count": self._lost}, why=why)
-            if after is not None:
-                content = content | {"what": {**_as_mapping(content.get("what")), "after": after}}
             folder.append(content)
-            after = None
             if self._kept:
                 self._kept.popleft()
             else:
                 self._lost = 0
-        folder.commit()
 
     def _fail(self, error: OSError) -> None:
         self._folder.close()
@@ -196,16 +188,11 @@ class LogWriter:
             log.error("%s Folder: %s. Later records are counted.", self._failing, self.folder)
             self._tell_all(self._failing)
 
-    def _note_success(self, now: float) -> None:
+    def _note_success(self) -> None:
         if self._failing is not None:
             self._failing = None
             log.warning("The event log in %s is written again.", self.folder)
             self._tell_all("")
-        if not self._head_at:
-            self._head_at = now + HEAD_INTERVAL
-        if now >= self._head_at:
-            self._head_at = now + HEAD_INTERVAL
-            log.info("Event log: record %d, sha256 %s.", self.head.seq, self.head.hash)
 
     def _tell_all(self, text: str) -> None:
         with self._attaching:
@@ -218,9 +205,3 @@ def _tell(pipe: Connection, text: str) -> None:
     with suppress(OSError):
         if writable(pipe.fileno()):
             pipe.send(text)
-
-
-def _as_mapping(what: Any) -> dict[str, Any]:
-    if what is None:
-        return {}
-    return what if isinstance(what, dict) else {"what": what}

@@ -1,0 +1,177 @@
+"""Test that the log continues over files, starts and kills, and the command that shows it."""
+
+from __future__ import annotations
+
+import stat
+import sys
+from pathlib import Path
+
+import pytest
+
+from katana450.cli.main import main
+from katana450.extensions.event_log.disk_log import DiskLog
+from katana450.extensions.event_log.folder import lines_of, log_files
+from katana450.extensions.event_log.records import MAX_LINE_BYTES, record
+from tests.event_log.logs import newest, numbered, records, write
+
+BREAKS = ["\n", "\r", "\v", "\f", "\x00", "\x1b[2K\x1b[31m", "\x85", "\u2028", "\u2029", "\u202e"]
+"""Characters that end a line or control a terminal."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a log of 12 records in one file."""
+    write(tmp_path / "log", numbered(10))
+    return tmp_path / "log"
+
+
+def lines(folder: Path) -> list[bytes]:
+    return newest(folder).read_bytes().splitlines(keepends=True)
+
+
+def test_records_are_numbered_from_one(folder: Path) -> None:
+    found = records(folder)
+    assert [each["seq"] for each in found] == list(range(1, 13))
+    assert found[0]["kind"] == "start"
+    assert found[0]["time"].endswith("Z")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has other permissions")
+def test_only_the_owner_can_read_the_log(folder: Path) -> None:
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert {stat.S_IMODE(path.stat().st_mode) for path in folder.iterdir()} == {0o600}
+
+
+def test_numbers_continue_over_files_and_starts(tmp_path: Path) -> None:
+    for _ in range(3):
+        write(tmp_path, numbered(10), max_file_bytes=1500, max_files=100)
+    files = log_files(tmp_path)
+    assert len(files) >= 3
+    assert max(path.stat().st_size for path in files) <= 1500
+    assert [each["seq"] for each in records(tmp_path)] == list(range(1, 37))
+    firsts = [next(line for line in lines_of(tmp_path) if line.path == path) for path in files]
+    names = [f"events-{line.record['seq']:012d}.jsonl" for line in firsts if line.record]
+    assert names == [path.name for path in files]
+
+
+def test_size_of_the_log_is_limited(tmp_path: Path) -> None:
+    write(tmp_path, numbered(100), max_file_bytes=1500, max_files=3)
+    files = log_files(tmp_path)
+    assert len(files) == 3
+    assert sum(path.stat().st_size for path in files) <= 3 * 1500
+    assert records(tmp_path)[-1]["seq"] == 102
+
+
+def test_file_without_a_record_is_continued(tmp_path: Path) -> None:
+    (tmp_path / "events-000000000041.jsonl").touch()
+    write(tmp_path, [])
+    assert [each["seq"] for each in records(tmp_path)] == [41, 42]
+
+
+def test_line_that_a_kill_has_torn_stays_alone(folder: Path) -> None:
+    with newest(folder).open("ab") as file:
+        file.write(b'{"seq":13,"ti')
+    write(folder, [])
+    torn = lines(folder)[12]
+    assert torn == b'{"seq":13,"ti\n'
+    assert [each["seq"] for each in records(folder)] == list(range(1, 15))
+
+
+def test_log_with_hashes_of_an_earlier_version_is_shown_and_continued(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    old = b'{"seq":7,"time":"2026-01-31T12:00:00.000Z","t":1.0,"kind":"start","prev":"%s"}\n'
+    (tmp_path / "events-000000000007.jsonl").write_bytes(old % (b"0" * 64))
+    write(tmp_path, [])
+    assert main(["log", "show", str(tmp_path)]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["7", "8", "9"]
+
+
+@pytest.mark.parametrize("each", [*BREAKS, "\ud800", "\udfff\ud800", "😀"])
+def test_hostile_text_stays_in_its_line(
+    tmp_path: Path, each: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    forged = f'x{each}{{"seq":1}}'
+    write(tmp_path, [record("refusal", {forged: forged}, who={"name": forged}, why=forged)])
+    content = newest(tmp_path).read_bytes()
+    assert content.count(b"\n") == 3
+    assert all(32 <= byte < 127 for byte in content.replace(b"\n", b""))
+    assert records(tmp_path)[1]["why"] == forged
+    assert main(["log", "show", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert len(shown) == 3
+    assert all(line.isprintable() for line in shown)
+
+
+def test_record_of_a_megabyte_is_replaced_by_its_length(tmp_path: Path) -> None:
+    write(tmp_path, [record("refusal", {"request": "x" * 1_000_000})])
+    _, found, _ = records(tmp_path)
+    assert found["what"]["omitted_bytes"] > 1_000_000
+    assert max(map(len, lines(tmp_path))) <= MAX_LINE_BYTES
+
+
+def test_show_filters_by_time_participant_and_kind(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    anna = {"name": "Anna", "role": "operator", "address": "10.0.0.7"}
+    old = {"time": "2026-01-01T00:00:00.000Z", "kind": "stop", "who": anna}
+    write(tmp_path, [old, record("stop", who=anna), record("lease", who={"name": "Bert"})])
+
+    def shown(*options: str) -> list[str]:
+        assert main(["log", "show", str(tmp_path), *options]) == 0
+        return [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+
+    assert shown() == ["1", "2", "3", "4", "5"]
+    assert shown("--kind", "stop") == ["2", "3"]
+    assert shown("--kind", "stop", "--kind", "lease") == ["2", "3", "4"]
+    assert shown("--who", "anna", "--since", "10m") == ["3"]
+    assert shown("--who", "10.0.0.7", "--since", "2025-12-31") == ["2", "3"]
+
+
+@pytest.mark.parametrize(
+    ("since", "shown"),
+    [
+        ("2026-01-31T11:59:59", True),
+        ("2026-01-31 12:00:01", False),
+        ("2026-01-31T13:59:59+02:00", True),
+        ("2026-01-31T14:00:01+02:00", False),
+        ("2026-01-31T09:00:01-03:00", False),
+        ("2026-01-31T12:00:00Z", True),
+        ("2026-01-31", True),
+    ],
+)
+def test_show_takes_a_time_of_any_zone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], since: str, shown: bool
+) -> None:
+    write(tmp_path, [{"time": "2026-01-31T12:00:00.000Z", "kind": "stop"}])
+    assert main(["log", "show", str(tmp_path), "--since", since, "--kind", "stop"]) == 0
+    assert bool(capsys.readouterr().out) == shown
+
+
+def test_show_refuses_a_time_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
+    for since in ("noon", "0001-01-01T00:00+02:00"):
+        with pytest.raises(SystemExit):
+            main(["log", "show", "--since", since])
+        assert "a time such as 30m, 12h, 7d" in capsys.readouterr().err
+
+
+def test_end_that_nobody_requested_is_recorded_as_a_failure(tmp_path: Path) -> None:
+    for requested in (True, False):
+        DiskLog(tmp_path, 8080).close(requested=requested)
+    causes = [each["what"]["cause"] for each in records(tmp_path) if each["kind"] == "end"]
+    assert causes == ["requested", "the server could not start, or failed"]
+
+
+def test_show_names_broken_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = lines(folder)
+    newest(folder).write_bytes(b"".join([*content[:6], b"\xff\x1b[31m\n", *content[6:]]))
+    assert main(["log", "show", str(folder)]) == 1
+    captured = capsys.readouterr()
+    assert captured.err == f"{newest(folder).name}, line 7: this is not a record.\n"
+    assert len(captured.out.splitlines()) == 12
+
+
+def test_missing_log_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for folder in (tmp_path, tmp_path / "none"):
+        assert main(["log", "show", str(folder)]) == 1
+        assert f"There is no event log in {folder}" in capsys.readouterr().err
