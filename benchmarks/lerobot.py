@@ -24,7 +24,6 @@ import numpy.typing as npt
 from benchmarks.lerobot_environment import environment_of, prepare_lerobot
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main as katana450
-from katana450.extensions.media.picture import MOVING
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.recorded_states import RecordedStates
@@ -63,7 +62,7 @@ def expected_pictures(folder: Path, dataset: Path) -> dict[str, npt.NDArray[Any]
             for state in RecordedStates(file, session).at(file.start + BEGIN + frames / FPS):
                 for view in VIEWS:
                     shot = Shot(Preset[view.upper()], SIZE, "Light")
-                    taken[view].append(shot.taken(stage, robot, state, MOVING).pixels)
+                    taken[view].append(shot.taken(stage, robot, state).pixels)
     pictures = {
         f"pictures observation.images.{view}": np.array(each) for view, each in taken.items()
     }

@@ -45,7 +45,7 @@ def katana() -> Robot:
 @pytest.fixture(scope="module")
 def filled(workshop: Workshop) -> Picture:
     state = workshop.filled
-    return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
+    return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT)
 
 
 def ball(radius: float) -> VisualMesh:
@@ -58,7 +58,7 @@ def ball(radius: float) -> VisualMesh:
 
 def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture) -> None:
     state = workshop.filled
-    again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT, 1)
+    again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT)
     assert again.png == filled.png
 
 
@@ -83,13 +83,13 @@ def test_the_arm_covers_the_same_pixels_as_in_pillow(
     eye = np.array(at.position, dtype=np.float32)
     hits = first_hits(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
     theirs = silhouette(placed(URDF_PATH, katana.values(pose)), view)
-    assert overlap(hits.solid.reshape(SIZE, SIZE), theirs) >= 0.98
+    assert overlap((hits.item >= 0).reshape(SIZE, SIZE), theirs) >= 0.98
 
 
 def test_the_arm_stands_before_its_room_whatever_the_theme(workshop: Workshop) -> None:
     items = workshop.stage.items(workshop.ready)
     shown = {
-        name: picture(items, (), replace(NEAR, size=(160, 100)), theme, 1)
+        name: picture(items, (), replace(NEAR, size=(160, 100)), theme)
         for name, theme in THEMES.items()
     }
     light, dark = shown["Light"], shown["Dark"]
@@ -105,7 +105,7 @@ def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
     cup, water = filled.shows("cup"), filled.shows(CUP)
     assert cup.sum() > 300
     assert 20 < water.sum() < cup.sum()
-    dry = picture(workshop.stage.items(workshop.ready), (), NEAR, LIGHT, 1)
+    dry = picture(workshop.stage.items(workshop.ready), (), NEAR, LIGHT)
     wet, white = filled.pixels[water].astype(float), dry.pixels[water].astype(float)
     # Water absorbs red of the white cup.
     assert (wet[:, 2] - wet[:, 0]).mean() > (white[:, 2] - white[:, 0]).mean() + 20.0
@@ -120,7 +120,7 @@ def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
     T = se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0))
     box = SceneObject("crate", Shape.BOX, (0.1, 0.1, 0.1), T)
     state = replace(workshop.ready, objects=(box,))
-    shown = picture(workshop.stage.surrounding_items(state), (), NEAR, LIGHT, 1)
+    shown = picture(workshop.stage.surrounding_items(state), (), NEAR, LIGHT)
     where = np.argwhere(shown.shows("crate")).mean(axis=0)
     away = np.array((0.4, 0.0, 0.05)) - NEAR.position
     right, up, ahead = NEAR.frame @ away / NEAR.pixel
@@ -133,7 +133,7 @@ def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
 def test_a_sphere_has_the_size_of_its_projection() -> None:
     """A distant sphere covers a disc with the sine of its half angle as radius."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
-    shown = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1)
+    shown = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT)
     radius = math.tan(math.asin(0.3 / 2.0)) / at.pixel
     assert shown.shows("ball").sum() == pytest.approx(math.pi * radius**2, rel=0.01)
 
@@ -142,7 +142,7 @@ def test_a_shadow_falls_along_the_key_light() -> None:
     """The shadow of a sphere 0.5 m up lies along the light's direction from its centre."""
     at = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
     items = [Item("ball", ball(0.15), UP)]
-    with_ball, without = picture(items, (), at, LIGHT, 4), picture((), (), at, LIGHT, 4)
+    with_ball, without = picture(items, (), at, LIGHT), picture((), (), at, LIGHT)
     darker = without.pixels.astype(int).sum(axis=2) - with_ball.pixels.astype(int).sum(axis=2)
     shadow = (darker > 60) & (with_ball.item == FLOOR)
     key = np.array((0.7, -0.9, 1.9))
@@ -156,16 +156,16 @@ def test_a_shadow_falls_along_the_key_light() -> None:
 def test_edges_are_smooth() -> None:
     """Pixels between a dark sphere and the bright room have intermediate colours."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
-    row = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT, 1).pixels[:, :, 1].astype(int)
+    row = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT).pixels[:, :, 1].astype(int)
     inside, outside = row[100, 100], row[100, 5]
     # A nearly vertical outline crosses pixels at another place in each row.
     rim = row[70:130, 10:60]
-    assert ((rim > inside + 15) & (rim < outside - 15)).any(axis=1).mean() > 0.8
+    assert ((rim > inside + 15) & (rim < outside - 15)).any(axis=1).mean() > 0.7
 
 
 def test_an_empty_picture_is_the_room() -> None:
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (64, 48))
-    shown = picture((), (), at, DARK, 1)
+    shown = picture((), (), at, DARK)
     assert set(np.unique(shown.item)) == {FLOOR, NOWHERE}
     assert shown.names == ()
 

@@ -19,7 +19,6 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main
 from katana450.extensions.media.extension import CAMERAS
-from katana450.extensions.media.picture import MOVING
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
@@ -122,7 +121,7 @@ def test_pictures_show_the_states(tmp_path: Path) -> None:
             for state in RecordedStates(file, session).at(times):
                 for view, pictures in expected.items():
                     shot = Shot(Preset[view], SIZE, "Light")
-                    pictures.append(shot.taken(stage, robot, state, MOVING).pixels)
+                    pictures.append(shot.taken(stage, robot, state).pixels)
     for view, pictures in expected.items():
         feature = f"observation.images.{view.lower()}"
         shown = decoded(out / f"videos/{feature}/chunk-000/file-000.mp4", SIZE)

@@ -15,6 +15,12 @@ FLOOR, NOWHERE = -1, -2
 BACKGROUND_DISTANCE = 1e4
 """[m] Distance that is assigned to rays that hit nothing."""
 
+MAX_SHADOW_LENGTH = 2.5
+"""[m] Maximum length of a shadow."""
+
+RAY_OFFSET = 2e-4
+"""[m] Distance of the start of a shadow ray from its surface, to avoid hits of that surface."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hits:
@@ -24,8 +30,7 @@ class Hits:
         directions: (n, 3) of the rays.
         distance: (n,) [m].
         points: (n, 3) end points in the base frame [m].
-        normals: (n, 3) unit normals for shading, towards the camera.
-        flat: (n, 3) unit normals of the triangles, towards the camera.
+        normals: (n, 3) unit normals, towards the camera.
         item: (n,) numbers of items, FLOOR or NOWHERE.
     """
 
@@ -33,13 +38,7 @@ class Hits:
     distance: Floats
     points: Floats
     normals: Floats
-    flat: Floats
     item: Ints
-
-    @property
-    def solid(self) -> Bools:
-        """(n,) True for rays that hit an item."""
-        return np.asarray(self.item >= 0)
 
     def some(self, which: Bools) -> Hits:
         """Return the hits of the rays for which ``which`` (n,) is True."""
@@ -48,7 +47,6 @@ class Hits:
             self.distance[which],
             self.points[which],
             self.normals[which],
-            self.flat[which],
             self.item[which],
         )
 
@@ -60,38 +58,46 @@ def first_hits(
 
     ``floor`` is the height of the floor [m].
     """
-    met = tracer.first(_from(eye, directions), directions)
+    meeting = tracer.first(_from(eye, directions), directions)
     down = directions[:, 2]
     to_floor = np.full(len(directions), BACKGROUND_DISTANCE, dtype=np.float32)
     np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
-    nearest = np.minimum(met.distance, BACKGROUND_DISTANCE)
+    nearest = np.minimum(meeting.distance, BACKGROUND_DISTANCE)
     on_floor = (to_floor > 0.0) & (to_floor < nearest)
     distance = np.where(on_floor, to_floor, nearest).astype(np.float32)
-    hit = np.flatnonzero(met.face != NOTHING)
+    hit = np.flatnonzero(meeting.face != NOTHING)
     normals = np.zeros_like(directions)
     normals[:, 2] = 1.0
-    flat = normals.copy()
-    normals[hit], flat[hit] = _normals(scene, met, directions, hit)
+    normals[hit] = _normals(scene, meeting, directions, hit)
     item = np.where(on_floor, FLOOR, NOWHERE).astype(np.int32)
-    item[hit] = scene.item[met.face[hit]]
-    points = _ends(eye, distance, directions)
-    return Hits(directions, distance, points, normals, flat, item)
+    item[hit] = scene.item[meeting.face[hit]]
+    return Hits(directions, distance, _ends(eye, distance, directions), normals, item)
 
 
 def hits_behind(
     scene: RenderScene, tracer: Tracer, eye: Floats, before: Hits
 ) -> tuple[np.typing.NDArray[np.intp], Hits]:
     """Return the numbers (m,) of rays that hit another scene ``before`` they end, and the hits."""
-    met = tracer.first(_from(eye, before.directions), before.directions)
-    hit = np.flatnonzero(met.distance < before.distance)
-    directions, distance = before.directions[hit], met.distance[hit]
-    normals, flat = _normals(scene, met, before.directions, hit)
+    meeting = tracer.first(_from(eye, before.directions), before.directions)
+    hit = np.flatnonzero(meeting.distance < before.distance)
+    directions, distance = before.directions[hit], meeting.distance[hit]
+    normals = _normals(scene, meeting, before.directions, hit)
     points = _ends(eye, distance, directions)
-    return hit, Hits(directions, distance, points, normals, flat, scene.item[met.face[hit]])
+    return hit, Hits(directions, distance, points, normals, scene.item[meeting.face[hit]])
 
 
-def _from(eye: Floats, directions: Floats) -> Floats:
-    return np.tile(eye, (len(directions), 1))
+def lit(tracer: Tracer, hits: Hits, towards: Floats) -> Bools:
+    """Return (n,) whether the lamp in the direction ``towards`` (3,) reaches each point."""
+    reached: Bools = (hits.item != NOWHERE) & (hits.normals @ towards > 0.0)
+    facing = np.flatnonzero(reached)
+    start = (hits.points[facing] + RAY_OFFSET * hits.normals[facing]).astype(np.float32)
+    reached[facing] = ~tracer.blocked(start, _from(towards, facing), MAX_SHADOW_LENGTH)
+    return reached
+
+
+def _from(vector: Floats, rays: np.typing.NDArray[np.generic]) -> Floats:
+    """Return ``vector`` (3,) for each of the ``rays``."""
+    return np.tile(vector, (len(rays), 1))
 
 
 def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
@@ -99,12 +105,12 @@ def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
 
 
 def _normals(
-    scene: RenderScene, met: Meeting, directions: Floats, hit: np.typing.NDArray[np.intp]
-) -> tuple[Floats, Floats]:
-    """Return unit normals (m, 3) at the ends of the rays ``hit``: for shading, of triangles."""
-    face = met.face[hit]
+    scene: RenderScene, meeting: Meeting, directions: Floats, hit: np.typing.NDArray[np.intp]
+) -> Floats:
+    """Return smooth unit normals (m, 3) at the ends of the rays ``hit``."""
+    face = meeting.face[hit]
     a, b, c = (scene.normals[scene.faces[face, corner]] for corner in range(3))
-    second, third = met.second[hit, None], met.third[hit, None]
+    second, third = meeting.second[hit, None], meeting.third[hit, None]
     smooth = a + second * (b - a) + third * (c - a)
     size = np.sqrt(np.einsum("ni,ni->n", smooth, smooth))[:, None]
     plane = scene.flat[face]
@@ -112,7 +118,7 @@ def _normals(
     inside = np.einsum("ni,ni->n", plane, directions[hit]) > 0.0
     side = np.where(inside, np.float32(-1.0), np.float32(1.0))[:, None]
     shaded = np.where(size > MIN_DENOMINATOR, smooth / np.maximum(size, MIN_DENOMINATOR), plane)
-    return side * shaded, side * plane
+    return np.asarray(side * shaded, dtype=np.float32)
 
 
 STEEPNESS = 1e-6

@@ -1,4 +1,4 @@
-"""Rendering of a picture: one sample per pixel with light, and four more at edges."""
+"""Rendering of a picture: one sample per pixel, and four at edges of surfaces and shadows."""
 
 from __future__ import annotations
 
@@ -13,15 +13,11 @@ from PIL import Image
 
 from katana450.extensions.media import room
 from katana450.extensions.media.camera import Camera
-from katana450.extensions.media.hits import FLOOR, NOWHERE, Hits, first_hits, hits_behind
-from katana450.extensions.media.light import TILE, Light, reaching
+from katana450.extensions.media.hits import FLOOR, NOWHERE, Hits, first_hits, hits_behind, lit
 from katana450.extensions.media.scene import Bools, Floats, Ints, Item, RenderScene
-from katana450.extensions.media.shading import SurfaceMaterial, developed, shaded
+from katana450.extensions.media.shading import LAMPS, developed, shaded
 from katana450.extensions.media.tracer import Tracer
 from katana450.server.viser_bridge.themes import Theme
-
-STILL, MOVING = 4, 1
-"""Rays per pixel and kind of light: of a picture, and of a frame of a film."""
 
 CORNERS = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
 """Places of the samples in a pixel at an edge."""
@@ -68,17 +64,29 @@ class Picture:
 
 
 def picture(
-    items: Sequence[Item],
-    translucents: Sequence[Translucent],
-    camera: Camera,
-    theme: Theme,
-    rays: int = STILL,
+    items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera, theme: Theme
 ) -> Picture:
     """Return the picture of the items as ``camera`` sees them.
 
     Raises ConfigurationError without embreex.
     """
-    return _Renderer(items, translucents, camera, theme, rays).picture
+    return _Renderer(items, translucents, camera, theme).picture
+
+
+class _Samples(NamedTuple):
+    """What n rays show.
+
+    Attributes:
+        colours: (n, 3) sRGB, 0 to 1.
+        hits: first intersections with opaque surfaces.
+        item: (n,) what is seen there, also a translucent item.
+        lit: (n,) whether the key light reaches the points.
+    """
+
+    colours: Floats
+    hits: Hits
+    item: Ints
+    lit: Bools
 
 
 class _Renderer:
@@ -90,7 +98,6 @@ class _Renderer:
         translucents: Sequence[Translucent],
         camera: Camera,
         theme: Theme,
-        rays: int,
     ) -> None:
         self._solid = RenderScene.of(items)
         self._thin = RenderScene.of([translucent.item for translucent in translucents])
@@ -98,134 +105,73 @@ class _Renderer:
             [translucent.opacity for translucent in translucents], dtype=np.float32
         )
         self._tracer, self._behind = Tracer(self._solid), Tracer(self._thin)
-        self._camera, self._theme, self._rays = camera, theme, rays
+        self._camera, self._theme = camera, theme
         self._eye = np.array(camera.position, dtype=np.float32)
 
     @property
     def picture(self) -> Picture:
         width, height = self._camera.size
         rows, columns = np.divmod(np.arange(width * height, dtype=np.int32), width)
-        x, y = _spots(columns, 0.5), _spots(rows, 0.5)
-        hits = self._hits(x, y)
-        towards = room.LAMPS[0].towards
-        light = reaching(hits, self._tracer, towards, (width, height), self._rays)
-        found, translucent = self._light(hits, light, y)
-        colours = developed(found)
-        shown = np.where(translucent == NOWHERE, hits.item, translucent + len(self._solid.names))
-        rough = np.flatnonzero(self._ends(hits, shown))
-        if len(rough):
-            colours[rough] = self._finer(rough, rows, columns, hits, light)
-        # Dithering, because the low contrast of the background would show steps.
-        plain = hits.item == NOWHERE
-        finer = (TILE[rows[plain] % 4, columns[plain] % 4] - 7.5) / (16.0 * 255.0)
-        colours[plain] = np.clip(colours[plain] + finer[:, None], 0.0, 1.0)
+        samples = self._samples(_spots(columns, 0.5), _spots(rows, 0.5))
+        colours = samples.colours
+        edge = np.flatnonzero(self._edges(samples))
+        if len(edge):
+            colours[edge] = sum(
+                self._samples(_spots(columns[edge], right), _spots(rows[edge], down)).colours
+                for right, down in CORNERS
+            ) / np.float32(len(CORNERS))
+        plain = samples.item == NOWHERE
+        colours[plain] = room.dithered(colours[plain], rows[plain], columns[plain])
         return Picture(
             np.rint(255.0 * colours).astype(np.uint8).reshape(height, width, 3),
-            shown.astype(np.int32).reshape(height, width),
+            samples.item.reshape(height, width),
             (*self._solid.names, *self._thin.names),
         )
 
-    def _hits(self, x: Floats, y: Floats) -> Hits:
-        """Return the hits of the rays through x, y (n,) [px]."""
+    def _samples(self, x: Floats, y: Floats) -> _Samples:
+        """Return what the rays through x, y (n,) [px] show."""
         directions = self._camera.directions(x, y)
-        return first_hits(self._solid, self._tracer, self._eye, directions, room.HEIGHT)
-
-    def _light(self, hits: Hits, light: Light, y: Floats) -> tuple[Floats, Ints]:
-        """Return the light (n, 3) from points with the illumination ``light`` to the camera.
-
-        The second value (n,) is the translucent item before each point, NOWHERE without one.
-        """
-        found = room.background(self._theme, self._camera, y)
-        on_floor = hits.item == FLOOR
-        found[on_floor] = room.floor(
-            self._theme,
-            self._camera,
-            hits.some(on_floor),
-            _lit(light, on_floor),
-            found[on_floor],
+        hits = first_hits(self._solid, self._tracer, self._eye, directions, room.HEIGHT)
+        reached = lit(self._tracer, hits, LAMPS[0].towards)
+        light = room.background(self._theme, self._camera, y)
+        floor, solid = hits.item == FLOOR, hits.item >= 0
+        light[floor] = room.floor(
+            self._theme, self._camera, hits.some(floor), reached[floor], light[floor]
         )
-        solid = hits.solid
-        found[solid] = _surface(self._solid, hits.some(solid), _lit(light, solid))
-        translucent = np.full(len(found), NOWHERE, dtype=np.int32)
+        light[solid] = _surface(self._solid, hits.some(solid), reached[solid])
+        item = hits.item.copy()
         if self._thin.names:
-            at, seen = hits_behind(self._thin, self._behind, self._eye, hits)
+            which, surface = hits_behind(self._thin, self._behind, self._eye, hits)
             # Water has the same illumination as the point behind it.
-            shown = _surface(self._thin, seen, Light(light.key[at], light.sky[at]))
-            found[at] += self._opacity[seen.item][:, None] * (shown - found[at])
-            translucent[at] = seen.item
-        return found, translucent
+            shown = _surface(self._thin, surface, reached[which])
+            light[which] += self._opacity[surface.item][:, None] * (shown - light[which])
+            item[which] = surface.item + len(self._solid.names)
+        return _Samples(developed(light), hits, item, reached)
 
-    def _ends(self, hits: Hits, shown: Ints) -> Bools:
-        """Return (n,) the pixels with a neighbour on another surface; ``shown`` (n,) are items."""
+    def _edges(self, samples: _Samples) -> Bools:
+        """Return (n,) the pixels with a neighbour on another surface, or in another light."""
         width, height = self._camera.size
-        item = shown.reshape(height, width)
-        points = hits.points.reshape(height, width, 3)
-        normals = hits.normals.reshape(height, width, 3)
-        ends = np.zeros((height, width), dtype=bool)
+        item, reached = samples.item.reshape(height, width), samples.lit.reshape(height, width)
+        points = samples.hits.points.reshape(height, width, 3)
+        normals = samples.hits.normals.reshape(height, width, 3)
+        edges = np.zeros((height, width), dtype=bool)
         for axis in (0, 1):
             here, there = [slice(None)] * 2, [slice(None)] * 2
             here[axis], there[axis] = slice(None, -1), slice(1, None)
             one, other = tuple(here), tuple(there)
-            differs = item[one] != item[other]
+            differs = (item[one] != item[other]) | (reached[one] != reached[other])
             bent = np.einsum("hwi,hwi->hw", normals[one], normals[other]) < EDGE_COSINE
             apart = points[other] - points[one]
             off = np.abs(np.einsum("hwi,hwi->hw", apart, normals[one])) > EDGE_STEP
             differs |= (bent | off) & (item[one] >= 0)
-            ends[one] |= differs
-            ends[other] |= differs
-        return ends.ravel()
-
-    def _finer(
-        self, which: npt.NDArray[np.intp], rows: Ints, columns: Ints, hits: Hits, light: Light
-    ) -> Floats:
-        """Return colours (k, 3) of pixels, four samples each, lit as the most similar pixel."""
-        total = np.zeros((len(which), 3), dtype=np.float32)
-        for right, down in CORNERS:
-            x, y = _spots(columns[which], right), _spots(rows[which], down)
-            seen = self._hits(x, y)
-            found, _ = self._light(seen, self._near(which, seen, hits, light), y)
-            total += developed(found)
-        return total / np.float32(len(CORNERS))
-
-    def _near(self, which: npt.NDArray[np.intp], seen: Hits, hits: Hits, light: Light) -> Light:
-        """Return the light of the neighbouring pixel with the most similar surface."""
-        width, height = self._camera.size
-        row, column = np.divmod(which, width)
-        best = which
-        minimum = np.full(len(which), np.inf, dtype=np.float32)
-        for down in (-1, 0, 1):
-            for right in (-1, 0, 1):
-                near = np.clip(row + down, 0, height - 1) * width
-                near = near + np.clip(column + right, 0, width - 1)
-                apart = np.abs(hits.points[near] - seen.points).sum(axis=1)
-                turned = 1.0 - np.einsum("ni,ni->n", hits.normals[near], seen.normals)
-                unlike = (
-                    apart
-                    + PERPENDICULAR_PENALTY * turned
-                    + OTHER_ITEM_PENALTY * (hits.item[near] != seen.item)
-                )
-                best = np.where(unlike < minimum, near, best)
-                minimum = np.minimum(unlike, minimum)
-        return Light(light.key[best], light.sky[best])
-
-
-PERPENDICULAR_PENALTY = 0.02
-"""[m] Distance that counts for two perpendicular surfaces."""
-
-OTHER_ITEM_PENALTY = 1.0
-"""[m] Distance that counts for two different items."""
+            edges[one] |= differs
+            edges[other] |= differs
+        return edges.ravel()
 
 
 def _spots(pixels: Ints, within: float) -> Floats:
     return np.add(pixels, within, dtype=np.float32)
 
 
-def _surface(scene: RenderScene, hits: Hits, light: Light) -> Floats:
-    material = SurfaceMaterial(
-        scene.colour[hits.item], scene.metallic[hits.item], scene.rough[hits.item]
-    )
-    return shaded(material, hits.normals, hits.directions, light, room.LAMPS)
-
-
-def _lit(light: Light, which: Bools) -> Light:
-    return Light(light.key[which], light.sky[which])
+def _surface(scene: RenderScene, hits: Hits, reached: Bools) -> Floats:
+    return shaded(scene.colour[hits.item], hits.normals, reached)

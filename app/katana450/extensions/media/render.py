@@ -11,7 +11,6 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import Playback, chosen
 from katana450.extensions.media.film import check_filmable, write_film
-from katana450.extensions.media.picture import STILL
 from katana450.extensions.media.rendering_pool import RenderingPool, Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.media.tracer import check_traceable
@@ -43,7 +42,7 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = RenderStage(shown.robot, shown.session, load_props())
-        taken = shot.taken(stage, shown.robot, state, STILL)
+        taken = shot.taken(stage, shown.robot, state)
         write_files({path: writer_of(taken.png)})
     else:
         _film(path, shown, shot, options)

@@ -25,7 +25,7 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.media.camera import Camera
-from katana450.extensions.media.picture import MOVING, Picture, picture
+from katana450.extensions.media.picture import Picture, picture
 from katana450.extensions.media.stage import RenderStage
 from katana450.server.view.cameras import camera_pose
 from katana450.server.viser_bridge.presets import FOV, Preset
@@ -45,12 +45,12 @@ class Shot(NamedTuple):
     size: tuple[int, int]
     theme: str
 
-    def taken(self, stage: RenderStage, robot: Robot, state: State, rays: int) -> Picture:
-        """Return the picture of ``state`` with ``rays`` per pixel and kind of light."""
+    def taken(self, stage: RenderStage, robot: Robot, state: State) -> Picture:
+        """Return the picture of ``state``."""
         view = camera_pose(self.preset, robot, state)
         camera = Camera(view.position, view.target, float(FOV), self.size)
         theme: Theme = THEMES[self.theme]
-        return picture(stage.items(state), stage.water(state), camera, theme, rays)
+        return picture(stage.items(state), stage.water(state), camera, theme)
 
 
 class RenderingPool:
@@ -133,4 +133,4 @@ def _end_with_parent() -> None:
 def _take(state: State) -> tuple[Pixels, ...]:
     (studio,) = _studios
     stage, robot = studio.stage, studio.robot
-    return tuple(shot.taken(stage, robot, state, MOVING).pixels for shot in studio.shots)
+    return tuple(shot.taken(stage, robot, state).pixels for shot in studio.shots)

@@ -34,9 +34,6 @@ from katana450.server.viser_bridge.themes import LIGHT
 SIZE = 880, 550
 """Width and height of a picture [px]."""
 
-RAYS = 2
-"""Rays per pixel and kind of light."""
-
 FOV = float(np.deg2rad(36.0))
 """Vertical field of view [rad]."""
 
@@ -110,7 +107,7 @@ def stage_pictures(
             items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT, RAYS).png
+        found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT).png
     return found
 
 

@@ -1,4 +1,4 @@
-"""The room of a picture, the same as on the page: floor with lines, background and lamps."""
+"""The room of a picture, the same as on the page: floor with lines, and background."""
 
 from __future__ import annotations
 
@@ -6,18 +6,9 @@ import numpy as np
 
 from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.hits import Hits
-from katana450.extensions.media.light import Light
-from katana450.extensions.media.scene import Floats, light_of
-from katana450.extensions.media.shading import Lamp, lamp
-from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
+from katana450.extensions.media.scene import Bools, Floats, Ints, light_of
+from katana450.server.view.room import FLOOR_AT
 from katana450.server.viser_bridge.themes import Theme
-
-LAMPS: tuple[Lamp, ...] = (
-    lamp(KEY, (255, 250, 242), 1.08),
-    lamp(RIM, (226, 238, 255), 0.42),
-    lamp(FILL, (255, 255, 255), 0.16),
-)
-"""The lamps; the first casts shadows."""
 
 HEIGHT = FLOOR_AT
 """Height of the floor [m]."""
@@ -36,21 +27,30 @@ def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
     return light_of(top + fraction * (bottom - top))
 
 
-def floor(theme: Theme, camera: Camera, hits: Hits, light: Light, behind: Floats) -> Floats:
+def floor(theme: Theme, camera: Camera, hits: Hits, lit: Bools, behind: Floats) -> Floats:
     """Return the light (n, 3) of points on the floor, faded to the background ``behind`` (n, 3)."""
     colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(hits.points), 1))
     for (apart, wide), line in zip(CELLS, (theme.cell, theme.section), strict=True):
         fraction = _lines(camera, hits, apart, wide)[:, None]
         colour += fraction * (np.array(line, dtype=np.float32) / 255.0 - colour)
-    dark = (1.0 - theme.shadow * (1.0 - light.key)) * (1.0 - CORNERS * (1.0 - light.sky))
-    shown = light_of(colour * dark[:, None])
+    colour[~lit] *= 1.0 - theme.shadow
+    shown = light_of(colour)
     east, north = (hits.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
     left = np.clip(1.0 - np.hypot(east, north) / FADE_DISTANCE, 0.0, 1.0)[:, None]
     return np.asarray(behind + left * (shown - behind), dtype=np.float32)
 
 
-CORNERS = 0.45
-"""[1] Fraction by which the floor is darker without sky light."""
+def dithered(colours: Floats, rows: Ints, columns: Ints) -> Floats:
+    """Return colours (n, 3) of the background with the pattern of their pixels added.
+
+    Its low contrast would show steps.
+    """
+    finer = (TILE[rows % 4, columns % 4] - 7.5) / (16.0 * 255.0)
+    return np.clip(colours + finer[:, None], 0.0, 1.0).astype(np.float32)
+
+
+TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
+"""Order of the sixteen pixels of a tile in which they become brighter; neighbours are far apart."""
 
 
 def _lines(camera: Camera, hits: Hits, apart: float, wide: float) -> Floats:

@@ -43,8 +43,6 @@ class RenderScene:
         faces: (f, 3) corners, counter-clockwise seen from outside.
         item: (f,) item of each triangle.
         colour: (i, 3) linear colour of each item.
-        metallic: (i,) glTF metallic factor.
-        rough: (i,) glTF roughness factor.
     """
 
     names: tuple[str, ...]
@@ -53,8 +51,6 @@ class RenderScene:
     faces: Ints
     item: Ints
     colour: Floats
-    metallic: Floats
-    rough: Floats
 
     @classmethod
     def of(cls, items: Sequence[Item]) -> RenderScene:
@@ -70,8 +66,6 @@ class RenderScene:
             _stacked([s.faces + at for s, at in zip(shapes, starts[:-1], strict=True)], np.int32),
             np.repeat(np.arange(len(shapes)), [len(shape.faces) for shape in shapes]).astype("i4"),
             _stacked([[linear(material) for material in materials]], np.float32),
-            np.array([material.metallic for material in materials], dtype=np.float32),
-            np.array([material.rough for material in materials], dtype=np.float32),
         )
 
     @cached_property
