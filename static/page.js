@@ -96,8 +96,6 @@
     try {
       const answer = await fetch(url, { method: "POST", keepalive: true, credentials: "include" });
       if (sent !== press) return;
-      // The port of STOP may count the next copy of the press.
-      if (answer.status === 429 && path === "") return notCounted(await answer.text());
       if (!answer.ok) return;
       const found = answer.status === 204 ? {} : await answer.json();
       if (found.stop === "confirmed" && status?.stop !== "confirmed") proven = found.why;
@@ -105,12 +103,6 @@
     } catch {
       // Sent again.
     }
-  }
-
-  // The person is muted; the press is not sent again.
-  function notCounted(why) {
-    stopped();
-    toast(why);
   }
 
   function stopped() {
@@ -429,7 +421,6 @@
     else if (data.heard?.is === "stopped") stopped();
     else if (data.heard?.is === "people") people.heard(data.heard);
     else if (data.heard && (More.hear(data.heard) || welcome?.hear(data.heard) || teach?.hear(data.heard) || timeline?.hear(data.heard))) return drawLink();
-    else if (data.heard?.is === "refused" && data.heard.id === press) notCounted(data.heard.why);
     else if (data.heard?.is === "refused" && data.heard.id !== QUIETLY) {
       toast(data.heard.why);
       stage?.refused(data.heard);

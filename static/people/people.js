@@ -1,4 +1,4 @@
-// Who is connected, for admins: a list with buttons that mute and disconnect.
+// Who is connected, for admins: a list with buttons that disconnect.
 const EVERY = 1000; // ms between two queries while the list is open
 const KINDS = { page: "page", scene: "scene", program: "program", lines: "TCP", posts: "HTTP" };
 const CONTENT = `
@@ -8,7 +8,7 @@ const CONTENT = `
     <option value="revoke">ever: revoke the link</option>
   </select></label></p>
   <ul id="people-list"></ul>
-  <p id="people-note">A muted person can still stop the arm, once per interval. A disconnected one can too, once in 10 s, from a page that is open. STOP of the driver, of the owner of the running program and of admins always counts.</p>
+  <p id="people-note">A disconnected person can still stop the arm from a page that is open, until the link is revoked.</p>
 `;
 /** @type {(id: string) => any} */
 const byId = (id) => document.getElementById(id);
@@ -23,7 +23,7 @@ function connections(all) {
 }
 
 function about(person) {
-  const { role, drives, asks, program, connections: all, refused, muted, kept_out: out, link } = person;
+  const { role, drives, asks, program, connections: all, refused, kept_out: out, link } = person;
   const addresses = [...new Set(all.map(({ address }) => address))].join(", ");
   return [
     role,
@@ -32,7 +32,6 @@ function about(person) {
     all.length > 0 && `${connections(all)} from ${addresses} since ${time(all[0].since)}`,
     link && `link ${link.slice(0, 6)}`,
     refused > 0 && `${refused} refused`,
-    muted !== null && `muted, one STOP in ${muted} s`,
     out !== null && `disconnected for ${Math.ceil(out / 60)} min`,
   ].filter(Boolean).join(" · ");
 }
@@ -101,7 +100,7 @@ export class People {
   }
 
   row(each) {
-    const { person, name, role, you, muted, kept_out: out } = each;
+    const { person, name, you, kept_out: out } = each;
     const item = document.createElement("li");
     const title = document.createElement("b");
     title.textContent = you ? `${name} (you)` : name;
@@ -109,8 +108,6 @@ export class People {
     line.textContent = about(each);
     const acts = document.createElement("div");
     const add = (key, label, act) => acts.append(this.button(`${key} ${person}`, label, name, act));
-    if (role !== "admin" && muted === null) add("mute", "Mute", () => this.say({ do: "mute", person }));
-    if (muted !== null) add("mute", "Unmute", () => this.say({ do: "unmute", person }));
     if (out !== null) add("kick", "Let in", () => this.say({ do: "kick", person, seconds: 0 }));
     else if (!you) add("kick", "Disconnect", (button) => this.kick(each, button));
     item.append(title, acts, line);
@@ -118,7 +115,7 @@ export class People {
   }
 
   heard({ people }) {
-    const parts = (each) => [each.person, each.name, each.role, each.muted === null, each.kept_out === null];
+    const parts = (each) => [each.person, each.name, each.role, each.kept_out === null];
     const key = JSON.stringify(people.map(parts));
     // Buttons are not replaced while they may be pressed.
     if (key === this.drawn) {

@@ -15,7 +15,7 @@ const SPEEDS = [0.25, 0.5, 1, 2, 4];
 // Nodes of the present that are hidden while the past is shown, beside the links that move.
 const PRESENT = /^\/(ghost|cup|basin|water|velocity|(target|handles|objects|path|branch)\/[^/]+)$/;
 // Requests that do not concern what is seen.
-const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|list_people|kick|mute|unmute|breakpoints|speed)$/;
+const QUIET = /^(stop|rename|ask|withdraw|decline|give|acquire|take|release_lease|query|heartbeat|list_people|kick|breakpoints|speed)$/;
 const EXPORTS = [["csv", "CSV table"], ["parquet", "Parquet table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 

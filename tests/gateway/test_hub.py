@@ -51,7 +51,6 @@ class FakeArm:
         self.holds = 0
         self.stops = 0
         self.beats = 0
-        self.drivers: tuple[str, ...] = ()
         self.stopped = False
         self.age = 0.0
         self.clear_refusal = ""
@@ -84,9 +83,8 @@ class FakeArm:
     def busy(self) -> bool:
         return False
 
-    def heartbeat(self, drivers: tuple[str, ...]) -> None:
+    def heartbeat(self) -> None:
         self.beats += 1
-        self.drivers = drivers
 
     def choices(self) -> tuple[BranchOption, ...]:
         return ()

@@ -292,69 +292,6 @@ def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> 
         assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
 
 
-@pytest.mark.long
-def test_stop_of_a_muted_viewer_counts_once_per_interval(tmp_path: Path) -> None:
-    path = tmp_path / "access.json"
-    links = AccessFile.create(path)
-    muted = links.give("Vera", Role.VIEWER, time.time() + HOUR)
-    operator = links.give("Otto", Role.OPERATOR, time.time() + HOUR)
-    (number,) = (each for each, grant in links.grants.items() if grant.name == "Vera")
-    links.mute(number, 30.0)
-    with AppServer((*APP, "--access", str(path))) as server:
-        assert stop(server.stop_url, Authorization=f"Bearer {muted}")[0] == 200
-        with connect(server.url, "Driver", token=operator) as driver:
-            driver.clear_stop()
-            status, answer = stop(server.stop_url, Authorization=f"Bearer {muted}")
-            assert status == 429
-            assert "Your next one counts in" in answer["words"]
-            assert driver.query(answers.State).stopped is None
-            assert stop(server.stop_url, Authorization=f"Bearer {operator}")[0] == 200
-
-
-@pytest.mark.long
-def test_press_of_a_muted_viewer_uses_up_the_interval_of_both_ports(tmp_path: Path) -> None:
-    path = tmp_path / "access.json"
-    links, expires = AccessFile.create(path), time.time() + HOUR
-    tokens = [f"Bearer {links.give(name, Role.VIEWER, expires)}" for name in ("A", "B", "C")]
-    for number in links.grants:
-        links.mute(number, 1000.0)
-    operator = links.give("Otto", Role.OPERATOR, expires)
-    with (
-        AppServer((*APP, "--access", str(path))) as server,
-        connect(server.url, "Driver", token=operator) as driver,
-    ):
-        main, port = server.url, server.stop_url
-        for token, urls in zip(tokens, ((main,), (port,), (main, port)), strict=True):
-            for url in urls:
-                query = f"?press={token[-20:]}"
-                status = ask(f"{url}/api/v1/stop{query}", data=b"", Authorization=token)[0]
-                assert status in (200, 204)
-                until(lambda: driver.query(answers.State).stop == "confirmed")
-            driver.clear_stop()
-            for url in (main, port):
-                assert ask(f"{url}/api/v1/stop", data=b"", Authorization=token)[0] == 429
-            assert driver.query(answers.State).stopped is None
-
-
-def test_muted_driver_stops_the_arm_at_any_time_while_the_front_end_is_frozen(
-    tmp_path: Path,
-) -> None:
-    path = tmp_path / "access.json"
-    links = AccessFile.create(path)
-    operator = links.give("Oda", Role.OPERATOR, time.time() + HOUR)
-    links.mute(next(iter(links.grants)), 1000.0)
-    token = f"Bearer {operator}"
-    with (
-        AppServer((*APP, "--access", str(path))) as server,
-        connect(server.url, "Driver", token=operator) as driver,
-    ):
-        for _ in range(2):
-            under_way(driver)
-            with server.frozen(server.front):
-                assert stop(server.stop_url, Authorization=token)[0] == 200
-            driver.clear_stop()
-
-
 def test_flood_of_presses_delays_no_other_stop(server: AppServer, program: Client) -> None:
     async def flood(done: asyncio.Event) -> None:
         while not done.is_set():

@@ -164,7 +164,7 @@ class _Pipe:
         self._loop.call_soon_threadsafe(self._woken.set)
         return ticket
 
-    def heartbeat(self, drivers: tuple[str, ...]) -> None:
+    def heartbeat(self) -> None:
         """Ignore it: the arm's own watch is tested elsewhere."""
 
     async def run(self, hub: Hub) -> None:

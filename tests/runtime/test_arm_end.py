@@ -148,14 +148,6 @@ def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
     np.testing.assert_array_equal(state.q, ends.loop.state_publisher.snapshot.state.q)
 
 
-def test_heartbeat_carries_the_drivers(ends: Ends) -> None:
-    assert ends.arm_end.drivers == ()
-    ends.front.heartbeat(("oda", "otto"))
-    until(lambda: ends.arm_end.drivers == ("oda", "otto"))
-    ends.front.heartbeat()
-    until(lambda: ends.arm_end.drivers == ())
-
-
 def wait_with_heartbeats(ends: Ends, true: Callable[[], bool]) -> None:
     """Wait for ``true``, and send heartbeats meanwhile."""
 

@@ -10,6 +10,7 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
+from typing import Any
 
 import pytest
 
@@ -19,11 +20,12 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.runtime import stop_end
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.stop_end import StopEnd
-from katana450.arm.runtime.stop_messages import StopPress
+from katana450.arm.runtime.stop_messages import StopPress, StopStatus
 from katana450.arm.runtime.stop_pipe import StopPipe
 
 TIMEOUT = 5.0
@@ -52,15 +54,13 @@ def _next(pipes: Iterator[Connection]) -> Connection:
 
 
 @contextmanager
-def arm_end(
-    arm: ArmModel, session: Session, drivers: Callable[[], tuple[str, ...]] = tuple
-) -> Iterator[Connection]:
+def arm_end(arm: ArmModel, session: Session) -> Iterator[Connection]:
     """Run an arm; yield the far end of its pipe, which is cut afterwards."""
     mailbox = Mailbox(session.check)
     driver = SimulatedDriver(arm, session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, MonotonicClock(), 100.0)
     ours, theirs = multiprocessing.Pipe()
-    end = StopEnd(ours, loop, mailbox, drivers)
+    end = StopEnd(ours, loop, mailbox)
     loop.start()
     end.start()
     yield theirs
@@ -133,56 +133,33 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
     asyncio.run(act())
 
 
-def test_status_names_the_newest_drivers(arm: ArmModel, session: Session) -> None:
-    drivers: list[str] = []
-
-    async def act() -> None:
-        with arm_end(arm, session, lambda: tuple(drivers)) as pipe:
-            pipes = iter((pipe,))
-            stop_pipe = StopPipe(lambda: _next(pipes))
-
-            async def names(expected: tuple[str, ...]) -> None:
-                async with asyncio.timeout(TIMEOUT):
-                    while stop_pipe.status is None or stop_pipe.status.drivers != expected:
-                        await asyncio.sleep(0.01)
-
-            await names(())
-            drivers.append("oda")
-            await names(("oda",))
-        await ended(stop_pipe)
-        pipe.close()
-
-    asyncio.run(act())
-
-
 @pytest.mark.parametrize("failing", ["arm", "process of STOP"])
 def test_error_in_a_thread_closes_the_pipe_of_stop(
     arm: ArmModel, session: Session, failing: str
 ) -> None:
-    stumbling: list[str] = []
-
-    def drivers() -> tuple[str, ...]:
-        if stumbling == ["arm"]:
-            raise RuntimeError(stumbling.pop())
-        return tuple(stumbling)
+    def status(stopped: Any, presses: tuple[str, ...]) -> StopStatus:
+        if failing == "arm" and "zero" in presses:
+            raise RuntimeError(failing)
+        return StopStatus(stopped, presses)
 
     async def act() -> None:
-        with arm_end(arm, session, drivers) as first, arm_end(arm, session) as second:
+        with arm_end(arm, session) as first, arm_end(arm, session) as second:
             pipes = iter((first, second))
             stop_pipe = StopPipe(lambda: _next(pipes))
             call = stop_pipe._call
 
             def stumble(act: Callable[..., None], *values: object) -> None:
-                if stumbling == ["process of STOP"] == list(getattr(values[-1], "drivers", ())):
-                    raise RuntimeError(stumbling.pop())
+                if "zero" in getattr(values[-1], "presses", ()):
+                    raise RuntimeError(failing)
                 call(act, *values)
 
             with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(stop_end, "StopStatus", status)
                 patch.setattr(stop_pipe, "_call", stumble)
                 async with asyncio.timeout(TIMEOUT):
                     while not connected(stop_pipe):
                         await asyncio.sleep(0.01)
-                    stumbling.append(failing)
+                    stop_pipe.press(press("zero"))
                     while stop_pipe._pipe is not second:
                         await asyncio.sleep(0.01)
             stop_pipe.press(press("one"))

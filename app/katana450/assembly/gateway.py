@@ -32,14 +32,13 @@ from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import keep_alive
 from katana450.server.service.hub import TICK, Hub
-from katana450.server.service.mutes import MutedError
 from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web.admission import Admission
-from katana450.server.web.bodies import TOO_MANY, refusal
+from katana450.server.web.bodies import refusal
 from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
@@ -201,17 +200,10 @@ class Gateway:
                     await self._moves.wait()
 
 
-async def _muted(request: Request, error: Exception) -> Response:
-    """Answer a STOP that does not count, because its sender is muted."""
-    assert isinstance(error, MutedError)
-    retry = {"Retry-After": str(math.ceil(error.retry))}
-    return refusal(request.url.path, str(error), TOO_MANY, retry)
-
-
 async def _refused(request: Request, error: Exception) -> Response:
     """Answer a request that is refused with an HTTP status."""
     assert isinstance(error, HTTPException)
     return refusal(request.url.path, error.detail, error.status_code, error.headers)
 
 
-REFUSALS = {MutedError: _muted, HTTPException: _refused}
+REFUSALS = {HTTPException: _refused}

@@ -107,15 +107,12 @@ class RunningArm:
         with self._attaching:
             if self._stop_end is not None:
                 self._stop_end.close()
-            self._stop_end = StopEnd(pipe, self._loop, self._mailbox, self._drivers)
+            self._stop_end = StopEnd(pipe, self._loop, self._mailbox)
             self._stop_end.start()
 
     def record(self, sender: TickSender) -> None:
         """Give the record of each further tick to ``sender``."""
         self._tick_sender, self._loop.record = sender, sender.put
-
-    def _drivers(self) -> tuple[str, ...]:
-        return () if self._front_end is None else self._front_end.drivers
 
     @property
     def state_publisher(self) -> StatePublisher:

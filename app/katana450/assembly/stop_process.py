@@ -77,7 +77,6 @@ async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
     supervisor.report(READY)
     while not supervisor.ended.is_set():
         turned = time.monotonic()
-        server.follow()
         await asyncio.sleep(TURN_INTERVAL)
     acceptor.close()
     await acceptor.wait_closed()

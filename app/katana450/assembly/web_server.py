@@ -82,7 +82,7 @@ class WebServer:
         self.people.links, now = access, time.time()
         for number, grant in {} if access is None else access.grants.items():
             if now < grant.expires:
-                self.people.restore(identity_of(number, grant), grant.muted, grant.kept_out - now)
+                self.people.restore(identity_of(number, grant), grant.kept_out - now)
         port = self.stop_path.main_port
         self.authenticator = Authenticator(access, port, self.address, self.people)
         self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)

@@ -326,7 +326,7 @@ class AsyncClient:
         return await asyncio.to_thread(self._site.recording, last)
 
     async def people(self) -> tuple[answers.ConnectedPerson, ...]:
-        """Return everybody who is connected, muted or kept out. For admins only."""
+        """Return everybody who is connected or kept out. For admins only."""
         answer = await self.ask(requests.ListPeople())
         assert isinstance(answer, answers.People)
         return answer.people
@@ -338,14 +338,6 @@ class AsyncClient:
         ``revoke``: whether to revoke the access link for good.
         """
         await self.ask(requests.Kick(person=person, seconds=seconds, revoke=revoke))
-
-    async def mute(self, person: int, seconds: float = 10.0) -> None:
-        """Let one STOP and one request of ``person`` count per ``seconds``. For admins only."""
-        await self.ask(requests.Mute(person=person, seconds=seconds))
-
-    async def unmute(self, person: int) -> None:
-        """End the mute of ``person``. For admins only."""
-        await self.ask(requests.Unmute(person=person))
 
     async def _heartbeat(self) -> None:
         while True:

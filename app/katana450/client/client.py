@@ -101,14 +101,6 @@ class Client:
         """See ``AsyncClient.kick``."""
         self._wait(self._client.kick(person, seconds, revoke=revoke))
 
-    def mute(self, person: int, seconds: float = 10.0) -> None:
-        """See ``AsyncClient.mute``."""
-        self._wait(self._client.mute(person, seconds))
-
-    def unmute(self, person: int) -> None:
-        """See ``AsyncClient.unmute``."""
-        self._wait(self._client.unmute(person))
-
     def states(self, hz: float = FOLLOW_RATE) -> Iterator[answers.State]:
         """See ``AsyncClient.states``."""
         states = self._client.states(hz)

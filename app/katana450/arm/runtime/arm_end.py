@@ -69,13 +69,7 @@ class CommandMessage:
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """A message that proves that the front end is alive.
-
-    Attributes:
-        drivers: sessions of the driver, and of the owner of the program that drives.
-    """
-
-    drivers: tuple[str, ...] = ()
+    """A message that proves that the front end is alive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +125,6 @@ class ArmEnd:
         self._numbering = threading.Lock()
         self._heard = time.monotonic()
         self._names = PlanNames()
-        self.drivers: tuple[str, ...] = ()
-        """The drivers in the newest heartbeat, see ``Heartbeat``."""
         self.cut = threading.Event()
         """Set once the other end is closed."""
         self._threads = [
@@ -162,9 +154,7 @@ class ArmEnd:
         while not self.cut.is_set():
             message = self._pipe.recv()
             self._heard = time.monotonic()
-            if isinstance(message, Heartbeat):
-                self.drivers = message.drivers
-            elif isinstance(message, CommandMessage) and not self.cut.is_set():
+            if isinstance(message, CommandMessage) and not self.cut.is_set():
                 self._put(message)
 
     def _lose(self) -> None:

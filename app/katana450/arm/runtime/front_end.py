@@ -64,7 +64,6 @@ class FrontEnd:
         self._sending = threading.Lock()
         self._unsent: deque[CommandMessage] = deque()
         self._number = 0
-        self._drivers: tuple[str, ...] = ()
         self._beaten = -math.inf
         self._plans = PlanStore()
         first = _loaded(pipe.recv_bytes(), self._plans)
@@ -145,8 +144,8 @@ class FrontEnd:
             return time.monotonic() - self._heard
         return 0.0 if readable(self._pipe.fileno()) else time.monotonic() - self._heard
 
-    def heartbeat(self, drivers: tuple[str, ...] = ()) -> None:
-        """Send a heartbeat with the ``drivers``, unless commands still wait to be sent.
+    def heartbeat(self) -> None:
+        """Send a heartbeat, unless commands still wait to be sent.
 
         An arm at rest needs them seldom; the command that moves it counts as one.
         """
@@ -154,9 +153,9 @@ class FrontEnd:
             if not (self._flush() and self._connected):
                 return
             now, resting = time.monotonic(), not self.state_publisher.snapshot.state.moving
-            if not resting or drivers != self._drivers or now - self._beaten >= REST_HEARTBEAT:
-                self._drivers, self._beaten = drivers, now
-                self._send(Heartbeat(drivers))
+            if not resting or now - self._beaten >= REST_HEARTBEAT:
+                self._beaten = now
+                self._send(Heartbeat())
 
     def close(self) -> None:
         """Cut the pipe; a thread that reads from the pipe ends with its process."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 
@@ -25,23 +24,9 @@ class StopEnd:
     The arm does not stop when this pipe is cut: the front end is the other path of STOP.
     """
 
-    def __init__(
-        self,
-        pipe: Connection,
-        loop: ControlLoop,
-        mailbox: Mailbox,
-        drivers: Callable[[], tuple[str, ...]] = tuple,
-    ) -> None:
-        """Create the end; ``start`` runs it.
-
-        Args:
-            pipe: the pipe to the process of STOP.
-            loop: the control loop.
-            mailbox: the mailbox of that loop.
-            drivers: returns the drivers in the newest heartbeat of the front end.
-        """
+    def __init__(self, pipe: Connection, loop: ControlLoop, mailbox: Mailbox) -> None:
+        """Create the end of ``pipe``; ``start`` runs it. ``mailbox``: that of ``loop``."""
         self._pipe = pipe
-        self._drivers = drivers
         self._loop = loop
         self._mailbox = mailbox
         self._cut = threading.Event()
@@ -88,7 +73,7 @@ class StopEnd:
                 seen, now = publisher.snapshot, time.monotonic()
                 state = seen.state
                 stopped = None if state.stopped is None else state.stopped.cause
-                status = StopStatus(stopped, state.presses, self._drivers())
+                status = StopStatus(stopped, state.presses)
                 due = now - reported >= STATUS_INTERVAL and self._loop.ticks != ticks
                 if status != sent or due:
                     self._pipe.send(status)

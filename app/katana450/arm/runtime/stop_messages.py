@@ -26,14 +26,12 @@ class StopPress(NamedTuple):
 
 
 class StopStatus(NamedTuple):
-    """The stop in a state of the arm, and the drivers.
+    """The stop in a state of the arm.
 
     Attributes:
         stopped: cause of the stop that holds the arm; None if it is not stopped.
         presses: names of the newest presses that the arm's process has executed.
-        drivers: the drivers in the newest heartbeat of the front end. If it hangs they stay.
     """
 
     stopped: StopCause | None
     presses: tuple[str, ...]
-    drivers: tuple[str, ...] = ()

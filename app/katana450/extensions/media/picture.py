@@ -74,7 +74,7 @@ def picture(
 
 
 class _Samples(NamedTuple):
-    """What n rays show.
+    """The colours that n rays show, and where they end.
 
     Attributes:
         colours: (n, 3) sRGB, 0 to 1.

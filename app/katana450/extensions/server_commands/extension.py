@@ -48,7 +48,7 @@ EXTENSION = Extension(
             "access", "give people links with which they sign in", add_access_options, _access
         ),
         CliCommand(
-            "people", "list who is connected, disconnect and mute", add_people_options, _people
+            "people", "list who is connected, and disconnect people", add_people_options, _people
         ),
     ),
     ServeExtension(handler=_handler),

@@ -1,4 +1,4 @@
-"""``katana450 people``: list who is connected to a server, and disconnect or mute people."""
+"""``katana450 people``: list who is connected to a server, and disconnect people."""
 
 from __future__ import annotations
 
@@ -25,10 +25,6 @@ def people(options: Namespace) -> int:
                 server.kick(options.person, options.seconds, revoke=options.revoke)
             case "let-in":
                 server.kick(options.person, 0.0)
-            case "mute":
-                server.mute(options.person, options.seconds)
-            case "unmute":
-                server.unmute(options.person)
     return 0
 
 
@@ -45,8 +41,6 @@ def line(person: answers.ConnectedPerson) -> str:
         notes.append("asks for the lease")
     if person.refused:
         notes.append(f"{person.refused} refused")
-    if person.muted is not None:
-        notes.append(f"muted, one STOP per {person.muted:g} s")
     if person.kept_out is not None:
         notes.append(f"kept out for {person.kept_out:.0f} s")
     if person.link is not None:

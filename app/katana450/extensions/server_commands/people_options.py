@@ -11,11 +11,9 @@ command line."""
 
 
 def add_people_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommands list, kick, let-in, mute and unmute to ``parser``."""
-    acts = parser.add_subparsers(
-        dest="act", required=True, metavar="list | kick | let-in | mute | unmute"
-    )
-    acts.add_parser("list", help="list everybody who is connected, muted or kept out")
+    """Add the subcommands list, kick and let-in to ``parser``."""
+    acts = parser.add_subparsers(dest="act", required=True, metavar="list | kick | let-in")
+    acts.add_parser("list", help="list everybody who is connected or kept out")
     kick = acts.add_parser("kick", help="close all connections of a person")
     kick.add_argument(
         "--seconds",
@@ -25,12 +23,7 @@ def add_people_options(parser: argparse.ArgumentParser) -> None:
     )
     kick.add_argument("--revoke", action="store_true", help="revoke the link for good")
     let_in = acts.add_parser("let-in", help="let a person in again before the time")
-    mute = acts.add_parser("mute", help="let only one STOP of a person count per interval")
-    mute.add_argument(
-        "--seconds", type=float, default=10.0, help="interval, 1 to 60 (default: %(default)g)"
-    )
-    unmute = acts.add_parser("unmute", help="end the mute of a person")
-    for act in (kick, let_in, mute, unmute):
+    for act in (kick, let_in):
         act.add_argument("person", type=int, help="number of the person in `list`")
     for act in acts.choices.values():
         act.add_argument(

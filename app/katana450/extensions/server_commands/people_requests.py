@@ -27,7 +27,7 @@ class PeopleRequests(RequestHandler):
     not do, and InputError for an unknown person.
     """
 
-    request_types = (requests.ListPeople, requests.Kick, requests.Mute, requests.Unmute)
+    request_types = (requests.ListPeople, requests.Kick)
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         super().__init__(hub, options)
@@ -40,14 +40,6 @@ class PeopleRequests(RequestHandler):
                 return answers.People(people=self._list(session_of(participant.person.key)))
             case requests.Kick(person=number):
                 self._kick(participant, self._person(number), request)
-            case requests.Mute(person=number, seconds=seconds):
-                self._mute(participant, self._person(number), seconds)
-            case requests.Unmute(person=number):
-                found = self._person(number)
-                self._note("unmute", participant, found)
-                self._people.mutes.remove(found.session)
-                self._store_mute(participant, found, None)
-                log.warning("%s ended the mute of %s.", participant.person.name, self._name(found))
         return answers.Done()
 
     def _kick(self, participant: Participant, person: Identity, request: requests.Kick) -> None:
@@ -64,11 +56,13 @@ class PeopleRequests(RequestHandler):
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
             if links is not None:
-                # The process of STOP finds it there.
+                # The next start of the server finds it there.
                 until = time.time() + request.seconds if request.seconds else 0.0
                 people.write(
                     lambda: links.keep_out(person.session, until),
-                    lambda why: _report(participant, f"The port of STOP does not know this. {why}"),
+                    lambda why: _report(
+                        participant, f"The server forgets this when it restarts. {why}"
+                    ),
                 )
             return
         if links is None:
@@ -90,31 +84,10 @@ class PeopleRequests(RequestHandler):
         self._people.kick(person, seconds)
         self.hub.runner.removed(person.session)
 
-    def _mute(self, participant: Participant, person: Identity, seconds: float) -> None:
-        if person.role is Role.ADMIN:
-            raise LeaseError("An admin cannot be muted.")
-        self._people.mutes.add(person.session, seconds)
-        name = self._name(person)
-        self._note("mute", participant, person, seconds=seconds)
-        log.warning("%s muted %s: one STOP per %g s.", participant.person.name, name, seconds)
-        self._store_mute(participant, person, seconds)
-
     def _note(self, kind: str, participant: Participant, person: Identity, **values: float) -> None:
         """Note for the event log what an admin did to ``person``."""
         what = {"person": self._name(person), "link": person.link, **values}
         self.hub.recorder.note(kind, participant.actor, what, always=True)
-
-    def _store_mute(
-        self, participant: Participant, person: Identity, interval: float | None
-    ) -> None:
-        links = self._people.links
-        if links is not None:
-            self._people.write(
-                lambda: links.mute(person.session, interval),
-                lambda why: _report(
-                    participant, f"The server forgets this when it restarts. {why}"
-                ),
-            )
 
     def _person(self, number: int) -> Identity:
         found = self._people.identity(number)
@@ -151,7 +124,6 @@ class PeopleRequests(RequestHandler):
             asks=any(session_of(each.key) == session for each in hub.lease.waiting),
             program=program.person.name if program is not None and owns else None,
             refused=people.refusals(session),
-            muted=people.mutes.interval(session),
             kept_out=round(kept_out, 1) if kept_out else None,
             connections=tuple(self._connection(each) for each in connections.get(session, ())),
         )

@@ -30,7 +30,7 @@ class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
     """A person with all connections: everybody who uses one link; without links, one browser.
 
     Attributes:
-        person: Number for ``kick`` and ``mute``.
+        person: Number for ``kick``.
         name: Name of the link or, without links, of the first page or program.
         role: viewer, operator or admin.
         link: Number of the access link; null without links.
@@ -39,7 +39,6 @@ class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
         asks: Whether the person asks for the lease.
         program: Name of the running program that the person owns; null without one.
         refused: Number of requests that were refused so far.
-        muted: Interval [s] in which one STOP and one request count; null unless muted.
         kept_out: Time [s] for which the person is kept out; null unless kicked.
         connections: Open connections, the oldest first.
     """
@@ -53,12 +52,11 @@ class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
     asks: bool
     program: str | None
     refused: int
-    muted: float | None
     kept_out: float | None
     connections: tuple[PersonConnection, ...]
 
 
 class People(Answer, frozen=True, kw_only=True):
-    """Everybody who is connected, muted or kept out."""
+    """Everybody who is connected or kept out."""
 
     people: tuple[ConnectedPerson, ...]

@@ -13,7 +13,7 @@ MAX_TIME_OUT = 86_400.0
 
 
 class ListPeople(Request, frozen=True):
-    """List everybody who is connected, muted or kept out. For admins only."""
+    """List everybody who is connected or kept out. For admins only."""
 
     traits: ClassVar[RequestTraits] = RequestTraits(admin=True, answered=True)
 
@@ -21,8 +21,8 @@ class ListPeople(Request, frozen=True):
 class Kick(Request, frozen=True, kw_only=True):
     """Close all connections of a person, and keep the person out for a while. For admins only.
 
-    The person can still stop the arm over HTTP, once per 10 s. A running program of the person
-    ends, also an unattended one.
+    The person can still stop the arm over HTTP. A running program of the person ends, also an
+    unattended one.
 
     Attributes:
         person: Number of the person in ``people``.
@@ -36,32 +36,3 @@ class Kick(Request, frozen=True, kw_only=True):
     person: int
     seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0
     revoke: bool = False
-
-
-class Mute(Request, frozen=True, kw_only=True):
-    """Let only one STOP and one request of a person count per interval. For admins only.
-
-    An admin cannot be muted. The mute does not apply while the person drives, or owns the running
-    program.
-
-    Attributes:
-        person: Number of the person in ``people``.
-        seconds: Interval [s].
-    """
-
-    traits: ClassVar[RequestTraits] = ADMIN
-
-    person: int
-    seconds: Annotated[float, Meta(ge=1.0, le=60.0)] = 10.0
-
-
-class Unmute(Request, frozen=True, kw_only=True):
-    """End the mute of a person. For admins only.
-
-    Attributes:
-        person: Number of the person in ``people``.
-    """
-
-    traits: ClassVar[RequestTraits] = ADMIN
-
-    person: int

@@ -64,7 +64,7 @@ from katana450.server.api.motion_requests import (
     Turn,
     Undo,
 )
-from katana450.server.api.people_requests import Kick, ListPeople, Mute, Unmute
+from katana450.server.api.people_requests import Kick, ListPeople
 from katana450.server.api.scene_requests import (
     Attach,
     FieldName,
@@ -110,7 +110,6 @@ __all__ = [
     "ListPeople",
     "Load",
     "MotionRequest",
-    "Mute",
     "Nudge",
     "OperateArm",
     "Orient",
@@ -137,7 +136,6 @@ __all__ = [
     "Tool",
     "Turn",
     "Undo",
-    "Unmute",
     "Watch",
     "Withdraw",
     "id_of",

@@ -172,9 +172,9 @@ class ArmHandle:
         """Reason for which the path of the newest command was not found; else empty."""
         return "" if self._planning_worker is None else self._planning_worker.failure
 
-    def heartbeat(self, drivers: tuple[str, ...]) -> None:
-        """Send a heartbeat of the server, with its drivers, to the arm's process."""
-        self._front_end.heartbeat(drivers)
+    def heartbeat(self) -> None:
+        """Send a heartbeat of the server to the arm's process."""
+        self._front_end.heartbeat()
 
     @property
     def age(self) -> float:

@@ -22,7 +22,7 @@ from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer, give_back
 
 ACCEPTED, REQUESTED = Verdict.ACCEPTED.value, "requested"
@@ -57,8 +57,7 @@ class Dispatcher:
         the end of the motion if the request waits for it.
 
         The processor time is charged to ``budget``; raises BusyError when that is used up. A
-        ``free`` request and a command of the driver cost nothing. Raises MutedError for a request
-        of a muted identity that does not count.
+        ``free`` request and a command of the driver cost nothing.
         """
         question, driver = request.traits.question, driver_key(self._hub, participant)
         admin = request.traits.admin and participant.person.role is Role.ADMIN
@@ -70,7 +69,6 @@ class Dispatcher:
             participant.gives_back = wait is not None and (participant.gives_back or not holds)
         try:
             with nullcontext() if free else budget.charged(driver, question=question):
-                self._check_muted(participant, request)
                 if wait is not None and participant.heartbeat.open >= MAX_OPEN:
                     raise InputError(f"At most {MAX_OPEN} requests can wait at once.")
                 answer = self._execute(participant, request)
@@ -85,13 +83,6 @@ class Dispatcher:
             fingers = isinstance(request, requests.Gripper)
             return PendingAnswer(self._hub, participant, answer, wait, fingers=fingers)
         return answer
-
-    def _check_muted(self, participant: Participant, request: requests.Request) -> None:
-        """Raise MutedError if ``request`` does not count. ``Hub.stop`` counts the STOPs."""
-        session = session_of(participant.person.key)
-        counted = not isinstance(request, requests.Stop | requests.Heartbeat)
-        if counted and session not in self._hub.drivers:
-            self._hub.people.mutes.count_request(session)
 
     def _execute(self, participant: Participant, request: requests.Request) -> answers.Answer:
         hub = self._hub

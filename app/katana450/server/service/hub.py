@@ -27,7 +27,6 @@ from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.known_pages import KnownPages
-from katana450.server.service.mutes import MutedError
 from katana450.server.service.names import renamed
 from katana450.server.service.participants import (
     Participant,
@@ -236,24 +235,9 @@ class Hub:
     def stop(self, actor: Actor, press: str | None = None) -> int:
         """Stop the arm for ``actor``, which needs no right to drive; return the ticket.
 
-        A repeated ``press`` counts once: it can only add the name, and the ticket is 0. Raises
-        MutedError for a muted identity whose STOP does not count. The driver's always counts.
+        A repeated ``press`` counts once: it can only add the name, and the ticket is 0.
         """
-        command = cmd.Stop(pressed(actor.name, actor.key, press, 0.0))
-        if self.gate.is_known(press):
-            return self.gate.submit(command, actor)
-        session = session_of(actor.key)
-        interval = self.people.stop_interval(session)
-        if interval is not None and session not in self.drivers:
-            # A press that changes nothing uses up nothing.
-            if self.stopped is not None:
-                return 0
-            try:
-                self.people.mutes.count_stop(session, interval, press)
-            except MutedError as error:
-                self.recorder.refuse("stop", actor, error)
-                raise
-        return self.gate.submit(command, actor)
+        return self.gate.submit(cmd.Stop(pressed(actor.name, actor.key, press, 0.0)), actor)
 
     @property
     def drivers(self) -> tuple[str, ...]:
@@ -340,10 +324,8 @@ class Hub:
         if arm is not None:
             # Without heartbeats of the server the arm stops by itself.
             if not silent:
-                arm.heartbeat(self.drivers)
+                arm.heartbeat()
             self._watch(arm)
-            stopped = arm.state.stopped
-            self.people.mutes.follow(None if stopped is None else stopped.cause)
             self.follow_stop()
             self.runner.tick()
 

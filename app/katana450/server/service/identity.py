@@ -21,8 +21,6 @@ class Identity:
         role: Role of the client.
         link: Number of the access link; empty without one.
         link_name: Name of the link, also of a program with a name of its own; empty without one.
-        muted: Interval [s] in which one STOP counts; None unless the access file says that an
-            admin has muted the person or keeps it out.
         address: Network address of the client; empty if it is unknown.
     """
 
@@ -31,7 +29,6 @@ class Identity:
     role: Role
     link: str = ""
     link_name: str = ""
-    muted: float | None = None
     address: str = ""
 
     def person(self, key: str, name: str) -> Person:

@@ -19,13 +19,12 @@ from typing import Protocol
 
 from katana450.errors import KatanaError
 from katana450.server.service.identity import Identity
-from katana450.server.service.mutes import STOP_INTERVAL, Mutes
 
 log = logging.getLogger(__name__)
 
 MAX_REMEMBERED = 1024
-"""Number of identities whose numbers and refusals are remembered, beside those that are connected,
-muted or kept out."""
+"""Number of identities whose numbers and refusals are remembered, beside those that are connected
+or kept out."""
 
 
 class ConnectionKind(Enum):
@@ -49,11 +48,11 @@ class LinkStore(Protocol):
     def revoke(self, number: str) -> object:
         """Delete the link of ``number``. Raises KatanaError or OSError."""
 
-    def mute(self, number: str, interval: float | None) -> None:
-        """Store the interval of a mute [s], or its end. Raises KatanaError or OSError."""
-
     def keep_out(self, number: str, until: float) -> None:
-        """Store until when a person is kept out [s since the epoch]; see ``mute``."""
+        """Store until when a person is kept out [s since the epoch].
+
+        Raises KatanaError or OSError.
+        """
 
 
 @dataclass(eq=False)
@@ -85,7 +84,6 @@ class People:
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self.mutes = Mutes(clock)
         self.links: LinkStore | None = None
         """The access links; None on a server without them."""
         self._connections: dict[Connection, None] = {}
@@ -143,7 +141,7 @@ class People:
 
     @property
     def shown(self) -> dict[int, Identity]:
-        """The identities that are connected, muted or kept out, by their numbers."""
+        """The identities that are connected or kept out, by their numbers."""
         listed = self._listed
         return {
             number: identity
@@ -153,10 +151,10 @@ class People:
 
     @property
     def _listed(self) -> set[str]:
-        """The sessions that are connected, muted or kept out."""
+        """The sessions that are connected or kept out."""
         present = {each.identity.session for each in self._connections}
         absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
-        return present | absent | set(self.mutes.sessions)
+        return present | absent
 
     # Refusals
 
@@ -185,14 +183,11 @@ class People:
             each.kicked.set()
         return len(closed)
 
-    def restore(self, identity: Identity, muted: float | None, kept_out: float) -> None:
-        """Mute ``identity`` and keep it out as before the server was started.
+    def restore(self, identity: Identity, kept_out: float) -> None:
+        """Keep ``identity`` out as before the server was started.
 
-        ``muted``: interval [s] of its mute; None for none. ``kept_out``: remaining time [s]; not
-        positive for none.
+        ``kept_out``: remaining time [s]; not positive for none.
         """
-        if muted is not None:
-            self.mutes.add(identity.session, muted)
         self.kick(identity, max(kept_out, 0.0))
         if identity.session in self._listed:
             self._remember(identity)
@@ -228,13 +223,3 @@ class People:
             except (KatanaError, OSError) as error:
                 log.error("The access file cannot be changed: %s", error)
                 failed(str(error))
-
-    # STOP
-
-    def stop_interval(self, session: str) -> float | None:
-        """Return the interval [s] in which one STOP of ``session`` counts; None if each does.
-
-        An identity that is kept out counts as muted. It can still stop the arm over HTTP.
-        """
-        interval = self.mutes.interval(session)
-        return max(STOP_INTERVAL, interval or 0.0) if self.kept_out(session) else interval

@@ -44,15 +44,15 @@ class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
         name: Name of the person.
         role: Role of the person.
         expires: End of the validity [s since the epoch].
-        muted: Interval [s] in which one STOP counts; None unless an admin has muted the person.
         kept_out: End of the time [s since the epoch] for which an admin keeps the person out.
+        muted: Ignored; files of earlier versions can have it.
     """
 
     name: str
     role: Role
     expires: float
-    muted: float | None = None
     kept_out: float = 0.0
+    muted: float | None = None
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -121,22 +121,15 @@ class AccessFile:
                 return grants.pop(number)
             raise InputError(f"There is no link {number!r}; `katana450 access list` shows them.")
 
-    def mute(self, number: str, interval: float | None) -> None:
-        """Store the mute of the link of ``number``; see ``Grant``. Raises InputError if unknown.
-
-        So it lasts when the server is started again, and each process that admits STOP knows it.
-        """
-        self._update(number, muted=interval)
-
     def keep_out(self, number: str, until: float) -> None:
-        """Store until when [s since the epoch] the person is kept out, as ``mute`` does."""
-        self._update(number, kept_out=until)
+        """Store until when [s since the epoch] the person is kept out.
 
-    def _update(self, number: str, **changes: float | None) -> None:
+        So it lasts when the server is started again. Raises InputError if ``number`` is unknown.
+        """
         with self._changing() as grants:
             if number not in grants:
                 raise InputError(f"There is no link {number!r}.")
-            grants[number] = msgspec.structs.replace(grants[number], **changes)
+            grants[number] = msgspec.structs.replace(grants[number], kept_out=until)
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""

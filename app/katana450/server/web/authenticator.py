@@ -16,7 +16,6 @@ from urllib.parse import urlsplit
 from katana450.arm.control.lease import Role
 from katana450.errors import ConfigurationError
 from katana450.server.service.identity import Identity
-from katana450.server.service.mutes import STOP_INTERVAL
 from katana450.server.service.people import Connection, People
 from katana450.server.web.access_links import MAX_NAME_LENGTH, AccessFile, Grant
 
@@ -255,7 +254,4 @@ class Authenticator:
 
 def identity_of(number: str, grant: Grant) -> Identity:
     """Return the identity of the link of ``number``."""
-    muted = grant.muted
-    if time.time() < grant.kept_out:
-        muted = max(STOP_INTERVAL, muted or 0.0)
-    return Identity(number, grant.name, grant.role, number, grant.name, muted)
+    return Identity(number, grant.name, grant.role, number, grant.name)

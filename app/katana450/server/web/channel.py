@@ -23,7 +23,6 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival
 from katana450.server.service.hub import Hub
-from katana450.server.service.mutes import MutedError
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
@@ -194,8 +193,6 @@ class Channel(ABC):
                     log.warning("%s exceeds its budget: disconnected.", participant.person.name)
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
-                self.refuse(str(error), request.id, retry=error.retry)
-            except MutedError as error:
                 self.refuse(str(error), request.id, retry=error.retry)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)

@@ -26,7 +26,6 @@ from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, 
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.mutes import MutedError
 from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of, session_of
 from katana450.server.service.pending_answer import ARRIVED, PendingAnswer
 from katana450.server.service.people import Connection, ConnectionKind
@@ -130,10 +129,8 @@ class Api:
                 self._hub.heartbeat(participant)
             try:
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
-                    if identity.session not in self._hub.drivers:
-                        self._hub.people.mutes.count_request(identity.session)
                     return as_json(self._dispatcher.query(subject))
-            except (BusyError, MutedError) as error:
+            except BusyError as error:
                 self._refused(request)
                 self._note_flood(identity, error)
                 return await _too_much(error)
@@ -178,7 +175,7 @@ class Api:
             end = answer.end if isinstance(answer, answers.Done) else None
             failed = isinstance(answer, answers.Refused) or (end and end.how not in ARRIVED)
             return as_json(answer, NOT_NOW if failed else 200)
-        except (BusyError, MutedError) as error:
+        except BusyError as error:
             self._refused(request)
             self._note_flood(identity, error)
             return await _too_much(error, requests.id_of(body))
@@ -235,7 +232,7 @@ class Api:
         """Add one to the refused requests of the sender of ``request``."""
         self._hub.people.refused(identity(self._authenticator, request) or address_of(request))
 
-    def _note_flood(self, identity: Identity, error: BusyError | MutedError) -> None:
+    def _note_flood(self, identity: Identity, error: BusyError) -> None:
         self._hub.recorder.refuse("any", actor_of(identity, CommandChannel.HTTP), error)
 
     def _budget(self, request: Request) -> Budget:
@@ -314,7 +311,7 @@ class Api:
         self._hub.leave(participant, for_good=True)
 
 
-async def _too_much(error: BusyError | MutedError, id: Id = None) -> Response:
+async def _too_much(error: BusyError, id: Id = None) -> Response:
     # The delay slows down a client that repeats the request at once. STOP is not delayed.
     await asyncio.sleep(min(error.retry, MAX_PAUSE))
     answer = as_json(answers.Refused(why=str(error), id=id, retry=error.retry), TOO_MANY)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-import math
 import secrets
 import time
 from collections.abc import Mapping, Sequence
@@ -31,7 +30,6 @@ from katana450.errors import InputError
 from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
-from katana450.server.service.mutes import MutedError, Mutes
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import (
     TOKEN_REQUIRED,
@@ -107,13 +105,7 @@ class StopServer:
         self._main_port = main_port
         self._acceptor = acceptor
         self._often: dict[str, TokenBucket] = {}
-        self._mutes = Mutes(time.monotonic)
         self._kept = 0
-
-    def follow(self) -> None:
-        """Count the presses that came on other paths. Call this often."""
-        if self._pipe.status is not None:
-            self._mutes.follow(self._pipe.status.stopped)
 
     async def reply(self, request: h11.Request, client: tuple[str, int] | None) -> Reply:
         """Execute ``request`` of ``client`` and return its response."""
@@ -239,16 +231,6 @@ class StopServer:
                 return _stop_reply(stopped)
         if stopped is None and executed:
             return _answer("cleared", "This press stopped the arm; that stop was cleared since.")
-        drives = pipe.status is not None and identity.session in pipe.status.drivers
-        if identity.muted is not None and not drives and not executed:
-            if stopped is not None:
-                # Sent, it would put off the time at which the stop can be cleared.
-                return _stop_reply(stopped)
-            try:
-                self._mutes.count_stop(identity.session, identity.muted, press)
-            except MutedError as error:
-                retry = ("retry-after", str(math.ceil(error.retry)))
-                return Reply(HTTPStatus.TOO_MANY_REQUESTS, str(error).encode(), headers=(retry,))
         # Sent even if the arm is stopped, so that late copies of this press are recognised.
         pipe.press(StopPress(cause, actor))
         if stopped is None:
