@@ -78,7 +78,7 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     """The film agrees with that of short steps, also when the cup begins to move between two."""
     state = held_level(session, full)
     assert state.poured is not None
-    water = replace(state.poured.water, film=8 * 10**12)
+    water = replace(state.poured.water, film=3 * 10**11)
     state = replace(state, poured=replace(state.poured, water=water))
     start, seen = state.t, []
     for _ in range(1050):
