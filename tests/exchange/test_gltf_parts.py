@@ -1,4 +1,4 @@
-"""Test glTF with buffers in other files, sparse numbers, compression and repeated meshes."""
+"""Test glTF with buffers in other files, sparse numbers, and compression."""
 
 from __future__ import annotations
 
@@ -108,22 +108,6 @@ def test_meshopt_is_decompressed(name: str) -> None:
         read_shape(glb(large, data), Format.GLB, "a.glb")
     with pytest.raises(InputError, match="corrupt"):
         read_shape(glb(json.dumps(document).encode(), bytes(len(data))), Format.GLB, "a.glb")
-
-
-def test_a_mesh_is_repeated_at_instances() -> None:
-    places = np.array([[0, 0, 0], [0, 0, 4]], "<f4").tobytes()
-    document: dict[str, Any] = json.loads(json.dumps(SQUARE))
-    document["buffers"].append({"byteLength": 24, "uri": "p.bin"})
-    document["bufferViews"].append({"buffer": 1, "byteLength": 24})
-    document["accessors"].append(
-        {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}
-    )
-    document["nodes"][0]["extensions"] = {
-        "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2}}
-    }
-    shape = read(document, p_bin=places, **{"a b_bin": DATA})
-    assert len(shape.faces) == 4
-    assert sides(shape) == pytest.approx([1e3, 4e3, 1e3])
 
 
 def test_an_unknown_extension_is_reported() -> None:

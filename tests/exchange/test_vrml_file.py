@@ -34,7 +34,7 @@ SQUARE = "IndexedFaceSet { coord Coordinate { point [ 0 0 0, 1 0 0, 1 1 0, 0 1 0
     ("geometry", "litres", "size"),
     [
         ("Box { }", 8.0, [200, 200, 200]),
-        ("Box { size 1 2 3 }", 6.0, [100, 200, 300]),
+        ("Box { solid FALSE size 1 2 3 }", 6.0, [100, 200, 300]),
         ("Cylinder { radius 2 height 1 }", 4.0 * PRISM, [400, 100, 400]),
         ("Cone { bottomRadius 2 height 3 }", 4.0 * PRISM, [400, 300, 400]),
         ("Extrusion { }", 4.0, [200, 100, 200]),

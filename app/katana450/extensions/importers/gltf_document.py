@@ -7,7 +7,6 @@ parts that are read are listed, named as in the specification in snake case.
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -22,21 +21,6 @@ Natural = Annotated[int, msgspec.Meta(ge=0)]
 
 LINE_MODES, TRIANGLES, STRIP, FAN = range(4), 4, 5, 6
 """Modes of a primitive: points and lines, and three of surfaces."""
-
-
-def pose(
-    translation: Sequence[float], rotation: Sequence[float], scale: Sequence[float]
-) -> FloatArray:
-    """Return the matrix (4, 4) of a translation, a quaternion x, y, z, w and factors.
-
-    NaN for a quaternion of zeros.
-    """
-    if not any(rotation):
-        return np.full((4, 4), np.nan)
-    x, y, z, w = rotation
-    T = se3.from_rotation_translation(so3.from_quaternion((w, x, y, z)), translation)
-    T[:3, :3] *= scale
-    return T
 
 
 class Buffer(msgspec.Struct, rename="camel"):
@@ -140,18 +124,6 @@ class Mesh(msgspec.Struct, rename="camel"):
     primitives: list[Primitive]
 
 
-class Instances(msgspec.Struct):
-    """The places at which the mesh of a node is repeated (EXT_mesh_gpu_instancing)."""
-
-    attributes: dict[str, Natural]
-
-
-class NodeExtensions(msgspec.Struct):
-    """The extension of a node that is read."""
-
-    instances: Instances | None = msgspec.field(default=None, name="EXT_mesh_gpu_instancing")
-
-
 class Node(msgspec.Struct, rename="camel"):
     """A node of the scene tree."""
 
@@ -162,13 +134,17 @@ class Node(msgspec.Struct, rename="camel"):
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotation: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.0)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    extensions: NodeExtensions = msgspec.field(default_factory=NodeExtensions)
 
     def pose(self) -> FloatArray:
         """Return its pose (4, 4) in the frame of its parent."""
         if self.matrix is not None:
             return np.array(self.matrix).reshape(4, 4).T
-        return pose(self.translation, self.rotation, self.scale)
+        # A quaternion of zeros is no rotation.
+        if not any(self.rotation):
+            return np.full((4, 4), np.nan)
+        x, y, z, w = self.rotation
+        R = so3.from_quaternion((w, x, y, z)) * self.scale
+        return se3.from_rotation_translation(R, self.translation)
 
 
 class Scene(msgspec.Struct, rename="camel"):

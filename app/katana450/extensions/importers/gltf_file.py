@@ -18,10 +18,8 @@ from katana450.extensions.importers.gltf_document import (
     STRIP,
     TRIANGLES,
     Document,
-    Instances,
     Primitive,
     decoded,
-    pose,
 )
 from katana450.extensions.importers.surface import (
     MAX_COPIES,
@@ -39,7 +37,6 @@ READ_EXTENSIONS = (
     "EXT_meshopt_compression",
     "KHR_meshopt_compression",
     "KHR_mesh_quantization",
-    "EXT_mesh_gpu_instancing",
 )
 """Required extensions that are read."""
 
@@ -91,9 +88,7 @@ class _File:
             if node.skin is not None:
                 self._left_out["bones"] += 1
             if node.mesh is not None:
-                mesh = self._mesh(node.mesh)
-                for T_copy in self._copies(node.extensions.instances):
-                    builder.add(mesh.moved(T @ T_copy))
+                builder.add(self._mesh(node.mesh).moved(T))
         if self._document.animations:
             self._left_out["motion"] += 1
         for extension in self._document.extensions_required:
@@ -107,28 +102,6 @@ class _File:
             return document.scenes[document.scene or 0].nodes[::-1]
         children = {child for node in document.nodes for child in node.children}
         return [number for number in range(len(document.nodes)) if number not in children]
-
-    def _copies(self, instances: Instances | None) -> list[FloatArray]:
-        """Return the poses (4, 4) in the frame of a node at which its mesh is shown."""
-        if instances is None:
-            return [np.eye(4)]
-        widths = {"TRANSLATION": (3, 0.0), "ROTATION": (4, 0.0), "SCALE": (3, 1.0)}
-        found = {
-            key: self._buffers.numbers(instances.attributes[key], width)
-            for key, (width, _) in widths.items()
-            if key in instances.attributes
-        }
-        count = len(next(iter(found.values()), ()))
-        if count > MAX_COPIES or any(len(each) != count for each in found.values()):
-            raise self._buffers.broken("a mesh is repeated too often, or its places do not match")
-        moved, turned, sized = (
-            found.get(key, np.full((count, width), default))
-            for key, (width, default) in widths.items()
-        )
-        if "ROTATION" not in found:
-            turned[:, 3] = 1.0
-        rows = zip(moved.tolist(), turned.tolist(), sized.tolist(), strict=True)
-        return [pose(*row) for row in rows]
 
     def _mesh(self, number: int) -> MeshSurface:
         if number not in self._meshes:
