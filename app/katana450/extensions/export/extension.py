@@ -64,8 +64,8 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="vrml, x3d, glb and html: motion that the file plays; .csv with the columns "
-        "t,theta1,...,theta5,gripper or .json with lists of these names, or trace.csv of a report",
+        help="vrml, x3d, glb and html: motion that the file plays; a .csv with the columns "
+        "t,theta1,...,theta5,gripper, or trace.csv of a report",
     )
     motion.add_argument(
         "--run",

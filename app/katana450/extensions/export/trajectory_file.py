@@ -1,4 +1,4 @@
-"""A motion as a table of times and joint values, in CSV or JSON.
+"""A motion as a table of times and joint values, in CSV.
 
 The first line of a CSV file has the names of the columns, `t` first. Every line after it has a time
 [s] and the value of each named joint [rad, m]:
@@ -7,15 +7,13 @@ The first line of a CSV file has the names of the columns, `t` first. Every line
 
 `theta1` is the first driven joint and so on; `gripper` is the driven joint after the fifth. Joints
 can also have their own names. The table of a report, `trace.csv`, is such a file too: its columns
-of times and joints are taken, in its units, and the others left out. JSON is an object of lists
-with the same names, all of one length.
-Joints that are not named stay at zero.
+of times and joints are taken, in its units, and the others left out. Joints that are not named stay
+at zero.
 """
 
 from __future__ import annotations
 
 import csv
-import json
 import math
 import re
 from collections.abc import Mapping
@@ -78,26 +76,21 @@ class RecordedMotion:
 
 
 def load_motion(path: Path, robot: Robot) -> RecordedMotion:
-    """Return the motion of ``robot`` in a .csv or .json file.
+    """Return the motion of ``robot`` in a .csv file.
 
     Raises InputError for a file that cannot be read or is not such a table, for unknown joints, and
     for values outside the limits of a joint.
     """
+    if path.suffix.lower() != ".csv":
+        raise InputError(f"{path} must end in .csv.")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path} cannot be read: {error}.") from error
-    match path.suffix.lower():
-        case ".csv":
-            columns = _csv_columns(path, text)
-        case ".json":
-            columns = _json_columns(path, text)
-        case _:
-            raise InputError(f"{path} must end in .csv or .json.")
-    return _motion(path, columns, robot)
+    return _motion(path, _csv_columns(path, text), robot)
 
 
-def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
+def _csv_columns(path: Path, text: str) -> dict[str, list[float]]:
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
     if not rows:
         raise InputError(f"{path} is empty. Its first line must name the columns, t first.")
@@ -106,7 +99,7 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[object]]:
     names = rows[0]
     if len(set(names)) != len(names):
         raise InputError(f"{path} names a column twice: {', '.join(names)}.")
-    numbers: list[list[object]] = []
+    numbers: list[list[float]] = []
     for count, row in enumerate(rows[1:], start=1):
         try:
             if len(row) != len(names):
@@ -136,24 +129,14 @@ def _of_report(rows: list[list[str]]) -> list[list[str]]:
     return [head, *([cell(row, place, unit) for place, _, unit in taken] for row in rows[1:])]
 
 
-def _json_columns(path: Path, text: str) -> dict[str, list[object]]:
-    try:
-        columns = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON: {error}.") from error
-    if not isinstance(columns, dict) or not all(isinstance(v, list) for v in columns.values()):
-        raise InputError(f"{path} must hold an object of lists, such as {{'t': [0, 1], ...}}.")
-    return columns
-
-
-def _motion(path: Path, columns: Mapping[str, list[object]], robot: Robot) -> RecordedMotion:
+def _motion(path: Path, columns: Mapping[str, list[float]], robot: Robot) -> RecordedMotion:
     if "t" not in columns:
         raise InputError(f"{path} has no column t; it has {', '.join(columns)}.")
     count = len(columns["t"])
     if not 2 <= count <= MAX_ROWS:
         raise InputError(f"{path} has {count} rows; a motion has from 2 to {MAX_ROWS}.")
     table = {
-        name: finite_array(column, (count,), f"The column {name} of {path}")  # type: ignore[arg-type]
+        name: finite_array(column, (count,), f"The column {name} of {path}")
         for name, column in columns.items()
     }
     t = table.pop("t")
