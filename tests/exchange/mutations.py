@@ -21,7 +21,7 @@ from katana450.extensions.importers.shape_file import (
     read_shape,
 )
 
-MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 60
+MUTATIONS = 1000 if "KATANA450_LONG" in os.environ else 20
 """Number of mutations of each seed."""
 
 NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[", b"}", b'"', b"0"]

@@ -127,18 +127,6 @@ def test_the_motion_is_that_of_the_file(tmp_path: Path, gantry: Robot) -> None:
     assert extras["thumb"]["mimic"] == {"joint": "grip", "multiplier": -0.1, "offset": -0.04}
 
 
-@needs("tovrmlx3d")
-def test_another_program_reads_it_with_its_motion(tmp_path: Path, katana: Robot) -> None:
-    (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,2\n")
-    motion = load_motion(tmp_path / "m.csv", katana)
-    ((name, content),) = glb_files(katana, katana.values(()), motion).items()
-    (tmp_path / name).write_bytes(content)
-    converted = run("tovrmlx3d", tmp_path / name)
-    assert "pan_link" in converted
-    assert converted.count("OrientationInterpolator {") == len(katana.joints)
-    assert converted.count("TimeSensor {") == 1
-
-
 VALIDATE = """
 const [folder, file] = process.argv.slice(1);
 const bytes = new Uint8Array(require("fs").readFileSync(file));

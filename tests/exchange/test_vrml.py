@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
-from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.export.vrml import DIGITS, part_world, vrml_files, world_of
@@ -208,32 +207,6 @@ def test_comments_commas_and_bare_values_are_read() -> None:
     text = f"{HEADER} by hand\n# one\nTransform{{center 1,2,3#two\nchildren Group{{}}}}"
     shown = (("center", (1.0, 2.0, 3.0)), ("children", (Node("Group"),)))
     assert read_world(text) == World((Node("Transform", shown),))
-
-
-@needs("tovrmlx3d")
-def test_another_program_accepts_the_arm_that_moves(tmp_path: Path, katana: Robot) -> None:
-    (tmp_path / "m.csv").write_text("t,theta1\n0,0\n2,0.2\n")
-    options = ["--no-objects", "--out", str(tmp_path), "--trajectory", str(tmp_path / "m.csv")]
-    assert main(["export", "vrml", *options]) == 0
-    converted = run("tovrmlx3d", "--encoding", "xml", tmp_path / "katana450.wrl")
-    for joint in katana.joints:
-        assert f'<Transform DEF="{joint}"' in converted
-    assert converted.count("<ROUTE") == 2 * len(katana.joints)
-    assert converted.count("<IndexedFaceSet DEF") == sum(len(link.shapes) for link in katana.links)
-    assert converted.count("<Switch") == sum(bool(link.shapes) for link in katana.links)
-
-
-@needs("tovrmlx3d")
-@pytest.mark.parametrize("which", ["katana", "gantry"])
-def test_another_program_accepts_parts(
-    which: str, tmp_path: Path, katana: Robot, gantry: Robot
-) -> None:
-    robot = katana if which == "katana" else gantry
-    links = [link for link in robot.links if link.shapes]
-    for link in links[-3:]:
-        (tmp_path / "part.wrl").write_text(world_text(part_world(robot, link)))
-        converted = run("tovrmlx3d", tmp_path / "part.wrl")
-        assert converted.count("IndexedFaceSet {") == len(link.shapes)
 
 
 def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float = 0.0) -> Path:

@@ -34,7 +34,6 @@ PACKAGES = {
     "xvfb-run": "xvfb",
     "xauth": "xauth",
     "xdotool": "xdotool",
-    "tovrmlx3d": "view3dscene",
     "view3dscene": "view3dscene",
     "firefox-esr": "firefox-esr",
     "node": "nodejs",
