@@ -1,11 +1,10 @@
-"""Cost of collision checks: the nearest pair beside simpler methods, and one control tick.
+"""Cost of collision checks: the nearest pair beside a simpler method, and one control tick.
 
     python -m benchmarks.collision
 
 Every method measures the same random postures in turn, each posture several times, and its minimum
 time counts. The tables give the median and the 95th percentile over the postures. Times are
-processor times of the thread, so that other load on the machine hardly counts. FCL, which measures
-where coal has no wheel, is compared with coal in the same run.
+processor times of the thread, so that other load on the machine hardly counts.
 """
 
 from __future__ import annotations
@@ -13,12 +12,9 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, NamedTuple
-from unittest import mock
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
-import coal
 import numpy as np
 
 from katana450.arm.control.state import Status
@@ -26,7 +22,6 @@ from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.maths.collision import engine as engines
 from katana450.maths.collision.clearance import advance
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import CollisionWorld, obstacle
@@ -62,71 +57,12 @@ class Row(NamedTuple):
     remark: str
 
 
-@contextmanager
-def without_coal() -> Iterator[None]:
-    """Choose the engine as on a machine without coal."""
-    with mock.patch.object(engines, "find_spec", return_value=None):
-        engines.engine.cache_clear()
-        yield
-    engines.engine.cache_clear()
-
-
 def world_on_table(robot: Robot) -> CollisionWorld:
     """Return the arm's bodies above the table."""
     world, _ = world_of(robot)
     if world is None:
         raise SystemExit("The robot description has no collision shapes.")
     return world.with_obstacles([obstacle("table", np.eye(4), half_space())])
-
-
-class RawMeshes:
-    """The visible triangles of each link, without hulls, for all pairs of a world without table."""
-
-    def __init__(self, robot: Robot, world: CollisionWorld) -> None:
-        self._world = world
-        bodies = {body.name: body for body in robot.links}
-        self._meshes = {}
-        for number, part in enumerate(world.parts):
-            if part.name in bodies:
-                meshes = [visual.mesh for visual in bodies[part.name].visuals]
-                self._meshes[number] = _bvh(meshes)
-        self._pairs = [(a, b) for a, b in world.pairs if a in self._meshes and b in self._meshes]
-        self._request = coal.DistanceRequest()
-
-    def nearest(self, x: FloatArray) -> float:
-        """Return the minimum distance of two links [m]."""
-        poses = self._world.linkage.poses(x)
-        placed = {}
-        for number in self._meshes:
-            part = self._world.parts[number]
-            T = poses[part.mover] @ part.T_mover_shape[0]
-            placed[number] = coal.Transform3s(T[:3, :3], T[:3, 3])
-        nearest: float = min(
-            coal.distance(
-                self._meshes[a],
-                placed[a],
-                self._meshes[b],
-                placed[b],
-                self._request,
-                coal.DistanceResult(),
-            )
-            for a, b in self._pairs
-        )
-        return nearest
-
-
-def _bvh(meshes: Sequence[Any]) -> Any:
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    count = 0
-    for mesh in meshes:
-        points.extend(list(np.asarray(mesh.vertices)))
-        faces.extend([coal.Triangle(*face) for face in (mesh.faces + count).tolist()])
-        count += len(mesh.vertices)
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(faces), count)
-    model.addSubModel(points, faces)
-    model.endModel()
-    return model
 
 
 def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
@@ -139,32 +75,18 @@ def quickest(work: Callable[[], object], turns: int = TURNS) -> float:
     return 1e6 * best
 
 
-def nearest_rows(
-    robot: Robot, world: CollisionWorld, by_fcl: CollisionWorld, postures: FloatArray
-) -> list[Row]:
+def nearest_rows(world: CollisionWorld, postures: FloatArray) -> list[Row]:
     """Return the rows of the methods that find the nearest pair."""
     every = range(len(world.first))
-    raw = RawMeshes(robot, world)
-    methods: dict[str, tuple[Callable[[FloatArray], object], int]] = {
-        "katana450 `nearest`": (world.nearest, TURNS),
-        "katana450 `nearest`, by FCL": (by_fcl.nearest, TURNS),
-        "coal, the same hulls, every pair": (
-            lambda x: min(map(world.at(x).distance, every)),
-            TURNS,
-        ),
-        "coal, the visible meshes, without the table": (raw.nearest, 1),
+    methods: dict[str, Callable[[FloatArray], object]] = {
+        "katana450 `nearest`": world.nearest,
+        "every pair": lambda x: min(map(world.at(x).distance, every)),
     }
     times: dict[str, list[float]] = {name: [] for name in methods}
     for x in postures:
-        for name, (method, turns) in methods.items():
-            times[name].append(quickest(lambda method=method, x=x: method(x), turns))  # type: ignore[misc]
-    ours, fcl = (np.array(times[name]) for name in list(times)[:2])
-    remarks = (
-        f"{len(world.part_of)} bodies, {len(world.first)} pairs",
-        f"{np.median(fcl / ours):.2f} times coal",
-        "",
-        f"{len(raw._pairs)} pairs of links",
-    )
+        for name, method in methods.items():
+            times[name].append(quickest(lambda method=method, x=x: method(x)))  # type: ignore[misc]
+    remarks = (f"{len(world.part_of)} bodies, {len(world.first)} pairs", "")
     return [
         Row(name, float(np.median(took)), float(np.percentile(took, 95.0)), remark)
         for (name, took), remark in zip(times.items(), remarks, strict=True)
@@ -215,22 +137,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     built = time.perf_counter() - start
     chain, gripper = arm.chain, arm.gripper
     lower, upper = np.append(chain.lower, gripper.lower), np.append(chain.upper, gripper.upper)
-    with without_coal():
-        by_fcl = world_on_table(robot)
-        by_fcl.load()
     postures = np.random.default_rng(SEED).uniform(lower, upper, (count, len(lower)))
     print(f"{count} postures of seed {SEED}; load average {os.getloadavg()[0]:.1f}.")
     print(f"Bodies read and pairs found in {built:.2f} s.\n")
-    print(table("the nearest pair", nearest_rows(robot, world, by_fcl, postures)))
+    print(table("the nearest pair", nearest_rows(world, postures)))
     print()
-    ticks = tick_rows(arm, world)
-    print(table("one tick of a drive", ticks))
-    print()
-    slower = [
-        row._replace(remark=f"{row.median / coal.median:.2f} times coal, {row.remark}")
-        for row, coal in zip(tick_rows(arm, by_fcl), ticks, strict=True)
-    ]
-    print(table("one tick of a drive, by FCL", slower))
+    print(table("one tick of a drive", tick_rows(arm, world)))
 
 
 if __name__ == "__main__":

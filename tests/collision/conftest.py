@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
-from katana450.maths.collision import engine as engines
-from katana450.maths.collision.engine import Engine
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry.arrays import FloatArray
 
 
-@pytest.fixture(scope="module", autouse=True, params=["coal", "fcl"])
-def engine(request: pytest.FixtureRequest) -> Iterator[Engine]:
-    """Run every test of this folder on coal, and on FCL as on a machine without coal."""
-    pytest.importorskip(request.param)
-    with pytest.MonkeyPatch.context() as patch:
-        if request.param == "fcl":
-            patch.setattr(engines, "find_spec", lambda _: None)
-        engines.engine.cache_clear()
-        found = engines.engine()
-        assert request.param in type(found).__module__
-        yield found
-    engines.engine.cache_clear()
-
-
 @pytest.fixture(scope="module")
-def bare(robot: Robot, engine: Engine) -> CollisionWorld:
+def bare(robot: Robot) -> CollisionWorld:
     """The arm without an environment."""
     world, notes = world_of(robot)
     assert world is not None
     assert notes == ()
-    assert world.engine is engine
     return world
 
 

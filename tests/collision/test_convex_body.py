@@ -27,7 +27,7 @@ def check_holds(found: ConvexBody, points: FloatArray) -> None:
     mesh = trimesh.Trimesh(found.corners).convex_hull
     heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
     assert (points @ mesh.face_normals.T - heights).max() <= 1e-6 * np.ptp(points, axis=0).max()
-    # Bodies that coal accepts: it ends the process for bodies without a volume.
+    # It has a volume.
     hull(found.corners)
 
 

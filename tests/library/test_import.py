@@ -11,7 +11,7 @@ import pytest
 
 import katana450
 
-HEAVY = ("numpy", "viser", "coal", "trimesh", "yourdfpy", "matplotlib", "ruckig", "msgspec")
+HEAVY = ("numpy", "viser", "mujoco", "trimesh", "yourdfpy", "matplotlib", "ruckig", "msgspec")
 
 
 def modules_after(statement: str) -> set[str]:

@@ -146,7 +146,7 @@ def test_libraries_are_loaded_when_they_are_needed() -> None:
     script = (
         "import sys; from katana450.arm.robot.loader import load;"
         "first = {'trimesh', 'yourdfpy'} & set(sys.modules); load();"
-        "print([*first, *({'coal', 'viser'} & set(sys.modules))])"
+        "print([*first, *({'mujoco', 'viser'} & set(sys.modules))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
@@ -159,8 +159,8 @@ def test_described_robot_needs_no_engine_until_a_distance_is_measured() -> None:
         "import sys; from katana450.assembly.robot_session import find_robot;"
         "from katana450.resources import URDF_PATH; from katana450.settings import Settings;"
         "session = find_robot(Settings(), URDF_PATH, None).session;"
-        "before = 'coal' in sys.modules; session.choices(session.begin(session.ready, 0.0, 0.0));"
-        "print(before, 'coal' in sys.modules)"
+        "before = 'mujoco' in sys.modules; session.choices(session.begin(session.ready, 0.0, 0.0));"
+        "print(before, 'mujoco' in sys.modules)"
     )
     # The first process may have to find the pairs that can meet, and keeps them.
     first, second = (

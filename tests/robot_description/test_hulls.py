@@ -7,12 +7,12 @@ import platform
 import sys
 from pathlib import Path
 
-import coal
 import numpy as np
 import pytest
 import yourdfpy
 from manifold3d import Manifold
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from katana450.resources import URDF_PATH
 from robot_description.cad import conduit
@@ -97,31 +97,17 @@ def filled(link: str) -> Manifold:
     return result
 
 
-def surface(shape: Manifold) -> coal.BVHModelOBBRSS:
-    mesh = shape.to_mesh64()
-    corners = np.asarray(mesh.vert_properties)[:, :3]
-    triangles = np.asarray(mesh.tri_verts).astype(int).tolist()
-    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    points.extend(list(corners))
-    faces.extend([coal.Triangle(*triangle) for triangle in triangles])
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(triangles), len(corners))
-    model.addSubModel(points, faces)
-    model.endModel()
-    return model
+def corners(shape: Manifold, spacing: float) -> NDArray[np.float64]:
+    """Return points (n, 3) [mm] of the surface, nearer to each other than ``spacing`` [mm]."""
+    return np.asarray(shape.refine_to_length(spacing).to_mesh64().vert_properties)[:, :3]
 
 
-def standoff(excess: Manifold, model: coal.BVHModelOBBRSS) -> tuple[float, list[float]]:
-    """Return the maximum distance [mm] of ``excess`` from the surface of ``model``, and where."""
-    mesh = excess.refine_to_length(5.0).to_mesh64()
-    point, still, request = coal.Sphere(1e-9), coal.Transform3s(), coal.DistanceRequest()
-    found = (0.0, [0.0, 0.0, 0.0])
-    for at in np.asarray(mesh.vert_properties)[:, :3]:
-        place = coal.Transform3s(np.eye(3), at)
-        far = coal.distance(model, still, point, place, request, coal.DistanceResult())
-        if far > found[0]:
-            found = (far, at.round(1).tolist())
-    return found
+def standoff(excess: Manifold, surface: cKDTree) -> tuple[float, list[float]]:
+    """Return the maximum distance [mm] of ``excess`` from points of a surface, and where."""
+    points = corners(excess, 5.0)
+    distances = surface.query(points)[0]
+    far = int(np.argmax(distances))
+    return float(distances[far]), points[far].round(1).tolist()
 
 
 def test_rebuild_gives_the_committed_bytes(tmp_path: Path) -> None:
@@ -203,11 +189,11 @@ def test_shoulder_and_column_do_not_overlap_at_any_angle() -> None:
 @pytest.mark.parametrize("link", LINKS)
 def test_every_hull_stays_near_its_link(link: str) -> None:
     reference = filled(link)
-    model = surface(reference)
+    surface = cKDTree(corners(reference, 1.0))
     for number, hull in enumerate(hulls(link)):
         excess = hull - reference
         fraction = excess.volume() / (hull.volume() - excess.volume())
-        far, at = standoff(excess, model)
+        far, at = standoff(excess, surface)
         assert fraction <= EXCESS or far <= STANDOFF, (
             f"{link}_{number} stands {far:.1f} mm off at {at} and is {fraction:.0%} too big: "
             "give the link another plane in robot_description/cad/hulls.py"

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from katana450.arm.control.solid import MAX_CORNERS
 from katana450.errors import InputError
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 MIN_THICKNESS_FRACTION = 0.005
@@ -176,7 +176,7 @@ def _farthest(
 
 def _faces(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return outward normals (m, 3), heights (m,) and areas (m,) of the faces of a small hull."""
-    a, b, c = engine().triangles(points).transpose(1, 0, 2)
+    a, b, c = points[hull_triangles(points)].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1)
     real = sizes > EXACT**2

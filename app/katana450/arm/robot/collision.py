@@ -14,7 +14,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.visual import Visual
 from katana450.disk_cache import kept
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.maths.collision.engine import library
 from katana450.maths.collision.linkage import GROUND, Linkage, RigidGroup
 from katana450.maths.collision.pairs import pairs_that_meet
 from katana450.maths.collision.shape import CollisionShape, half_space, hull
@@ -88,7 +87,7 @@ def _pairs(
     shapes = [each.mark for part in parts for each in part.shapes]
     places = [(part.mover, part.T_mover_shape) for part in parts]
     bodies = pickle.dumps((groups, places, shapes))
-    return kept(pairs, list[tuple[int, int]], bodies, lower, upper, library())
+    return kept(pairs, list[tuple[int, int]], bodies, lower, upper)
 
 
 def table() -> Part:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from katana450.arm.robot.visual import GEOMETRY_FILES, PrimitiveShape, Visual
 from katana450.extensions.convex_body import convex_body
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry.arrays import FloatArray
 
 MAX_PIECES = 8
@@ -117,8 +117,7 @@ def _volume(corners: FloatArray) -> float:
     """Return the volume [m^3] of the hull of ``corners`` (n, 3), 0 if they lie in a plane."""
     centred = corners - corners.mean(axis=0)
     spread = np.sqrt(max(float(np.linalg.eigvalsh(centred.T @ centred)[0]), 0.0))
-    # The engine ends the process when it is given points without a volume.
     if len(corners) < 4 or spread < FLAT * np.sqrt(len(corners)):
         return 0.0
-    a, b, c = engine().triangles(centred).transpose(1, 0, 2)
+    a, b, c = centred[hull_triangles(centred)].transpose(1, 0, 2)
     return float(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum()) / 6.0

@@ -10,7 +10,8 @@ import numpy as np
 from katana450.arm.control.grip import TOUCH_DISTANCE
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import distance
+from katana450.maths.collision.shape import placement
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -93,10 +94,5 @@ def _overlaps_more(pushed: SceneObject, item: SceneObject, other: SceneObject) -
 
 def _gap(one: SceneObject, other: SceneObject) -> float:
     """Return the distance [m] of two objects that are not held; negative if they overlap."""
-    measure = engine()
-    placed = (
-        (each.collision_shape.geometry, measure.transform(each.T_collision_shape))
-        for each in (one, other)
-    )
-    (first, T_first), (second, T_second) = placed
-    return measure.distance(first, T_first, second, T_second)
+    shapes = ((each.collision_shape, each.T_collision_shape) for each in (one, other))
+    return distance(placement(*shapes), 0, 1)

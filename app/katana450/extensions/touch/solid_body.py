@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from katana450.arm.control.scene_objects import MAX_OBJECTS, SceneObject, Shape
-from katana450.maths.collision.engine import engine
+from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 FLAT = 1e-12
@@ -115,7 +115,7 @@ def body_of(scene_object: SceneObject) -> SolidBody:
 def _hull(corners: bytes, scale: float, middle: float) -> SolidBody:
     """Return the body of a mesh about its middle, from the triangles of its convex hull."""
     points = scale * np.frombuffer(corners).reshape(-1, 3) - (0.0, 0.0, middle)
-    a, b, c = engine().triangles(points).transpose(1, 0, 2)
+    a, b, c = points[hull_triangles(points)].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     sizes = np.linalg.norm(normals, axis=1)
     real = sizes > FLAT

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.maths.collision.engine import Engine, engine
+from katana450.maths.collision.engine import Geometry, Placement
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 
 HALF_SPACE_RADIUS = 1e6
@@ -31,23 +28,32 @@ class CollisionShape:
     """A convex body in a frame of its own.
 
     Attributes:
-        make: returns its geometry in an engine.
+        geometry: the geometry that is measured, about ``middle``.
         centre, radius: a ball (3,), scalar [m] that contains the body.
         low, high: corners (3,) of a box along the axes that contains the body [m].
         mark: bytes that identify the shape; other shapes have other marks.
     """
 
-    make: Callable[[Engine], Any]
+    geometry: Geometry
     centre: FloatArray
     radius: float
     low: FloatArray
     high: FloatArray
     mark: bytes
 
-    @cached_property
-    def geometry(self) -> Any:
-        """The geometry of the engine, made at its first use: drawing needs none."""
-        return self.make(engine())
+    @property
+    def middle(self) -> FloatArray:
+        """The place (3,) of the geometry [m]: a half-space is about a point of its plane."""
+        return np.zeros(3) if self.mark == PLANE else self.centre
+
+
+def placement(*placed: tuple[CollisionShape, FloatArray]) -> Placement:
+    """Return the geometries of shapes, each at its pose (4, 4) [m]."""
+    return Placement(
+        tuple(shape.geometry for shape, _ in placed),
+        np.array([T[:3, :3] @ shape.middle + T[:3, 3] for shape, T in placed]),
+        np.array([T[:3, :3].ravel() for _, T in placed]),
+    )
 
 
 def hull(points: npt.ArrayLike) -> CollisionShape:
@@ -57,22 +63,23 @@ def hull(points: npt.ArrayLike) -> CollisionShape:
     # Each once, in order, as from `np.unique`, which imports `numpy.ma` at each start.
     corners = corners[np.lexsort(corners.T[::-1])]
     corners = corners[(np.diff(corners, axis=0, prepend=np.nan) != 0.0).any(axis=1)]
-    # The engine ends the process when it is given points without a volume.
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)
     if len(corners) < 4 or spread[-1] < FLAT * np.sqrt(len(corners)):
         raise InputError(f"The hull has no volume: its {len(corners)} points lie in one plane.")
     low, high = corners.min(axis=0), corners.max(axis=0)
     centre = 0.5 * (low + high)
     radius = float(np.linalg.norm(corners - centre, axis=1).max())
-    make, mark = (lambda engine: engine.hull(corners)), corners.tobytes()
-    return CollisionShape(make, frozen(centre), radius, frozen(low), frozen(high), mark)
+    # About its middle, because the geometry has single precision.
+    geometry = Geometry("hull", points=frozen(corners - centre))
+    mark = corners.tobytes()
+    return CollisionShape(geometry, frozen(centre), radius, frozen(low), frozen(high), mark)
 
 
 def box(size: npt.ArrayLike) -> CollisionShape:
     """Return a box of ``size`` (3,) [m] about its middle."""
     size = _lengths(size, 3, "The size of a box")
     half, mark = frozen(0.5 * size), b"box" + size.tobytes()
-    return _round_middle(lambda engine: engine.box(size), float(np.linalg.norm(half)), half, mark)
+    return _round_middle("box", half, float(np.linalg.norm(half)), mark)
 
 
 def cylinder(radius: float, length: float) -> CollisionShape:
@@ -80,22 +87,29 @@ def cylinder(radius: float, length: float) -> CollisionShape:
     _lengths((radius, length), 2, "Radius and length of a cylinder")
     half = frozen((radius, radius, 0.5 * length))
     mark, reach = b"cylinder" + half.tobytes(), float(np.hypot(radius, 0.5 * length))
-    return _round_middle(lambda engine: engine.cylinder(radius, length), reach, half, mark)
+    return _round_middle("cylinder", half, reach, mark, (radius, 0.5 * length, 0.0))
 
 
 def sphere(radius: float) -> CollisionShape:
     """Return a ball about its middle; radius in m."""
     _lengths((radius,), 1, "The radius of a sphere")
     half = frozen((radius, radius, radius))
-    mark = b"sphere" + half.tobytes()
-    return _round_middle(lambda engine: engine.sphere(radius), radius, half, mark)
+    return _round_middle("sphere", half, radius, b"sphere" + half.tobytes())
 
 
 def _round_middle(
-    make: Callable[[Engine], Any], radius: float, half: FloatArray, mark: bytes
+    kind: str,
+    half: FloatArray,
+    radius: float,
+    mark: bytes,
+    size: tuple[float, float, float] | None = None,
 ) -> CollisionShape:
-    """Return a shape about its middle; ``half`` (3,) of the size of its box [m]."""
-    return CollisionShape(make, frozen(np.zeros(3)), radius, -half, half, mark)
+    """Return a shape about its middle; ``half`` (3,) of the size of its box [m].
+
+    ``size`` is that of the geometry; None if it is ``half``.
+    """
+    geometry = Geometry(kind, tuple(half.tolist()) if size is None else size)
+    return CollisionShape(geometry, frozen(np.zeros(3)), radius, -half, half, mark)
 
 
 def half_space() -> CollisionShape:
@@ -103,9 +117,7 @@ def half_space() -> CollisionShape:
     far = np.full(3, HALF_SPACE_RADIUS)
     low, high = frozen(-far), frozen(far * (1.0, 1.0, 0.0))
     centre = frozen((0.0, 0.0, -HALF_SPACE_RADIUS))
-    return CollisionShape(
-        lambda engine: engine.half_space(), centre, HALF_SPACE_RADIUS, low, high, PLANE
-    )
+    return CollisionShape(Geometry("half-space"), centre, HALF_SPACE_RADIUS, low, high, PLANE)
 
 
 def _lengths(value: npt.ArrayLike, count: int, name: str) -> FloatArray:

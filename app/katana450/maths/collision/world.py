@@ -5,22 +5,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.caching import cached_property
+from katana450.maths.collision import engine
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.engine import Engine, engine
+from katana450.maths.collision.engine import Placement
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.shape import PLANE, CollisionShape
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 IndexArray = npt.NDArray[np.int64]
-
-FEW_PAIRS = 1000
-"""Number of pairs up to which their balls are compared in one product of matrices."""
 
 DIRECT_PAIRS = 8
 """Number of pairs that are measured as quickly as the boxes round their bodies are compared."""
@@ -108,7 +105,8 @@ class CollisionWorld:
             frames.setdefault((mover, T.tobytes()), len(frames)) for _, mover, T, _ in bodies
         ]
         first_of = [frame_of.index(frame) for frame in range(len(frames))]
-        self.frames = [(int(self.mover_of[i]), self.T_mover_body[i]) for i in first_of]
+        self.frame_of = np.array(frame_of, dtype=np.int64)
+        self.frames = self.mover_of[first_of], self.T_mover_body[first_of, :3, :3]
         R = self.T_mover_body[:, :3, :3]
         at = self.T_mover_body[:, :3, 3]
         centres = np.array([shape.centre for shape in shapes]).reshape(-1, 3, 1)
@@ -127,10 +125,7 @@ class CollisionWorld:
         for a, b in self.pairs:
             met[a, b] = True
         self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
-        self._shapes, self._frame_of = shapes, frame_of
-        self.apart: FloatArray | None = None
-        if len(self.first) <= FEW_PAIRS:
-            self.apart = self.spread[self.second] - self.spread[self.first]
+        self.geometries = tuple(shape.geometry for shape in shapes)
         self.radii = self.radius[self.first] + self.radius[self.second]
         # Flat indices into (b, m) of a body relative to a group.
         directions = np.zeros((linkage.count, linkage.count, 4))
@@ -138,7 +133,8 @@ class CollisionWorld:
         self.axes = directions.reshape(linkage.count, -1)
         self._carries = linkage.carries[self.mover_of].astype(np.float64)
         self._stays = (~linkage.carries).T.astype(np.float64)
-        self._planes = [body for body, shape in enumerate(shapes) if shape.mark == PLANE]
+        self.bodies_of = list(zip(self.first.tolist(), self.second.tolist(), strict=True))
+        self.planes = [body for body, shape in enumerate(shapes) if shape.mark == PLANE]
         self._second_seen = self.second * linkage.count + self._seen(self.first, self.second)
         self._first_seen = self.first * linkage.count + self._seen(self.second, self.first)
 
@@ -150,27 +146,15 @@ class CollisionWorld:
         this joint moves no part towards the table.
         """
         groups = self.mover_of[bodies]
-        for body in self._planes:
+        for body in self.planes:
             turning = self.linkage.turning_about(self.T_mover_body[body, :3, 2])
             found = turning[self.mover_of[others]]
             groups = np.where((bodies == body) & (groups == GROUND), found, groups)
         return groups
 
-    @cached_property
-    def engine(self) -> Engine:
-        """The engine of this process. It is loaded on first use, like the geometries."""
-        return engine()
-
-    @cached_property
-    def measured(self) -> list[tuple[Any, int, Any, int]]:
-        """Both geometries of each pair, each with the number of its frame."""
-        made, frame = [shape.geometry for shape in self._shapes], self._frame_of
-        pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
-        return [(made[a], frame[a], made[b], frame[b]) for a, b in pairs]
-
     def load(self) -> None:
-        """Load the engine and make all geometries now, so that no later check waits for them."""
-        _ = self.engine, self.measured
+        """Prepare the engine of this thread now, so that no later check in it waits."""
+        engine.load(self.geometries)
 
     @cached_property
     def _closest(self) -> FloatArray:
@@ -269,7 +253,6 @@ class PlacedWorld:
     def __init__(self, world: CollisionWorld, T_base_mover: FloatArray) -> None:
         self._world = world
         self._T = T_base_mover
-        self._transforms: dict[int, Any] = {}
 
     @cached_property
     def _columns(self) -> FloatArray:
@@ -284,13 +267,11 @@ class PlacedWorld:
     @cached_property
     def _apart(self) -> FloatArray:
         """The distance between the balls round the bodies of each pair, (p,) [m]."""
-        world, centre = self._world, self._centre
-        apart = (
-            centre[world.second] - centre[world.first]
-            if world.apart is None
-            else world.apart @ self._columns
-        )
-        return np.asarray(np.sqrt(np.einsum("ij,ij->i", apart, apart)) - self._world.radii)
+        # By coordinates, because numpy takes whole rows far faster.
+        world, centre = self._world, np.ascontiguousarray(self._centre.T)
+        apart = centre.take(world.second, axis=1) - centre.take(world.first, axis=1)
+        apart *= apart
+        return np.asarray(np.sqrt(apart[0] + apart[1] + apart[2]) - world.radii)
 
     def reach(self) -> FloatArray:
         """Return the farthest distance of each body from each joint's axis, (b, m) [m].
@@ -336,25 +317,27 @@ class PlacedWorld:
         near = bounds < (limit[pairs] if isinstance(limit, np.ndarray) else limit)
         return pairs[near], bounds[near]
 
+    @cached_property
+    def _placement(self) -> Placement:
+        """The geometries of all bodies, at their places."""
+        world, T = self._world, self._T
+        # Most geometries are about the centre of their ball.
+        positions = self._centre
+        for body in world.planes:
+            positions = positions.copy()
+            positions[body] = (T[world.mover_of[body]] @ world.T_mover_body[body])[:3, 3]
+        movers, R_mover_body = world.frames
+        rotations = (T[movers, :3, :3] @ R_mover_body).reshape(-1, 9)
+        return Placement(world.geometries, positions, rotations[world.frame_of])
+
     def distance(self, pair: int) -> float:
         """Return the distance between the bodies of a pair [m]; a negative value is their depth."""
-        return self._world.engine.distance(*self._placed(pair))
+        return engine.distance(self._placement, *self._world.bodies_of[pair])
 
     def contact(self, pair: int) -> Contact:
         """Return the nearest points of the bodies of a pair."""
-        world, found = self._world, self._world.engine.witness(*self._placed(pair))
-        bodies = world.first[pair], world.second[pair]
+        world = self._world
+        bodies = world.bodies_of[pair]
+        found = engine.witness(self._placement, *bodies)
         one, other = (world.parts[world.part_of[body]].name for body in bodies)
         return Contact((one, other), found.distance, found.points, found.normal)
-
-    def _placed(self, pair: int) -> tuple[Any, Any, Any, Any]:
-        one, frame, other, other_frame = self._world.measured[pair]
-        return one, self._transform(frame), other, self._transform(other_frame)
-
-    def _transform(self, frame: int) -> Any:
-        found = self._transforms.get(frame)
-        if found is None:
-            mover, T_mover_body = self._world.frames[frame]
-            found = self._world.engine.transform(self._T[mover] @ T_mover_body)
-            self._transforms[frame] = found
-        return found
