@@ -28,10 +28,13 @@ from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.recording.digest import Digester
 from katana450.extensions.recording.files.checking import TickReader, verify_recording
+from katana450.extensions.recording.files.fingerprint import fingerprint
 from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.record_command import same_setpoints
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.replay import Difference, Verification
 from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS
 from katana450.settings import Settings
 from tests.conftest import LONG
@@ -278,3 +281,21 @@ def test_command_describes_cuts_and_explains(
         assert "first difference at t = " in told
         assert words in told
         assert ("libm_rounding" in told) is bool(metadata)
+
+
+@pytest.mark.parametrize(
+    ("distances", "size", "same"),
+    [(None, 0.0, True), ("coal", 5e-10, True), (None, 1e-8, False), ("", 0.0, False)],
+    ids=["none named", "another library", "setpoints differ", "the same library"],
+)
+def test_recordings_of_another_distance_library_pass_by_their_setpoints(
+    distances: str | None, size: float, same: bool
+) -> None:
+    recorded = fingerprint()
+    if distances is None:
+        del recorded["distances"]
+    elif distances:
+        recorded["distances"] = distances
+    first = Difference(1.0, size)
+    assert same_setpoints(Verification(9, 2, first, first), recorded) is same
+    assert not same_setpoints(Verification(9), recorded)

@@ -14,6 +14,7 @@ import struct
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,11 @@ import numpy as np
 from katana450.cli.version import version
 from katana450.portable_rounding import ROUNDS_PORTABLY
 
+DISTANCES = "distances"
+"""Entry that tells what measured the distances of bodies. Recordings by coal or FCL have none."""
+
 RELEVANT = (
-    *("version", "python", "numpy", "blas", "blas_core", "libc", "machine", "cpu"),
+    *("version", "python", "numpy", DISTANCES, "blas", "blas_core", "libc", "machine", "cpu"),
     *("libm_rounding", "blas_rounding", "numpy_rounding"),
 )
 """Entries that show why a simulation may not give the same bits."""
@@ -47,6 +51,7 @@ def fingerprint() -> dict[str, str]:
         "version": version(),
         "python": platform.python_version(),
         "numpy": np.__version__,
+        DISTANCES: f"MuJoCo {metadata.version('mujoco-core')}",
         "blas": _blas(),
         "blas_core": _blas_core(),
         "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from argparse import Namespace
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -18,7 +19,12 @@ from katana450.extensions.recording.datasets.export_command import check_options
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_command import episodes
 from katana450.extensions.recording.episodes.episode_file import episodes_in
-from katana450.extensions.recording.files.fingerprint import OF_PROCESS, differences
+from katana450.extensions.recording.files.fingerprint import (
+    DISTANCES,
+    OF_PROCESS,
+    differences,
+    fingerprint,
+)
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
@@ -26,11 +32,20 @@ from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.trimming import Trimmed, trim
 from katana450.extensions.recording.files.verifying import simulates_apart, verified
 from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.replay import Verification
 
 PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""
 
 MB = 1e6
+
+SAME = 1e-9
+"""[rad or m] Difference of a setpoint that the rounding of distances can make."""
+
+OTHER_DISTANCES = (
+    "All setpoints are the same. Distances between bodies were measured by another library, and "
+    "differ in their rounding."
+)
 
 
 def record(options: Namespace) -> int:
@@ -117,6 +132,9 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
             raise InputError(f"{path} has no tick that can be simulated.")
         if result.identical:
             return 0
+        if same_setpoints(result, file.metadata):
+            print(OTHER_DISTANCES)
+            return 0
         # The process that simulated it rounds as the one that recorded it.
         others = differences(file.metadata, OF_PROCESS if simulates_apart(file) else ())
         if others:
@@ -126,6 +144,16 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
         else:
             print("Program, libraries and rounding are the same, so the recording was changed.")
     return 1
+
+
+def same_setpoints(result: Verification, recorded: Mapping[str, str]) -> bool:
+    """Return whether only distances differ, because another library measured them.
+
+    ``recorded``: the fingerprint of the recording.
+    """
+    if result.largest is None or recorded.get(DISTANCES) == fingerprint()[DISTANCES]:
+        return False
+    return result.largest.size <= SAME
 
 
 def _verify_for_programs(path: Path, urdf: Path | None) -> int:
