@@ -1,4 +1,4 @@
-"""Nodes of a running world for the pads and the sensors of the gripper."""
+"""Nodes of a running world for the pads of the gripper."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from katana450.arm.control.state import State
 from katana450.extensions.export.vrml_named import FieldValue, NamedField, NamedNode
 from katana450.extensions.export.vrml_node import Type
 from katana450.extensions.touch.foundation import PadPressure
-from katana450.extensions.touch.gripper_sensors import INDICES
 from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.touch_model import TouchModel
 
 
 def gripper_nodes(model: TouchModel) -> dict[str, NamedNode]:
-    """Return the nodes of the pads and of the sensors of the gripper, which the files lack."""
+    """Return the nodes of the pads of the gripper, which the files lack."""
 
     def pad(number: int) -> NamedNode:
         def value(state: State, of: Callable[[PadPressure], FieldValue], none: FieldValue) -> Any:
@@ -36,9 +35,4 @@ def gripper_nodes(model: TouchModel) -> dict[str, NamedNode]:
         }
         return NamedNode("Touch", f"link {model.pads[number].finger}", fields)
 
-    def sensor(name: str) -> NamedField:
-        return NamedField(Type.INT, lambda state: float(model.sensors(state).named()[name]))
-
-    sensors = {name: sensor(name) for name in INDICES}
-    pads = {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}
-    return {**pads, "gripper_sensors": NamedNode("Sensors", "gripper", sensors)}
+    return {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}

@@ -1,1 +1,1 @@
-"""Touch of the gripper: pressures on its pads, the sensors of the real gripper, and slip."""
+"""Touch of the gripper: pressures on its pads, and slip."""

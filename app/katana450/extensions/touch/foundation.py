@@ -32,7 +32,6 @@ class PadPressure:
         finger: name of the link.
         force: integral of the pressure over the surface [N].
         pressure: (16, 8) mean pressure of each taxel [Pa].
-        rear, front: the forces on the half next to the palm and on that at the tip [N].
         centre: centre of pressure: distance along the pad from the palm, and across it from the
             middle [m]; None without a force.
     """
@@ -40,8 +39,6 @@ class PadPressure:
     finger: str
     force: float
     pressure: FloatArray
-    rear: float
-    front: float
     centre: tuple[float, float] | None
 
 
@@ -65,8 +62,6 @@ def pressed(
         pad.finger,
         force,
         frozen(taxels / pad.taxel_areas),
-        float(taxels[: ROWS // 2].sum()),
-        float(taxels[ROWS // 2 :].sum()),
         centre,
     )
 

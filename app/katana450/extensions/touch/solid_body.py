@@ -1,4 +1,4 @@
-"""The convex body of an object: how deep a point is inside it, where a ray meets it, its volume."""
+"""The convex body of an object: how deep a point is inside it, and its volume."""
 
 from __future__ import annotations
 
@@ -13,9 +13,6 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 
 FLAT = 1e-12
 """[m^2] Area of a triangle below which it has no direction."""
-
-PARALLEL = 1e-12
-"""Sine of the angle between a ray and a plane below which they never meet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,41 +49,6 @@ class SolidBody:
         if self.ball is not None:
             found = np.minimum(found, self.ball - np.sqrt(np.einsum("ij,ij->i", points, points)))
         return found
-
-    def distances(self, starts: FloatArray, directions: FloatArray) -> FloatArray:
-        """Return the distance (n,) along each ray to the body [m]; infinite for a ray beside it.
-
-        starts: (n, 3) [m]; a ray that starts inside has the distance 0. directions: (n, 3) unit.
-        """
-        enters, leaves = np.zeros(len(starts)), np.full(len(starts), np.inf)
-        if len(self.normals):
-            rate, room = directions @ self.normals.T, self.heights - starts @ self.normals.T
-            beside = (np.abs(rate) < PARALLEL) & (room < 0.0)
-            at = room / np.where(np.abs(rate) < PARALLEL, np.inf, rate)
-            enters = np.maximum(enters, np.where(rate < -PARALLEL, at, 0.0).max(axis=1))
-            leaves = np.minimum(leaves, np.where(rate > PARALLEL, at, np.inf).min(axis=1))
-            leaves[beside.any(axis=1)] = -np.inf
-        for radius, used in ((self.cylinder, 2), (self.ball, 3)):
-            if radius is not None:
-                near, far = _round(starts[:, :used], directions[:, :used], radius)
-                enters, leaves = np.maximum(enters, near), np.minimum(leaves, far)
-        return np.where(enters <= leaves, enters, np.inf)
-
-
-def _round(
-    starts: FloatArray, directions: FloatArray, radius: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return where rays (n, k) enter and leave a circle or a ball of ``radius`` [m]."""
-    a = np.einsum("ij,ij->i", directions, directions)
-    b = np.einsum("ij,ij->i", starts, directions)
-    c = np.einsum("ij,ij->i", starts, starts) - radius**2
-    along = a > PARALLEL
-    root = np.sqrt(np.maximum(b * b - a * c, 0.0))
-    safe = np.where(along, a, 1.0)
-    hit = np.where(along, b * b >= a * c, c <= 0.0)
-    near = np.where(along, (-b - root) / safe, -np.inf)
-    far = np.where(along, (-b + root) / safe, np.inf)
-    return near, np.where(hit, far, -np.inf)
 
 
 def body_of(scene_object: SceneObject) -> SolidBody:

@@ -1,4 +1,4 @@
-"""The model of touch of one arm: forces, slip and sensor values of a state."""
+"""The model of touch of one arm: forces and slip of a state."""
 
 from __future__ import annotations
 
@@ -13,12 +13,6 @@ from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.errors import InputError
 from katana450.extensions.touch.foundation import PadPressure
-from katana450.extensions.touch.gripper_sensors import (
-    COUNT,
-    GripperSensors,
-    distance_value,
-    force_value,
-)
 from katana450.extensions.touch.held_load import (
     FRICTION,
     acceleration,
@@ -27,7 +21,6 @@ from katana450.extensions.touch.held_load import (
     mass,
     sliding_speed,
 )
-from katana450.extensions.touch.infrared import InfraredRays
 from katana450.extensions.touch.pad import Pad, pads_of
 from katana450.extensions.touch.solid_body import body_of
 from katana450.extensions.touch.squeeze import FORCE_LIMIT, Squeeze, SqueezedBody
@@ -38,9 +31,6 @@ from katana450.maths.water.units import GRAVITY
 
 UP = np.array((0.0, 0.0, 1.0))
 """Direction against gravity in the base frame."""
-
-CLOSED_ANGLE = -0.43
-"""[rad] Finger joint of the Katana450 below which the fingers touch each other."""
 
 
 class PadReport(TypedDict):
@@ -60,16 +50,15 @@ class PadReport(TypedDict):
 
 
 class TouchReport(TypedDict):
-    """The touch of a gripper: squeeze [rad], greatest force of a finger [N], pads, and sensors."""
+    """The touch of a gripper: squeeze [rad], greatest force of a finger [N], and pads."""
 
     squeeze: float
     force_limit: float
     pads: list[PadReport]
-    sensors: dict[str, int]
 
 
 class TouchModel:
-    """Forces, slip and sensors of a gripper with known pads. It implements ``GripModel``.
+    """Forces and slip of a gripper with known pads. It implements ``GripModel``.
 
     Its results depend on their arguments alone. The last grip is kept, because it lasts for many
     states.
@@ -96,12 +85,10 @@ class TouchModel:
         self._linkage, self._palm, self._masses = world.linkage, hand.palm, masses
         groups = {part.name: part.mover for part in world.parts}
         self._fingers = tuple(groups[pad.finger] for pad in pads)
-        self._rays = InfraredRays(hand.palm, {pad.finger: groups[pad.finger] for pad in pads})
         self._zero = np.zeros(int(world.linkage.variable.max()))
         # Each is replaced as a whole, because several threads may ask.
         self._last_body: tuple[SceneObject, float, SqueezedBody] | None = None
         self._last_squeeze: tuple[SqueezedBody, float, Squeeze] | None = None
-        self._last_sensors: tuple[State, GripperSensors] | None = None
 
     def overload(self, state: State) -> float | None:
         """Return the load [N] under which the held object slides; None if the fingers hold it.
@@ -188,39 +175,6 @@ class TouchModel:
             )
         return wanted
 
-    def sensors(self, state: State) -> GripperSensors:
-        """Return the values of the 16 sensors: those that the arm reports, or simulated ones."""
-        measured = () if state.report is None else state.report.sensors
-        if len(measured) == COUNT:
-            return GripperSensors.from_bytes([round(each) for each in measured])
-        last = self._last_sensors
-        if last is None or last[0] is not state:
-            last = self._last_sensors = (state, self._sensors(state))
-        return last[1]
-
-    def _sensors(self, state: State) -> GripperSensors:
-        poses = self._linkage.poses(state.x)
-        bodies = [
-            (
-                body_of(each),
-                (poses[self._palm] if each.carried else np.eye(4)) @ each.T_collision_shape,
-            )
-            for each in state.objects
-        ]
-        distances = self._rays.distances(poses, bodies).tolist()
-        values = {
-            name: distance_value(distance)
-            for name, distance in zip(self._rays.names, distances, strict=True)
-        }
-        squeeze = self.squeeze(state)
-        for pad in () if squeeze is None else squeeze.pads:
-            side = pad.finger.split("_")[1]
-            values[f"{side}_rear_force"] = force_value(pad.rear)
-            values[f"{side}_front_force"] = force_value(pad.front)
-        # Objects count as insulators, so a current flows only from finger to finger.
-        values["conductivity"] = 255 if state.gripper <= CLOSED_ANGLE else 0
-        return GripperSensors(**values)
-
     def report(self, state: State) -> TouchReport:
         """Return the touch in ``state`` for the answer to a query."""
         squeeze = self.squeeze(state)
@@ -233,7 +187,6 @@ class TouchModel:
             "squeeze": state.squeeze,
             "force_limit": self.force_limit,
             "pads": pads,
-            "sensors": self.sensors(state).named(),
         }
 
     def _held(self, state: State) -> SqueezedBody | None:

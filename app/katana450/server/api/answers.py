@@ -126,7 +126,7 @@ class State(Answer, frozen=True, kw_only=True):
             load; null where its description states no masses.
         margins: Distances to joint limits, singularity and contact.
         touching: Fingers that touch an object that can be held.
-        touch: Forces, pressures and sensors of the gripper, see the documentation of touch; null
+        touch: Forces and pressures of the gripper, see the documentation of touch; null
             for a gripper whose pads are not known.
         held: Object held between both sides of the hand; null with an empty hand.
         branch: Shoulder and elbow; for an arm outside the five-axis family, the words of the name

@@ -108,8 +108,7 @@ class EmulatedArm:
     @property
     def sensors(self) -> tuple[int, ...]:
         """Bytes (16,) of the sensors of the gripper."""
-        plant = self.axes[GRIPPER].plant
-        return sensor_values(plant.position, self.object_width, plant.squeeze)
+        return sensor_values(self.axes[GRIPPER].plant.squeeze)
 
     def step(self, dt: float) -> None:
         """Simulate the next ``dt`` [s] in steps of fixed length; what is left follows later."""

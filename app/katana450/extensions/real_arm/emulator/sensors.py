@@ -1,18 +1,8 @@
-"""The 16 sensors of the emulated gripper, and the object between its fingers.
-
-Sensors read as those of the simulation, whose zero and scale are assumed.
-"""
+"""The force sensors of the emulated gripper, and the object between its fingers."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-
-from katana450.extensions.touch.gripper_sensors import (
-    GripperSensors,
-    distance_value,
-    force_value,
-)
-from katana450.extensions.touch.squeeze import FORCE_LIMIT
 
 OPEN_ENCODER, CLOSED_ENCODER = 30770, 12240
 """Counts of the open and the closed gripper."""
@@ -31,8 +21,11 @@ GAPS = (
 
 CLOSED_ANGLE, OPEN_ANGLE = GAPS[0][0], GAPS[-1][0]
 
-OPEN_GAP = GAPS[-1][1]
-"""[mm] Distance of everything that is not between the fingers."""
+SENSORS = 16
+"""Number of bytes in an answer."""
+
+FORCE_SENSORS = (6, 7, 14, 15)
+"""Places of the force sensors: rear and front of the right finger, then of the left one."""
 
 
 def encoder_at_gap(gap: float) -> float:
@@ -53,27 +46,10 @@ def gap_at_encoder(encoder: float) -> float:
     return start + (angle - low) / (high - low) * (end - start)
 
 
-def sensor_values(encoder: float, width: float | None, squeeze: float) -> tuple[int, ...]:
-    """Return the bytes (16,) of all sensors.
+def sensor_values(squeeze: float) -> tuple[int, ...]:
+    """Return the bytes (16,) of all sensors. The others read 0: how they behave is not known.
 
-    Args:
-        encoder: counts of axis 6.
-        width: width of the object between the fingers [mm]; None without one.
-        squeeze: force on it, as a fraction of the whole effort of the motor.
+    ``squeeze``: force on the object, as a fraction of the whole effort of the motor.
     """
-    beside = 0.5e-3 * max(gap_at_encoder(encoder) - (width or 0.0), 0.0)
-    near = distance_value(beside)
-    # Half of a pad has one of its two sensors.
-    force = force_value(0.5 * FORCE_LIMIT * squeeze)
-    sensors = GripperSensors(
-        right_near_distance=near,
-        right_far_distance=near,
-        right_rear_force=force,
-        right_front_force=force,
-        left_near_distance=near,
-        left_far_distance=near,
-        left_rear_force=force,
-        left_front_force=force,
-        centre_distance=distance_value(1e-3 * (OPEN_GAP if width is None else 0.0)),
-    )
-    return tuple(sensors.to_bytes())
+    force = min(round(255 * squeeze), 255)
+    return tuple(force if place in FORCE_SENSORS else 0 for place in range(SENSORS))
