@@ -21,7 +21,7 @@ from katana450.extensions.reachability.reachability_file import load_map
 from tests.general_arms.links_of_arms import ur5e
 
 ROOT = Path(__file__).resolve().parents[2]
-COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4", "--samples", "30")
+COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4")
 
 
 def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,7 +76,7 @@ def test_map_that_takes_too_long_is_refused_at_once(
 def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
     one, two = tmp_path / "one.npz", tmp_path / "two.npz"
     for path in (one, two):
-        assert main(["workspace", *COARSE, "--seed", "5", "--out", str(path)]) == 0
+        assert main(["workspace", *COARSE, "--out", str(path)]) == 0
     assert one.read_bytes() == two.read_bytes()
 
 
@@ -97,7 +97,6 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
     assert main(["workspace", *COARSE, "--table", "300", "--out", str(out)]) == 0
     assert load_map(out).points[:, 2].min() >= 0.3
     with np.load(out) as arrays:
-        assert arrays["cloud"][:, 2].min() >= 0.3
         assert arrays["table"].item() == pytest.approx(0.3)
 
 
@@ -112,8 +111,6 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
         (["--voxel", "inf"], "edge of a voxel"),
         (["--pitches", "0"], "number of pitches is 0"),
         (["--rolls", "100000"], "must be from 1 to 720"),
-        (["--samples", "-1"], "number of samples is -1"),
-        (["--seed", "-1"], "seed is -1"),
         (["--out", "map.txt"], "must end in .npz"),
         (["--ply", "map.npz"], "must end in .ply"),
         (["--out", "/nowhere/at/all/map.npz"], "no directory"),

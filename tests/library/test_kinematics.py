@@ -149,10 +149,9 @@ def test_tool_is_chosen_when_the_arm_is_loaded(mounted: MountedArm) -> None:
 
 
 def test_reachability_map_is_in_the_base_frame(shoulder_arm: katana450.Arm) -> None:
-    found = shoulder_arm.reachability(0.1, pitches=12, rolls=8, samples=50)
+    found = shoulder_arm.reachability(0.1, pitches=12, rolls=8)
     assert (found.points[:, 2] > 0.0).all()
     assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
-    assert 0 < len(found.cloud) <= 50
 
 
 Refused = Callable[[katana450.Arm], Any]

@@ -25,6 +25,7 @@ from tests.general_arms.published_arms import (
     SKEWED_6,
     UR5E,
 )
+from tests.workspace.base_frame import in_base
 
 STAND = se3.from_rotation_translation(so3.rotation_z(0.7), np.array([0.1, -0.2, 0.3]))
 """{S} in the base frame of an arm that does not stand at the origin."""
@@ -53,7 +54,7 @@ def test_orientation_of_home_is_possible_where_a_posture_has_it(chain: Chain, mi
     found = 0
     for q in inside(chain, 12, 1):
         every = reachability(chain, q)
-        p = every.in_base(forward(chain, q)[None, :3, 3])
+        p = in_base(every, forward(chain, q)[None, :3, 3])
         ((possible, at_home),) = every.count(p).tolist()
         assert possible >= at_home
         found += at_home
@@ -72,7 +73,7 @@ def test_count_is_that_of_poses_which_a_single_solution_takes(chain: Chain) -> N
             T = se3.from_rotation_translation(STAND[:3, :3].T @ R, point)
             taken += any(each.exact and each.within_limits for each in solver.inverse(T))
         counted.append(taken)
-    found = every.count(every.in_base(np.array(points)))
+    found = every.count(in_base(every, np.array(points)))
     assert (found[:, 0] - found[:, 1]).tolist() == counted
     assert 0 < sum(counted) < 4 * 18
 
@@ -95,14 +96,14 @@ def test_four_axes_count_directions_by_which_two_links_meet_the_wrist() -> None:
             far = math.dist(end, (shoulder[0] - foot[0], shoulder[2]))
             count += abs(upper - lower) < far < upper + lower
         counted.append(count)
-    found = every.count(every.in_base(points))
+    found = every.count(in_base(every, points))
     assert (found[:, 0] - found[:, 1]).tolist() == counted
     assert 0 < min(counted) < max(counted) <= steps
 
 
 def test_points_out_of_reach_or_below_the_table_count_nothing() -> None:
     q = DrivenTool(UR5E).ready((), STAND)
-    p = reachability(UR5E, q).in_base(forward(UR5E, q)[None, :3, 3])
+    p = in_base(reachability(UR5E, q), forward(UR5E, q)[None, :3, 3])
     assert reachability(UR5E, q).count(p)[0, 1] == 1
     height = float(p[0, 2])
     assert reachability(UR5E, q, table=height + 0.01).count(p).tolist() == [[0, 0]]
@@ -139,8 +140,8 @@ def test_three_axes_reach_points_in_some_orientation() -> None:
     every = reachability(three, np.zeros(3))
     assert every.orientations == 1
     points = np.array([forward(three, q)[:3, 3] for q in inside(three, 8, 8)])
-    assert every.count(every.in_base(points)).tolist() == [1] * 8
-    assert every.count(every.in_base(points + 1.0)).tolist() == [0] * 8
+    assert every.count(in_base(every, points)).tolist() == [1] * 8
+    assert every.count(in_base(every, points + 1.0)).tolist() == [0] * 8
 
 
 @pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, UR5E, PANDA])

@@ -20,6 +20,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.projection import project
 from tests.kinematics.family import member, random_offsets
+from tests.workspace.base_frame import in_base
 
 ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
@@ -59,7 +60,7 @@ def test_orientations_from_forward_kinematics_are_counted(
     # With its back to the point, the arm has the tool inward, at pitch pi and not 0.
     outward = (T[:, :2, 0] * T[:, :2, 3]).sum(axis=1) > 0.0
     assert outward.sum() > 20
-    assert (level.count(level.in_base(T[outward, :3, 3])) == 1).all()
+    assert (level.count(in_base(level, T[outward, :3, 3])) == 1).all()
 
 
 def of_the_katana(arm: MountedArm, tool: str) -> Reachability:
@@ -122,7 +123,7 @@ def test_the_count_is_that_of_poses_unchanged_by_the_projection(
     inside = np.array([forward(chain, each)[:3, 3] for each in q])
     points = np.concatenate([inside, [[0.3, 0.2, 0.2], [-0.2, 0.01, 0.1], [0.9, 0.0, 0.0]]])
     in_canonical = points @ canonical.T_C_S[:3, :3].T + canonical.T_C_S[:3, 3]
-    for p, count in zip(in_canonical, every.count(every.in_base(points)), strict=True):
+    for p, count in zip(in_canonical, every.count(in_base(every, points)), strict=True):
         possible = np.zeros((every.pitches, every.rolls), dtype=bool)
         for number in range(every.rolls):
             for poses in every.tool_poses(p[None], number):
@@ -131,7 +132,7 @@ def test_the_count_is_that_of_poses_unchanged_by_the_projection(
                     exact = nearest.position_error < 1e-8 and nearest.rotation_error < 1e-8
                     possible[pitch, number] |= exact
         assert count == possible.sum()
-    assert every.count(every.in_base(inside)).max() > 0
+    assert every.count(in_base(every, inside)).max() > 0
 
 
 def test_a_point_on_axis_1_can_be_counted(arm: MountedArm) -> None:
@@ -184,7 +185,7 @@ def test_rolls_are_those_that_axis_5_can_turn(arm: MountedArm) -> None:
     """Axis 5 turns from -164.5 to 171.5 deg, and only the front shoulder is inside the limits."""
     whole_degrees = reachability(arm, pitches=1, rolls=360)
     p = forward(whole_degrees.chain, np.array([0.0, -0.8, 1.2, -0.4, 0.0]))[None, :3, 3]
-    assert whole_degrees.count(whole_degrees.in_base(p)).tolist() == [336]
+    assert whole_degrees.count(in_base(whole_degrees, p)).tolist() == [336]
 
 
 def test_every_limit_counts(arm: MountedArm) -> None:

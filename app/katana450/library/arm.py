@@ -369,8 +369,6 @@ class Arm:
         table: float = 0.0,
         pitches: int = 36,
         rolls: int = 24,
-        samples: int = 0,
-        seed: int = 0,
     ) -> ReachabilityMap:
         """Map where the tool can be, and which fraction of orientations it can have there.
 
@@ -382,12 +380,10 @@ class Arm:
             table: height of the table in the base frame [m].
             pitches: number of pitches to try.
             rolls: number of rolls to try.
-            samples: number of random postures whose tool points are returned as ``cloud``.
-            seed: seed of these postures.
 
         Returns:
-            a map with ``points`` (N, 3) [m], always in the base frame, ``fraction`` (N,), the
-            fraction of orientations, and ``cloud`` (K, 3) [m].
+            a map with ``points`` (N, 3) [m], always in the base frame, and ``fraction`` (N,), the
+            fraction of orientations.
 
         Raises:
             InputError: the numbers are invalid.
@@ -398,7 +394,7 @@ class Arm:
         True
         """
         reach = Reachability(self.chain, self._mounted.T_base_shoulder, table, pitches, rolls)
-        survey = Survey(reach, voxel, samples, seed)
+        survey = Survey(reach, voxel)
         return survey.map(survey.count(chunk) for chunk in survey.chunks())
 
     def show(

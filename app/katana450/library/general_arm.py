@@ -132,8 +132,6 @@ class GeneralArm(Arm):
         table: float = 0.0,
         pitches: int | None = None,
         rolls: int | None = None,
-        samples: int = 0,
-        seed: int = 0,
     ) -> ReachabilityMap:
         """Map where the tool can be, and which fraction of orientations it can have there.
 
@@ -145,7 +143,7 @@ class GeneralArm(Arm):
         would take too long.
         """
         home, T = self._mounted.ready(Settings.ready), self.described.T_base_shoulder
-        options = MapOptions(table, voxel, pitches, rolls, samples, seed)
+        options = MapOptions(table, voxel, pitches, rolls)
         survey = survey_of(self.chain, T, home, options)
         return survey.map(survey.count(chunk) for chunk in survey.chunks())
 

@@ -42,17 +42,7 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         help="rolls of the tool tried for each pitch or direction, all round (default: 24; from "
         "six axes on 2, 4 or 6)",
     )
-    parser.add_argument(
-        "--samples",
-        type=int,
-        default=20_000,
-        metavar="N",
-        help="random postures for the cloud of tool points (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=0, help="seed of the random postures (default: %(default)s)"
-    )
-    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for map and cloud")
+    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for the map")
     parser.add_argument(
         "--ply", type=Path, metavar="FILE.ply", help="file for the map as coloured points"
     )

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.errors import InputError
-from katana450.extensions.reachability.cloud import tool_cloud
 from katana450.extensions.reachability.grid import IntArray, VoxelGrid
 from katana450.extensions.reachability.pose_reachability import PoseReachability
 from katana450.extensions.reachability.reachability import BoolArray, Reachability
@@ -17,12 +15,6 @@ from katana450.maths.geometry.arrays import FloatArray
 
 POSES = 65536
 """Poses per chunk: 50 MB each, and enough chunks for a progress bar and all cores."""
-
-MAX_MAP_SAMPLES = 1_000_000
-"""Maximum number of random postures; their poses take 170 MB."""
-
-MAX_SEED = 2**63 - 1
-"""Maximum seed; the file of the map stores it in 64 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +25,12 @@ class ReachabilityMap:
         points: (N, 3) centres of the voxels with at least one orientation, in the order of the
             grid.
         fraction: (N,) fraction of orientations in each voxel, above 0 and up to 1.
-        cloud: (K, 3) tool points at random joint angles.
         at_home: (N,) whether the orientation of the tool at Home is possible there; None for an arm
             whose map does not tell.
     """
 
     points: FloatArray
     fraction: FloatArray
-    cloud: FloatArray
     at_home: BoolArray | None = None
 
 
@@ -51,24 +41,14 @@ class Survey:
     Attributes:
         reachability: the arm and the tested orientations.
         voxel: edge of a voxel [m].
-        samples: number of random postures for the cloud.
-        seed: seed of the random postures.
 
-    Raises InputError for an invalid voxel or table, and for samples or seed out of range.
+    Raises InputError for an invalid voxel or table.
     """
 
     reachability: Reachability | PoseReachability
     voxel: float
-    samples: int
-    seed: int
 
     def __post_init__(self) -> None:
-        for name, value, maximum in (
-            ("number of samples", self.samples, MAX_MAP_SAMPLES),
-            ("seed", self.seed, MAX_SEED),
-        ):
-            if not 0 <= value <= maximum:
-                raise InputError(f"The {name} is {value}; it must be from 0 to {maximum}.")
         # Computed now, because it may raise InputError.
         _ = self.grid
 
@@ -96,6 +76,5 @@ class Survey:
         return ReachabilityMap(
             points=self.grid.centers(reached),
             fraction=found[reached] / self.reachability.orientations,
-            cloud=tool_cloud(self.reachability, self.samples, self.seed),
             at_home=at_home,
         )

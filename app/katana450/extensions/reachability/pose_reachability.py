@@ -169,10 +169,6 @@ class PoseReachability:
                 lowest = np.minimum(lowest, T[:, 2, 3])
         return np.asarray(lowest >= self.table)
 
-    def in_base(self, p: FloatArray) -> FloatArray:
-        """Return points `p` (N, 3) of {S} in the base frame, (N, 3) [m]."""
-        return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
-
 
 def rotations(directions: int, rolls: int) -> FloatArray:
     """Return rotations (directions * rolls, 3, 3) that are spread evenly.

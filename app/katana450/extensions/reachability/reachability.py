@@ -173,10 +173,6 @@ class Reachability:
         wrist = elbow - arm.l2 * np.sin(alpha[..., 1] + alpha[..., 2])
         return np.asarray(np.minimum(elbow, wrist) >= self.table)
 
-    def in_base(self, p: FloatArray) -> FloatArray:
-        """Return points ``p`` (N, 3) of {S} in the base frame, (N, 3) [m]."""
-        return p @ self.T_base_shoulder[:3, :3].T + self.T_base_shoulder[:3, 3]
-
 
 def check_steps(pitches: int, rolls: int) -> None:
     """Raise InputError for a number of steps outside 1 to MAX_STEPS."""

@@ -5,13 +5,11 @@ Keys of the .npz, lengths in m, angles in rad, points in the base frame:
     format           "katana450 reachability 2"
     points (N, 3)    centres of the voxels that the tool reaches
     fraction (N,)    fraction of orientations there, above 0 and up to 1
-    cloud (K, 3)     tool points at random joint angles
     at_home (N,)     whether the orientation of the tool at Home is possible there; only outside the
                      five-axis family
     voxel, table     edge of a voxel; height of the table
     pitches, rolls   number of steps in a turn; from six axes on of directions, and of turns of each
     robot, tool      name of the arm and of its tool frame
-    seed             seed of the cloud
 """
 
 from __future__ import annotations
@@ -72,14 +70,12 @@ def write_npz(
         format=np.array(FORMAT),
         points=found.points,
         fraction=found.fraction,
-        cloud=found.cloud,
         voxel=np.array(survey.voxel),
         table=np.array(reachability.table),
         pitches=np.array(reachability.pitches),
         rolls=np.array(reachability.rolls),
         robot=np.array(robot),
         tool=np.array(tool),
-        seed=np.array(survey.seed),
     )
 
 

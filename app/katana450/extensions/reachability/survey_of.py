@@ -52,16 +52,12 @@ class MapOptions(NamedTuple):
         table: height of the table in the base frame [m].
         voxel: edge of a voxel [m].
         pitches, rolls: numbers of steps of the orientation.
-        samples: number of random postures for the cloud.
-        seed: seed of the random postures.
     """
 
     table: float = 0.0
     voxel: float | None = None
     pitches: int | None = None
     rolls: int | None = None
-    samples: int = 0
-    seed: int = 0
 
 
 def survey_of(
@@ -79,12 +75,12 @@ def survey_of(
         InputError: a value is out of range, or the map would take too long.
         RobotDescriptionError: axis 1 of a five-axis arm is not upright.
     """
-    table, voxel, pitches, rolls, samples, seed = options
+    table, voxel, pitches, rolls = options
     kinematics = kinematics_of(chain)
     if isinstance(kinematics, FiveAxisKinematics):
         steps = PITCHES if pitches is None else pitches, ROLLS if rolls is None else rolls
         reach = Reachability(chain, T_base_shoulder, table, *steps)
-        return Survey(reach, VOXEL if voxel is None else voxel, samples, seed)
+        return Survey(reach, VOXEL if voxel is None else voxel)
     fineness = _fineness(kinematics)
     reachability = PoseReachability(
         chain,
@@ -96,7 +92,7 @@ def survey_of(
     )
     if voxel is None:
         voxel = ROUND * math.ceil(reachability.reach / fineness.voxels / ROUND)
-    survey = Survey(reachability, voxel, samples, seed)
+    survey = Survey(reachability, voxel)
     poses = len(survey.grid) * reachability.orientations
     if poses > fineness.poses:
         raise InputError(

@@ -44,8 +44,6 @@ def workspace(options: argparse.Namespace) -> int:
             None if options.voxel is None else 1e-3 * options.voxel,
             options.pitches,
             options.rolls,
-            options.samples,
-            options.seed,
         ),
     )
     found = survey.map(_counts(survey))
