@@ -121,7 +121,7 @@ class _BendableStretch:
         )
 
 
-HOSE = Material("rubber", (0.035, 0.035, 0.04), rough=0.6)
+HOSE = Material("rubber", (0.035, 0.035, 0.04))
 """Material of the conduit."""
 
 

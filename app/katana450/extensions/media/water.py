@@ -14,7 +14,6 @@ from katana450.extensions.water.nodes import (
     IN_VESSEL,
     INSET,
     ON_TABLE,
-    ROUGH,
     TWIST,
     WORTH_SHOWING,
 )
@@ -44,7 +43,7 @@ CUP, STREAM, BASIN, PUDDLE = (
 """Names of the items of water."""
 
 RED, GREEN, BLUE = COLOUR
-MATERIAL = Material("water", (RED / 255.0, GREEN / 255.0, BLUE / 255.0), 0.0, ROUGH)
+MATERIAL = Material("water", (RED / 255.0, GREEN / 255.0, BLUE / 255.0))
 """Material of all water."""
 
 
