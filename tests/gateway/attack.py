@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import select
 import socket
 import time
 from collections import Counter
@@ -51,12 +50,6 @@ def closed(sockets: list[socket.socket], seconds: float) -> int:
             except OSError:
                 left.discard(each)
     return len(sockets) - len(left)
-
-
-def answered(sockets: list[socket.socket], seconds: float) -> int:
-    """Return the number of ``sockets`` on which data arrives within ``seconds``."""
-    time.sleep(seconds)
-    return len(select.select(sockets, [], [], 0.0)[0])
 
 
 @asynccontextmanager

@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-import numpy as np
 import pytest
 
 from katana450.assembly.robot_session import DescribedRobot
@@ -88,15 +87,6 @@ def test_stop_withdraws_the_offer(program: Client) -> None:
 
 
 @pytest.mark.long
-def test_new_offer_follows_a_change_of_the_world(program: Client) -> None:
-    held_at_the_gap(program)
-    program.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.02]))
-    wait_for(program, lambda state: state.detour is not None)
-    program.ask(requests.Remove(name="ball"))
-    wait_for(program, lambda state: state.detour is not None)
-
-
-@pytest.mark.long
 def test_command_line_takes_the_detour(live_program: Client, server: AppServer) -> None:
     live_program.go(requests.Home())
     live_program.ask(requests.ReleaseLease())
@@ -111,34 +101,3 @@ def test_command_line_takes_the_detour(live_program: Client, server: AppServer) 
     assert done.returncode == 0, done.stderr
     assert "Taking a 2.9 s detour." in done.stdout
     assert distance(live_program.query(answers.State)) < 1e-6
-
-
-@pytest.fixture
-def automatic(described: DescribedRobot) -> Iterator[VirtualServer]:
-    with VirtualServer(described, "--go-on-release", detours=True) as server:
-        yield server
-
-
-@pytest.mark.long
-def test_setting_takes_the_detour_when_the_hand_lets_go(automatic: VirtualServer) -> None:
-    with automatic.connect("Test") as program:
-        state = held_at_the_gap(program)
-        time.sleep(0.5)
-        # A hand that rests is not a hand that lets go.
-        assert program.query(answers.State).q == state.q
-        program.ask(requests.EndDrag())
-        arrived = wait_for(program, lambda state: distance(state) < 1e-6 and not state.moving)
-        assert arrived.branch == state.branch
-
-
-@pytest.mark.long
-def test_setting_takes_no_detour_after_a_stop(automatic: VirtualServer) -> None:
-    with automatic.connect("Test") as program:
-        state = held_at_the_gap(program)
-        program.ask(requests.EndDrag())
-        program.ask(requests.Stop())
-        stopped = wait_for(program, lambda now: now.stop == "confirmed" and not now.moving)
-        program.clear_stop()
-        time.sleep(1.0)
-        np.testing.assert_allclose(program.query(answers.State).q, stopped.q, atol=1e-9)
-        assert distance(state) > 0.01

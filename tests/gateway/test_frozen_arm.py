@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import sys
 import time
@@ -14,10 +13,9 @@ import pytest
 from katana450.client import connect
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer
-from tests.gateway.client import ask, controlling
+from tests.gateway.client import ask
 from tests.gateway.lines import speaking
 from tests.gateway.postures import FAR
-from tests.gateway.test_isolation import under_way
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
@@ -62,47 +60,6 @@ if __name__ == "__main__":
 def state_of(server: AppServer) -> dict[str, object]:
     state: dict[str, object] = json.loads(ask(f"{server.url}/api/v1/state")[2])
     return state
-
-
-@pytest.mark.long
-def test_frozen_arm_is_reported_and_a_stop_is_requested_until_it_confirms() -> None:
-    async def act(server: AppServer) -> None:
-        async with controlling(server.url) as control:
-            with connect(server.url, "Driver") as arm:
-                before = await asyncio.to_thread(under_way, arm)
-                assert ask(f"{server.url}/health")[0] == 200
-                with server.frozen(server.arm):
-                    began = time.monotonic()
-                    await control.wait(headline="No answer from the arm")
-                    assert time.monotonic() - began < 2 * REPORTED
-                    status, _, body = ask(f"{server.url}/health")
-                    assert (status, b"No answer from the arm" in body) == (503, True)
-                    await control.say("stop")
-                    shown = await control.wait(stop="requested")
-                    assert (shown["mood"], shown["headline"]) == ("stopped", "Stop requested")
-                    assert "not confirmed" in shown["why"]
-                    # Longer than it takes to fill a pipe with heartbeats: STOP is still answered.
-                    await asyncio.sleep(6.0)
-                    state = arm.query(answers.State)
-                    assert state.stop == "requested"
-                    assert state.age > 6.0
-                    assert control.status["stop"] == "requested"
-                    assert isinstance(arm.ask(requests.Stop()), answers.Done)
-                    assert ask(f"{server.url}/health")[0] == 503
-                shown = await control.wait(stop="confirmed", headline="Stopped")
-                assert (shown["mood"], shown["headline"]) == ("stopped", "Stopped")
-                await asyncio.sleep(1.0)
-                state = arm.query(answers.State)
-                assert state.stop == "confirmed"
-                assert state.age < 1.0
-                assert not state.moving
-                # The arm continued from its place to where it could brake.
-                assert state.q[0] - before.q[0] < 1.5
-                assert state.q[0] < FAR[0] - 0.2
-                assert ask(f"{server.url}/health")[::2] == (200, b"ok\n")
-
-    with AppServer(ATTENTIVE_APP) as server:
-        asyncio.run(act(server))
 
 
 def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 
-from tests.browser.server import AppServer
-from tests.gateway.client import Control, ask, controlling, enter, page_name
+from tests.gateway.client import Control
 from tests.gateway.virtual import VirtualServer
 
 SCRIPT = """\
@@ -106,33 +104,3 @@ def test_former_driver_gets_the_name_of_the_new_one(local: VirtualServer, by_pro
             await driver.wait(mine=True, taken="")
 
     local.run(act())
-
-
-@pytest.mark.long
-def test_stop_names_the_page_that_pressed_it_after_a_restart() -> None:
-    page = page_name()
-
-    def press(server: AppServer, cookie: str) -> str | None:
-        stop = f"{server.url}/stop?press=one&page={page}"
-        assert ask(stop, data=b"", Origin=server.url, Cookie=cookie)[0] == 204
-        state = json.loads(ask(f"{server.url}/api/v1/state")[2])
-        stopped: str | None = state["stopped"]
-        return stopped
-
-    async def name(server: AppServer, cookie: str) -> str:
-        async with controlling(server.url, cookie, page) as control:
-            name_shown: str = (await control.wait())["name"]
-            return name_shown
-
-    with AppServer() as server:
-        cookie = enter(server.url)
-        assert press(server, cookie) == f"{asyncio.run(name(server, cookie))} pressed STOP."
-        server.restart()
-        # The page has no socket yet; with a socket it is the same person.
-        stopped = press(server, cookie)
-        assert stopped == f"{asyncio.run(name(server, cookie))} pressed STOP."
-        assert "Somebody" not in stopped
-        # A page without a key of its own cannot be identified.
-        server.restart()
-        page = "short"
-        assert press(server, cookie) == "Somebody pressed STOP."

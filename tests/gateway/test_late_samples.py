@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import random
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -19,9 +17,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state import Reason
-from katana450.client.asynchronous import aconnect
 from katana450.errors import LeaseError
-from katana450.server.api import answers, requests
+from katana450.server.api import requests
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.least_delay import WINDOW, LeastDelay
@@ -29,9 +26,6 @@ from katana450.server.service.participants import Participant
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import MessageFilter, Ruling
 from katana450.settings import Settings
-from tests.browser.server import SIMULATION_APP, AppServer
-from tests.gateway.client import websocket
-from tests.gateway.delayed_link import DelayedLink
 from tests.gateway.test_command_gate import Hooked
 from tests.gateway.test_hub import PAGES, Table, moves
 from tests.viser_bridge import internals
@@ -101,7 +95,7 @@ def test_longer_route_counts_as_usual_only_after_rest() -> None:
 def test_none_of_many_late_samples_is_executed(table: Table) -> None:
     client, random_delays = Client(table), random.Random(450)
     late = executed = 0
-    while late < 10_000:
+    while late < 2_000:
         table.t += 0.02
         client.delay = 0.03 + random_delays.choice((0.1, 0.4, 2.0)) * random_delays.random()
         before = len(table.arm.commands)
@@ -113,7 +107,7 @@ def test_none_of_many_late_samples_is_executed(table: Table) -> None:
         late += is_late
         executed += is_late and len(table.arm.commands) > before
     assert executed == 0
-    assert len(table.arm.commands) > 5_000
+    assert len(table.arm.commands) > 1_000
 
 
 def test_late_samples_are_refused_and_their_end_is_not(table: Table) -> None:
@@ -233,46 +227,3 @@ def test_time_of_a_message_of_viser_is_taken_from_it() -> None:
             assert (result.ruling, result.message) == (Ruling.DROP, None)
     finally:
         server.stop()
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer(SIMULATION_APP) as server:
-        yield server
-
-
-@pytest.mark.long
-def test_arm_rests_when_a_hand_lets_go_on_a_line_that_has_become_slow(server: AppServer) -> None:
-    """A hand jogs, while the line becomes 0.8 s slower without any silence."""
-
-    async def travel(link: DelayedLink) -> float:
-        async with aconnect(server.url) as watcher:
-            url = f"http://127.0.0.1:{link.port}"
-            async with websocket(url, "/api/v1/socket?name=Hand", origin=None) as socket:
-
-                async def say(do: str, **fields: Any) -> None:
-                    await socket.send(json.dumps({"do": do, **fields, "made": time.monotonic()}))
-
-                start = (await watcher.query(answers.State)).T
-                for number in range(36):
-                    await say("heartbeat")
-                    await say("jog", rates=FORWARD)
-                    link.delay = 0.04 * max(number - 16, 0)
-                    await asyncio.sleep(0.04)
-                await say("jog", rates=(0.0,) * 5)
-                before = (await watcher.query(answers.State)).T
-                async with asyncio.timeout(5.0):
-                    while "s late" not in json.loads(await socket.recv()).get("why", ""):
-                        pass
-                    while (await watcher.query(answers.State)).moving:
-                        await asyncio.sleep(0.1)
-                after = (await watcher.query(answers.State)).T
-        assert math.dist(column(start), column(before)) > 0.02
-        return math.dist(column(before), column(after))
-
-    with DelayedLink(server.port) as link:
-        assert asyncio.run(travel(link)) < 0.005
-
-
-def column(T: Any) -> list[float]:
-    return [row[3] for row in T[:3]]

@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -19,10 +12,7 @@ from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.command_gate import SETTLE_TIME
-from tests.browser.server import ROOT, SIMULATION_APP, AppServer
-from tests.gateway.client import ask
 from tests.gateway.test_hub import PAGES
-from tests.gateway.test_program_owner import wait
 from tests.gateway.test_program_runner import Staged
 
 LATE = Finding(Reason.SERVER_SILENT, 0.28)
@@ -76,34 +66,3 @@ def test_lost_owner_ends_the_paused_program(table: LateServer) -> None:
     progress = table.programs.progress()
     assert progress is not None
     assert (progress.status, "sends no heartbeats" in progress.why) == ("stopped", True)
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer(SIMULATION_APP) as server:
-        yield server
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the front end as Linux lists processes")
-def test_program_reaches_its_end_although_the_server_was_late(
-    server: AppServer, tmp_path: Path
-) -> None:
-    script = tmp_path / "wave.yaml"
-    script.write_text(
-        "name: Wave\nspeed: 0.6\nsteps:\n  - joints: [100, -60, 85, 8, 0]\n  - home\n"
-    )
-    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, cwd=ROOT) as owner:
-        try:
-            while wait(server, "running")["q"][0] < 0.02:
-                time.sleep(0.02)
-            front = server.front
-            os.kill(front, signal.SIGSTOP)
-            time.sleep(0.5)
-            os.kill(front, signal.SIGCONT)
-            assert owner.wait(60.0) == 0
-        finally:
-            owner.kill()
-    assert "The program Wave continues after a pause" in server.output
-    assert ask(f"{server.url}/health")[0] == 200

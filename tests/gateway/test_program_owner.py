@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.extensions.programs.extension import OWNER_SILENCE
-from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
+from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask
 from tests.gateway.lines import post
 from tests.gateway.virtual import VirtualServer
@@ -66,35 +61,6 @@ def clear_stop(server: AppServer) -> None:
     # The lease stays free for the owner of a program that was stopped.
     if state_of(server)["holder"] is not None:
         assert post(server, do="release_lease")[0] == 200
-
-
-@pytest.mark.long
-def test_frozen_command_line_ends_its_program(server: AppServer, tmp_path: Path) -> None:
-    script = tmp_path / "wave.yaml"
-    script.write_text(SCRIPT)
-    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
-    with subprocess.Popen(
-        command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=ROOT
-    ) as owner:
-        try:
-            wait(server, "running")
-            time.sleep(1.5 * OWNER_SILENCE)
-            # The program runs while heartbeats of the owner arrive.
-            assert wait(server, "running", 1.0)["moving"]
-            os.kill(owner.pid, signal.SIGSTOP)
-            began = time.monotonic()
-            state = wait(server, "stopped")
-            took = time.monotonic() - began
-        finally:
-            os.kill(owner.pid, signal.SIGCONT)
-            owner.kill()
-    assert took < OWNER_SILENCE + BRAKING
-    why = "Terminal sends no heartbeats. A program ends without its owner."
-    assert state["program"]["why"] == why
-    # The arm rests on its path. It is not stopped, and the lease is free.
-    assert (state["stopped"], state["holder"]) == (None, None)
-    assert 0.05 < state["q"][0] < np.deg2rad(100) - 0.05
-    clear_stop(server)
 
 
 def test_silent_owner_on_an_open_socket_ends_its_program(local: VirtualServer) -> None:

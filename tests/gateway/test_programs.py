@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
-from tests.browser.server import AppServer
 from tests.gateway.virtual import VirtualServer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -146,37 +141,3 @@ def test_script_that_is_too_long_is_refused(arm: Client) -> None:
         arm.ask(Program(text=part, more=True))
     with pytest.raises(RefusedError, match="at most 64 KB"):
         arm.ask(Program(text=part, more=True))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("interrupted", [False, True])
-def test_program_runs_from_the_command_line(
-    server: AppServer, tmp_path: Path, interrupted: bool
-) -> None:
-    script = tmp_path / "script.yaml"
-    script.write_text(THERE_AND_BACK)
-    command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=ROOT
-    ) as process:
-        assert process.stdout is not None
-        output = ""
-        for line in process.stdout:
-            output += line
-            if interrupted and "line 3" in line:
-                time.sleep(0.4)
-                os.kill(process.pid, signal.SIGINT)
-        assert process.stderr is not None
-        error = process.stderr.read()
-        process.wait(timeout=10)
-    assert process.returncode == (130 if interrupted else 0), error
-    assert "Traceback" not in error
-    assert ("the arm holds" in error) if interrupted else ("Done." in output)
-    with connect(server.url, "Watcher") as watcher:
-        state = watcher.query(answers.State)
-        assert state.program is not None
-        assert state.program.status == ("stopped" if interrupted else "done")
-        assert state.holder is None
-        watcher.go(requests.Home())
-        assert not watcher.query(answers.State).moving
-        watcher.ask(requests.ReleaseLease())

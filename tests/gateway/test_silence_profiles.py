@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-import time
-
 import numpy as np
 import pytest
 
@@ -24,9 +19,8 @@ from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
 from katana450.settings import Settings
-from tests.browser.server import SIMULATION_APP, AppServer
+from tests.browser.server import AppServer
 from tests.gateway.test_hub import PAGES, Table, moves
-from tests.gateway.test_isolation import under_way
 
 JOG = cmd.SetJoints(np.zeros(5))
 
@@ -174,28 +168,6 @@ def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Part
     table.hub.close(Identity("session", None, Role.ADMIN), PAGES[1])
     assert table.hub.lease.driver == driver.person
     assert table.hub.stopped is None
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the front end as Linux lists processes")
-def test_frozen_front_end_pauses_a_simulated_arm() -> None:
-    with AppServer(SIMULATION_APP) as server, connect(server.url, "Driver") as arm:
-        assert under_way(arm).silence_profile == "simulation"
-        front = server.front
-        os.kill(front, signal.SIGSTOP)
-        time.sleep(0.5)
-        os.kill(front, signal.SIGCONT)
-        end = time.monotonic() + 10.0
-        while (state := arm.query(answers.State)).status != "paused" or state.moving:
-            assert time.monotonic() < end
-            time.sleep(0.02)
-        assert state.stopped is None
-        assert "silent" in state.why or "late" in state.why
-        time.sleep(2 * SETTLE_TIME)
-        again = arm.query(answers.State)
-        np.testing.assert_array_equal(again.q, state.q)
-        there = [again.q[0] - 0.2, *again.q[1:]]
-        assert arm.joints(there).status == "ok"
 
 
 def test_profile_of_a_real_arm_can_be_forced(server: AppServer) -> None:

@@ -60,22 +60,3 @@ def test_unattended_program_outlives_its_terminal(
     assert state["holder"] is None
     clear_stop(server)
     assert state_of(server)["stopped"] is None
-
-
-@pytest.mark.long
-def test_server_option_refuses_unattended_programs(tmp_path: Path) -> None:
-    script = tmp_path / "wave.yaml"
-    script.write_text(SCRIPT)
-    with AppServer((*ATTENTIVE_APP, "--no-unattended")) as server:
-        command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
-        done = subprocess.run(
-            [*command, "--unattended"],
-            capture_output=True,
-            text=True,
-            cwd=ROOT,
-            timeout=60,
-            check=False,
-        )
-        assert done.returncode == 1
-        assert "Unattended programs are not allowed on this server." in done.stderr
-        assert not state_of(server)["moving"]
