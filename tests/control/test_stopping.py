@@ -85,6 +85,24 @@ def test_joined_stops_have_all_presses_and_the_first_cause(second: cmd.Stop) -> 
     assert both.presses == ("one", *second.presses)
 
 
+def test_joined_stops_keep_the_newest_presses() -> None:
+    presses = tuple(str(number) for number in range(REPORTED_PRESSES + 2))
+    both = joined(cmd.Stop(ANNA, others=presses[:2]), cmd.Stop(BERT, others=presses[2:]))
+    assert both.others == presses[2:]
+
+
+def test_fingers_rest_after_a_stop_and_during_a_pause(session: Session, state: State) -> None:
+    moving = run(session, state, cmd.SetJoints(np.zeros(5)), cmd.SetGripper(0.4), ticks=20)
+    assert moving.gripper_setpoint != moving.gripper_goal
+    paused = run(session, moving, cmd.Pause(), ticks=20)
+    assert paused.gripper_setpoint == moving.gripper_setpoint
+    stopped = run(session, moving, cmd.Stop(ANNA), ticks=150)
+    cleared = run(session, stopped, cmd.ClearStop(), ticks=20)
+    assert cleared.stopped is None
+    # They do not continue when the stop is cleared.
+    assert cleared.gripper_setpoint == moving.gripper_setpoint
+
+
 def test_stop_without_a_press_still_counts_when_it_is_joined() -> None:
     both = joined(cmd.Stop(ANNA), cmd.Stop(WATCHDOG))
     assert (both.cause.press, both.presses) == ("", ("one",))

@@ -33,6 +33,12 @@ def test_link_is_valid_for_its_person_until_it_expires(file: AccessFile) -> None
     assert found is not None
     assert (found[1].name, found[1].role) == ("Anna", Role.OPERATOR)
     assert file.check(token, 1000.0) is None
+    # The end that the token names counts too.
+    number, secret = found[0], json.loads(file.path.read_text())["secret"]
+    for expires in (500.0, 2000.0):
+        other = URLSafeSerializer(secret, salt=SALT).dumps([number, expires])
+        assert file.check(other, min(expires, 1000.0) - 1.0) is not None
+        assert file.check(other, min(expires, 1000.0)) is None
 
 
 def test_revoked_link_is_invalid(file: AccessFile) -> None:

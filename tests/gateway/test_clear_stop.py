@@ -239,6 +239,12 @@ def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> 
     shown = status.common(table.hub) | status.of(table.hub, driver)
     assert (shown["may_clear_stop"], shown["wait"]) == (True, EARLY)
     assert not status.of(table.hub, other)["may_clear_stop"]
+    # A viewer may not, even while nobody drives.
+    viewer = table.person("Vera", Role.VIEWER)
+    table.hub.release_lease(driver)
+    assert status.of(table.hub, driver)["may_clear_stop"]
+    assert not status.of(table.hub, viewer)["may_clear_stop"]
+    table.hub.acquire(driver)
     with pytest.raises(LeaseError, match=r"Clear the stop in 0\.6 s"):
         table.hub.move(driver, cmd.ClearStop())
     assert table.hub.stopped is not None

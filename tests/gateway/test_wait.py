@@ -306,6 +306,17 @@ def test_number_of_open_requests_is_bounded(local: VirtualServer, watcher: Clien
         rows.answer(do="gripper", angle=0.0, wait=30)
 
 
+def test_refused_request_leaves_the_lease_to_the_one_that_waits(
+    local: VirtualServer, watcher: Client
+) -> None:
+    with moving(local, watcher) as answer:
+        assert local.post(do="joints", q=[0.0], wait=5)[0] == 422
+        now = watcher.query(answers.State)
+        assert (now.moving, now.holder) == (True, "Program")
+        assert answer()[1]["end"]["how"] == "reached"
+    assert watcher.query(answers.State).holder is None
+
+
 @pytest.mark.long
 def test_planned_path_is_waited_for(local: VirtualServer, watcher: Client) -> None:
     q = np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)).tolist()
