@@ -75,6 +75,20 @@ def test_every_operation_of_openapi_has_a_name_of_its_own() -> None:
     assert openapi()["servers"][0]["url"] == "/"
 
 
+def test_every_refusal_of_openapi_has_the_schema_of_a_refusal() -> None:
+    operations = [each for path in openapi()["paths"].values() for each in path.values()]
+    refusals = [
+        (status, response.get("content"))
+        for each in operations
+        for status, response in each["responses"].items()
+        if status.startswith("4")
+    ]
+    schema = {"$ref": "#/components/schemas/Refused"}
+    assert len(refusals) > 50
+    assert [status for status, content in refusals if content is None] == []
+    assert all(schema == each["application/json"]["schema"] for _, each in refusals)
+
+
 def test_fields_are_described_with_their_units() -> None:
     schemas = openapi()["components"]["schemas"]
     assert schemas["Margins"]["properties"]["limits"]["description"].count("[rad]")

@@ -97,7 +97,9 @@ def port(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Port]:
 )
 def test_invalid_requests_are_refused(port: Port, more: list[tuple[str, str]]) -> None:
     request = h11.Request(method="POST", target="/api/v1/stop", headers=more)
-    assert asyncio.run(port.server.reply(request, CLIENT)).status == 400
+    reply = asyncio.run(port.server.reply(request, CLIENT))
+    assert reply.status == 400
+    assert json.loads(reply.body)["code"] == "malformed"
     assert port.sent == []
 
 

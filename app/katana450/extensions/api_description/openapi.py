@@ -84,16 +84,6 @@ def _first(path: str) -> str:
     return path.strip("/").partition("/")[0].partition("{")[0]
 
 
-COMMON_RESPONSES = {
-    "401": {"description": "A token is required."},
-    "403": {"description": "The sender may not do this."},
-    "429": {"description": "Too many requests, or too costly ones. `Retry-After` says when."},
-}
-"""Responses of every path but the documents."""
-
-NOT_READY = {"503": {"description": "The arm is not ready yet."}}
-
-
 def _question(path: str, kind: type) -> dict[str, Any]:
     return {
         "operationId": f"get_{path}",
@@ -153,8 +143,8 @@ def _do(request: Any, answer: Any) -> dict[str, Any]:
                 {"anyOf": [_reference(answers.Refused), _reference(answers.Done)]},
             ),
             "422": _response("The request is invalid.", answers.Refused),
-            "408": {"description": "The body was not received in time."},
-            "413": {"description": "The body is too large."},
+            "408": _response("The body was not received in time.", answers.Refused),
+            "413": _response("The body is too large.", answers.Refused),
             **COMMON_RESPONSES,
         },
     }
@@ -229,7 +219,7 @@ def _scripts() -> dict[str, Any]:
                 "parameters": [name],
                 "responses": {
                     "200": _content("The text.", "text/plain"),
-                    "404": {"description": "There is no script of this name."},
+                    "404": _response("There is no script of this name.", answers.Refused),
                     **COMMON_RESPONSES,
                 },
             },
@@ -261,7 +251,10 @@ def _recordings() -> dict[str, Any]:
     ]
     number = {"name": "number", "in": "path", "required": True, "schema": {"type": "integer"}}
     json = {"required": True, "content": {"application/json": {"schema": _OBJECT}}}
-    common = {"404": {"description": "There is no such recording here."}, **COMMON_RESPONSES}
+    common = {
+        "404": _response("There is no such recording here.", answers.Refused),
+        **COMMON_RESPONSES,
+    }
     made = {"409": _response("Nothing was recorded, and why.", answers.Refused), **common}
     return {
         "recording": {
@@ -334,7 +327,7 @@ def _upload(media: str, kept: type) -> dict[str, Any]:
         "responses": {
             "200": _response("The file is kept.", kept),
             "422": _response("The file cannot be read.", answers.Refused),
-            "413": {"description": "The file is too large."},
+            "413": _response("The file is too large.", answers.Refused),
             **COMMON_RESPONSES,
             **NOT_READY,
         },
@@ -371,3 +364,15 @@ def _query(
         "schema": {"type": type, **schema},
         "description": description,
     }
+
+
+COMMON_RESPONSES = {
+    "401": _response("A token is required.", answers.Refused),
+    "403": _response("The sender may not do this.", answers.Refused),
+    "429": _response(
+        "Too many requests, or too costly ones. `Retry-After` says when.", answers.Refused
+    ),
+}
+"""Responses of every path but the documents."""
+
+NOT_READY = {"503": _response("The arm is not ready yet.", answers.Refused)}

@@ -19,6 +19,9 @@ VERSION = 1
 ROOT = f"/api/v{VERSION}"
 """Path under which the API is served by HTTP."""
 
+API = "/api/"
+"""Prefix of the paths whose refusals are JSON."""
+
 STOP_PATHS = ("/stop", f"{ROOT}/stop")
 """Paths of STOP, for pages and for programs. They are always answered."""
 

@@ -6,6 +6,21 @@ import msgspec
 
 from katana450.server.api.fields import Answer, Numbers
 
+CODES = {
+    400: "malformed",
+    401: "token_required",
+    403: "forbidden",
+    404: "not_found",
+    405: "method_not_allowed",
+    408: "too_slow",
+    413: "too_long",
+    422: "invalid",
+    429: "too_many",
+    500: "error",
+    503: "not_ready",
+}
+"""Codes of refusals by their HTTP status; others have that of ``Refused``."""
+
 
 class Finding(msgspec.Struct, frozen=True, kw_only=True):
     """A reason why the arm does not reach the target as it was given.
@@ -105,3 +120,7 @@ class Refused(Answer, frozen=True, kw_only=True):
     code: str = "refused"
     retry: float | None = None
     choices: list[str] | None = None
+
+    def with_status(self, status: int) -> Refused:
+        """Return the refusal with the code of the HTTP ``status``."""
+        return msgspec.structs.replace(self, code=CODES.get(status, self.code))

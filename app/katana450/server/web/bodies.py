@@ -6,32 +6,15 @@ import asyncio
 import math
 from collections.abc import Mapping
 
-import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from katana450.server.api import answers
-
-API = "/api/"
-"""Prefix of the paths whose refusals are JSON."""
+from katana450.server.api.fields import API
 
 NOT_NOW, TOO_SLOW, TOO_LONG, NOT_UNDERSTOOD, TOO_MANY = 409, 408, 413, 422, 429
 """HTTP status codes of refusals."""
-
-CODES = {
-    400: "malformed",
-    401: "token_required",
-    403: "forbidden",
-    404: "not_found",
-    405: "method_not_allowed",
-    TOO_SLOW: "too_slow",
-    TOO_LONG: "too_long",
-    NOT_UNDERSTOOD: "invalid",
-    TOO_MANY: "too_many",
-    503: "not_ready",
-}
-"""Codes of refusals by their HTTP status; others have that of ``answers.Refused``."""
 
 BODY_SECONDS = 5.0
 """Timeout for receiving a small body [s]."""
@@ -66,8 +49,8 @@ def as_json(
     answer: answers.Answer, status: int = 200, headers: Mapping[str, str] | None = None
 ) -> Response:
     """Return ``answer`` as an HTTP response."""
-    if isinstance(answer, answers.Refused) and status in CODES:
-        answer = msgspec.structs.replace(answer, code=CODES[status])
+    if isinstance(answer, answers.Refused):
+        answer = answer.with_status(status)
     return Response(answers.encoded(answer), status, headers, media_type="application/json")
 
 

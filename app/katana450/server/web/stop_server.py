@@ -27,7 +27,8 @@ from katana450.arm.control.lease import Person
 from katana450.arm.control.stop_cause import UNNAMED, StopCause, pressed
 from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.errors import InputError
-from katana450.server.api.fields import MAX_PRESS_LENGTH, STOP_PATHS
+from katana450.server.api.fields import API, MAX_PRESS_LENGTH, STOP_PATHS
+from katana450.server.api.outcome_answers import Refused
 from katana450.server.api.stop_requests import Hello, Stop
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.web.acceptor import Acceptor
@@ -87,6 +88,14 @@ class Reply(NamedTuple):
     headers: tuple[tuple[str, str], ...] = ()
 
 
+def refused(path: str, status: int, why: str) -> Reply:
+    """Return the refusal of a request for ``path``: of the API as JSON, else as text."""
+    if not path.startswith(API):
+        return Reply(status, why.encode())
+    answer = Refused(why=why).with_status(status)
+    return Reply(status, msgspec.json.encode(answer) + b"\n", "application/json")
+
+
 class StopServer:
     """Decides each request of the port of STOP."""
 
@@ -113,7 +122,7 @@ class StopServer:
         path, _, query = request.target.decode("latin-1").partition("?")
         origin = headers.get("origin")
         if fault := framing_fault(headers):
-            return await self.delayed(Reply(HTTPStatus.BAD_REQUEST, fault.encode()), client)
+            return await self.delayed(refused(path, HTTPStatus.BAD_REQUEST, fault), client)
         refusal = self._refusal(request.method, path, headers.get("host", ""), origin)
         if refusal is not None:
             return await self.delayed(refusal, client)
@@ -121,8 +130,9 @@ class StopServer:
             return self._health()
         identity = self._identity(path, headers)
         if identity is None:
-            refused = Reply(HTTPStatus.UNAUTHORIZED, b"Sign in at the start page, or send a token.")
-            return await self.delayed(_readable_by(origin, refused), client)
+            why = "Sign in at the start page, or send a token."
+            reply = refused(path, HTTPStatus.UNAUTHORIZED, why)
+            return await self.delayed(_readable_by(origin, reply), client)
         asked = {name: values[0] for name, values in parse_qs(query).items()}
         press = asked.get("press", "")[:MAX_PRESS_LENGTH]
         page = asked.get("page", "") if path == STOP_PATHS[0] else ""
@@ -143,9 +153,7 @@ class StopServer:
         identity = self._authenticator.program(hello.name, token, {}, stopping=True)
         if identity is None:
             return await self.delayed(_refused_line(TOKEN_REQUIRED), client)
-        reply = await self._stop(identity, CommandChannel.TCP, stop.press or "", client)
-        # A refusal over HTTP is plain text.
-        return reply if reply.body.startswith(b"{") else _refused_line(reply.body.decode())
+        return await self._stop(identity, CommandChannel.TCP, stop.press or "", client)
 
     async def delayed(self, reply: Reply, client: tuple[str, int] | None) -> Reply:
         """Return the refusal ``reply``, after ``DELAY`` if ``client`` gets too many."""
@@ -164,21 +172,22 @@ class StopServer:
 
     def _refusal(self, method: bytes, path: str, host: str, origin: str | None) -> Reply | None:
         if not self._address.is_ours(host):
-            return Reply(HTTPStatus.FORBIDDEN, UNKNOWN_HOST.encode())
+            return refused(path, HTTPStatus.FORBIDDEN, UNKNOWN_HOST)
         if path not in (*STOP_PATHS, "/health"):
-            return Reply(HTTPStatus.NOT_FOUND, b"This port serves STOP alone.")
+            return refused(path, HTTPStatus.NOT_FOUND, "This port serves STOP alone.")
         allowed = "POST" if path in STOP_PATHS else "GET"
         if method.decode("latin-1") != allowed:
-            status, words = HTTPStatus.METHOD_NOT_ALLOWED, f"Send {allowed}.".encode()
-            return Reply(status, words, headers=(("allow", allowed),))
+            reply = refused(path, HTTPStatus.METHOD_NOT_ALLOWED, f"Send {allowed}.")
+            return reply._replace(headers=(("allow", allowed),))
         if path not in STOP_PATHS:
             return None
         if origin is None:
             # Programs have no Origin header, but browsers send one.
-            missing = Reply(HTTPStatus.FORBIDDEN, b"The header Origin is missing.")
+            missing = refused(path, HTTPStatus.FORBIDDEN, "The header Origin is missing.")
             return missing if path == STOP_PATHS[0] else None
         if not self._is_our_page(origin, host):
-            return Reply(HTTPStatus.FORBIDDEN, b"Pages of other sites may not send this request.")
+            why = "Pages of other sites may not send this request."
+            return refused(path, HTTPStatus.FORBIDDEN, why)
         return None
 
     def _is_our_page(self, origin: str, host: str) -> bool:
