@@ -83,10 +83,10 @@ def test_every_refusal_of_openapi_has_the_schema_of_a_refusal() -> None:
         for status, response in each["responses"].items()
         if status.startswith("4")
     ]
-    schema = {"$ref": "#/components/schemas/Refused"}
     assert len(refusals) > 50
-    assert [status for status, content in refusals if content is None] == []
-    assert all(schema == each["application/json"]["schema"] for _, each in refusals)
+    # A motion that ends elsewhere than asked is reported with the status of a refusal.
+    wrong = [each for each in refusals if "#/components/schemas/Refused" not in json.dumps(each)]
+    assert wrong == []
 
 
 def test_fields_are_described_with_their_units() -> None:
