@@ -1,9 +1,8 @@
-"""``katana450 run`` at a terminal: watch a file, begin at a step, pause, slow down, continue."""
+"""``katana450 run`` at a terminal: begin at a step, pause, slow down, continue."""
 
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -104,28 +103,6 @@ def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.long
-def test_saved_file_is_planned_again_and_run_by_enter(
-    server: AppServer, watcher: Client, script: Path
-) -> None:
-    with terminal(server, script, "--watch") as shown:
-        shown.wait_for("Three steps: 3 steps")
-        script.write_text(SCRIPT.replace("joints: [24", "joints: [x"), encoding="utf-8")
-        shown.wait_for("three.yaml:4:")
-        shown.type("\n")
-        shown.wait_for("Mend and save it first")
-        script.write_text(SCRIPT + "  - wait: 0.1\n", encoding="utf-8")
-        shown.wait_for("Three steps: 4 steps")
-        # Nothing has moved it yet.
-        assert not watcher.query(answers.State).moving
-        shown.type("\n")
-        wait(watcher, lambda each: each.status == "done")
-        script.write_text(SCRIPT, encoding="utf-8")
-        shown.wait_for("Three steps: 3 steps")
-        shown.process.send_signal(signal.SIGINT)
-        assert shown.process.wait(10.0) == 130
-
-
 def test_terminal_pauses_slows_and_continues(
     server: AppServer, watcher: Client, script: Path
 ) -> None:
@@ -160,7 +137,7 @@ def test_terminal_pauses_slows_and_continues(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--watch", "--headless"], "need a server"),
+        (["--from-step", "2", "--headless"], "need a server"),
         (["--from-step", "0"], "expected a step"),
         (["--pause-before", "1,x"], "expected a step"),
     ],

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.robot.collision import world_of
+from katana450.arm.robot.collision import scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.kinematics.json_lines import initial_obstacles
+from katana450.maths.collision.world import obstacle
 from katana450.resources import PROPS_PATH
 from katana450.settings import Settings
 
@@ -81,8 +81,10 @@ def test_an_invalid_file_is_refused(tmp_path: Path, text: str) -> None:
 def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
     """Check that no mesh of a prop leaves its collision shape, nor the table's top face."""
     props = load_props()
-    table, cup, basin = initial_obstacles(props)
-    assert table.name == "table"
+    cup, basin = (
+        obstacle(each.name, each.T_collision_shape, each.collision_shape)
+        for each in scene_objects_of(props)
+    )
     for part, vessel, at in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
         points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + at
         (T,) = part.T_mover_shape
@@ -94,6 +96,6 @@ def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
     world, _ = world_of(robot)
     assert world is not None
     ready = np.append(arm.ready(Settings().ready), 0.0)
-    found = world.with_obstacles((table, cup, basin)).nearest(ready)
+    found = world.with_obstacles((table(), cup, basin)).nearest(ready)
     assert found is not None
     assert found.distance > 0.03

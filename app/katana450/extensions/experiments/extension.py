@@ -20,12 +20,6 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 run`` to ``parser``."""
     parser.add_argument("file", type=Path, metavar="FILE", help="a script; see docs/programs.md")
     parser.add_argument(
-        "--watch",
-        action="store_true",
-        help="plan the script again whenever the file is saved, and show it in the browser; "
-        "Enter runs it",
-    )
-    parser.add_argument(
         "--from-step",
         type=_step,
         metavar="N",
@@ -44,7 +38,7 @@ def add_run_options(parser: argparse.ArgumentParser) -> None:
 
 def add_demo_options(parser: argparse.ArgumentParser) -> None:
     """Add the demos and their options to ``parser``."""
-    parser.set_defaults(watch=False, from_step=None, pause_before=())
+    parser.set_defaults(from_step=None, pause_before=())
     demos = parser.add_subparsers(dest="demo", required=True, metavar="DEMO")
     circle = demos.add_parser("circle", help="the circle of the paper, or any other circle")
     default = CircleDemo()

@@ -1,4 +1,4 @@
-"""The lines that a person types at the terminal while a program is watched or runs."""
+"""The lines that a person types at the terminal while a program runs."""
 
 from __future__ import annotations
 

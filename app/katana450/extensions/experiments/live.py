@@ -35,13 +35,13 @@ def run_live(text: str, script: Script, options: Namespace, report: ReportRun | 
 
     ``report``: reports the run at its end; None for no report.
     """
-    with server_at(script, options) as url, connect(url, NAME, options.token) as arm:
+    with _server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
-            send_script(arm, text, options)
+            _send_script(arm, text, options)
             if options.from_step is None:
-                planned_program(arm)
+                _planned_program(arm)
             began = arm.query(answers.State)
-            begin(arm, options)
+            _begin(arm, options)
             _follow(arm, Keyboard())
             return 0 if report is None else report(arm, began)
         except KeyboardInterrupt:
@@ -63,24 +63,24 @@ def _runs(arm: Client) -> bool:
     return program is not None and program.unattended
 
 
-def begin(arm: Client, options: Namespace) -> None:
+def _begin(arm: Client, options: Namespace) -> None:
     """Run the script that was sent, from a step and with breakpoints if ``options`` say so."""
     if options.pause_before:
         arm.ask(Breakpoints(steps=options.pause_before))
     at, unattended = options.from_step, options.unattended
     arm.ask(Steer(order=ProgramOrder.RUN, unattended=unattended, at=at))
     if at is not None:
-        planned_program(arm)
+        _planned_program(arm)
 
 
-def send_script(arm: Client, text: str, options: Namespace) -> None:
+def _send_script(arm: Client, text: str, options: Namespace) -> None:
     """Send the script, which the server then plans. ``options.scene`` replaces its own scene."""
     if options.scene is not None:
         text = without_scene(text)
     arm.send_script(text, options.speed)
 
 
-def planned_program(arm: Client) -> None:
+def _planned_program(arm: Client) -> None:
     """Wait until the script is planned. Raises KatanaError with its errors."""
     while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
@@ -157,7 +157,7 @@ def _continued(arm: Client, keyboard: Keyboard, ended: answers.Progress) -> bool
             return False
         try:
             arm.ask(Steer(order=ProgramOrder.CONTINUE))
-            planned_program(arm)
+            _planned_program(arm)
         except KatanaError as error:
             print(f"katana450: {error}", file=sys.stderr)
         else:
@@ -165,7 +165,7 @@ def _continued(arm: Client, keyboard: Keyboard, ended: answers.Progress) -> bool
 
 
 @contextmanager
-def server_at(script: Script, options: Namespace) -> Iterator[str]:
+def _server_at(script: Script, options: Namespace) -> Iterator[str]:
     """Return the address of the running server, or of one that is started for this block."""
     try:
         with connect(options.url, "Look", options.token):

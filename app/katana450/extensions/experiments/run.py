@@ -17,10 +17,10 @@ from katana450.extensions.programs.source import ScriptError
 def run(options: Namespace) -> int:
     """Execute ``katana450 run``; return the exit status."""
     alone = options.headless or options.dry_run or options.report is not None
-    if alone and (options.watch or options.from_step is not None or options.pause_before):
+    if alone and (options.from_step is not None or options.pause_before):
         raise InputError(
-            "--watch, --from-step and --pause-before need a server: leave out --headless, "
-            "--dry-run and --report."
+            "--from-step and --pause-before need a server: leave out --headless, --dry-run and "
+            "--report."
         )
     try:
         text = script_text(options.file)
@@ -63,10 +63,6 @@ def _run(text: str, source: str, options: Namespace) -> int:
             from katana450.extensions.experiments.measured import report_measured
 
             report = partial(report_measured, simulated, options)
-        if options.watch:
-            from katana450.extensions.experiments.watch import watch
-
-            return watch(options.file, script, options)
         from katana450.extensions.experiments.live import run_live
 
         return run_live(text, script, options, report)

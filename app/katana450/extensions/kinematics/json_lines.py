@@ -11,19 +11,14 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from katana450.arm.control.branch_options import contact_at
 from katana450.arm.control.findings import of_projection
 from katana450.arm.control.messages import REASONS
-from katana450.arm.robot.collision import scene_objects_of, table, world_of
-from katana450.arm.robot.props import Props, load_props
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import InputError
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
-from katana450.maths.collision.world import Part, obstacle
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
@@ -42,7 +37,6 @@ class JsonKinematics:
         tool: str | None,
         *,
         in_base_frame: bool,
-        all_metrics: bool = False,
         priority: Priority = Priority.POSE,
         with_nearest: bool = False,
     ) -> None:
@@ -52,20 +46,12 @@ class JsonKinematics:
             urdf: file of the arm.
             tool: link that is its default tool; see ``load``.
             in_base_frame: whether poses are in the base frame on the table, else in {S}.
-            all_metrics: whether solutions include the cost of moving there from the request's
-                ``q``.
             priority: the part of a pose that is kept when five axes cannot satisfy all of it.
             with_nearest: whether answers include the nearest posture inside the limits.
         """
-        self._all_metrics = all_metrics
         self._priority = priority
         self._with_nearest = with_nearest
-        robot = read_robot(urdf, tool)
-        self._arm = robot.require_arm()
-        self._world = None
-        if all_metrics:
-            world, _ = world_of(robot)
-            self._world = world and world.with_obstacles(initial_obstacles(load_props()))
+        self._arm = read_robot(urdf, tool).require_arm()
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,15 +68,13 @@ class JsonKinematics:
         ``rotation_misfit`` is the deviation of its numbers from a rotation.
 
         The residuals are the distance of that pose from the request, without regard to joint
-        limits. ``within_limits`` of each solution is True if the arm can go there. With all metrics
-        each solution also has its distance from ``q`` ([n rad]; the zero posture if not given), its
-        smallest singular value, and the two parts in contact there, if any. The finger joint is
-        then at 0 or at the limit nearest to it. ``nearest`` is the best posture inside the limits,
+        limits. ``within_limits`` of each solution is True if the arm can go there. ``nearest`` is
+        the best posture inside the limits, of equally good ones the nearest to ``q`` ([n rad]),
         with what it loses and what keeps it from more.
         """
-        takes_q = self._all_metrics or self._with_nearest
-        chain = self._chain(request, {*KEYS, "tool", "q"} if takes_q else {*KEYS, "tool"})
-        start = chain.check_q(numbers(request, "q", 1)) if "q" in request else np.zeros(chain.n)
+        keys = {*KEYS, "tool", "q"} if self._with_nearest else {*KEYS, "tool"}
+        chain = self._chain(request, keys)
+        hint = chain.check_q(numbers(request, "q", 1)) if "q" in request else None
         T_shoulder, misfit = requested_pose(request, chain, self._T_frame_shoulder)
         nearest = project(chain, T_shoulder, within_limits=False, priority=self._priority).T
         # If the axes do not cross, some branches do not reach every pose.
@@ -103,28 +87,23 @@ class JsonKinematics:
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
                 }
-                | (
-                    self._metrics(BranchMetrics.of(chain, solution, start))
-                    if self._all_metrics
-                    else {}
-                )
                 for solution in solutions
             ],
             "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
             "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
             "rotation_misfit": misfit,
-        } | (self._nearest(chain, T_shoulder, start, request) if self._with_nearest else {})
+        } | (self._nearest(chain, T_shoulder, hint, request) if self._with_nearest else {})
 
     def _nearest(
-        self, chain: Chain, T: FloatArray, start: FloatArray, request: Mapping[str, Any]
+        self, chain: Chain, T: FloatArray, hint: FloatArray | None, request: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Return the nearest posture to ``T`` (4, 4) in {S} inside the limits, and its losses.
 
-        Of equally good postures the nearest to ``start`` is taken. Axes count from 1.
+        Of equally good postures the nearest to ``hint`` is taken. Axes count from 1.
         """
         # Pitch and roll leave the yaw to the arm.
         yaw_counts = self._priority is Priority.POSE and "pitch" not in request
-        best = project(chain, T, priority=self._priority, q_hint=start if "q" in request else None)
+        best = project(chain, T, priority=self._priority, q_hint=hint)
         findings = of_projection(chain, best, self._priority, yaw_was_given=yaw_counts)
         links = (["axis 1"] if best.axis1 else []) + (["links"] if best.reach else [])
         return {
@@ -140,15 +119,6 @@ class JsonKinematics:
                 "held_by": links,
                 "reason": "; ".join(REASONS[each.reason](each) for each in findings),
             }
-        }
-
-    def _metrics(self, metrics: BranchMetrics) -> dict[str, Any]:
-        contact = contact_at(self._world, metrics.q, self._arm.gripper.clamp(0.0))
-        return {
-            "distance_rad": metrics.distance,
-            "time_s": metrics.time,
-            "smallest_singular_value": metrics.smallest_singular_value,
-            "contact": None if contact is None else contact.parts,
         }
 
     def _chain(self, request: Mapping[str, Any], keys: set[str]) -> Chain:
@@ -206,12 +176,3 @@ def _request(line: str) -> Mapping[str, Any]:
 
 def _distance(a: FloatArray, b: FloatArray) -> float:
     return float(np.linalg.norm(a[:3, 3] - b[:3, 3]))
-
-
-def initial_obstacles(props: Props) -> tuple[Part, ...]:
-    """Return the table and ``scene_objects_of`` as fixed obstacles."""
-    objects = scene_objects_of(props)
-    return (
-        table(),
-        *(obstacle(each.name, each.T_collision_shape, each.collision_shape) for each in objects),
-    )

@@ -19,14 +19,13 @@ def lines_of(options: Namespace) -> JsonKinematics | GeneralLines:
     arm does not have.
     """
     in_base_frame = options.frame == "base"
-    priority, metrics = getattr(options, "priority", "pose"), getattr(options, "metrics", False)
+    priority = getattr(options, "priority", "pose")
     with_nearest = getattr(options, "nearest", False)
     try:
         return JsonKinematics(
             options.urdf,
             options.tool,
             in_base_frame=in_base_frame,
-            all_metrics=metrics,
             priority=Priority[priority.upper()],
             with_nearest=with_nearest,
         )
@@ -34,11 +33,10 @@ def lines_of(options: Namespace) -> JsonKinematics | GeneralLines:
         arm = _other_arm(options)
         if arm is None:
             raise
-    if metrics or priority != "pose":
+    if priority != "pose":
         raise InputError(
-            "--metrics and --priority are for five-axis arms with a pan axis, three parallel axes "
-            f"and a roll axis; the kinematics of this arm are {arm.kinematics.method}. Leave these "
-            "options out."
+            "--priority is for five-axis arms with a pan axis, three parallel axes and a roll "
+            f"axis; the kinematics of this arm are {arm.kinematics.method}. Leave this option out."
         )
     return GeneralLines(arm, in_base_frame=in_base_frame, with_nearest=with_nearest)
 

@@ -22,13 +22,6 @@ def add_ik_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``ik`` to ``parser``."""
     _add_frame(parser)
     parser.add_argument(
-        "--metrics",
-        action="store_true",
-        help='add to each solution its distance_rad and time_s from "q" in the line (default: the '
-        "zero posture), its smallest_singular_value, and as contact the two parts that would meet "
-        "there, or null",
-    )
-    parser.add_argument(
         "--priority",
         choices=PRIORITIES,
         default=PRIORITIES[0],

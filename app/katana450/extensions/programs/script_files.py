@@ -87,7 +87,7 @@ def file_name(name: str) -> str:
     return f"{name}{ENDING}"
 
 
-def text_of(path: Path) -> str:
+def _text_of(path: Path) -> str:
     """Return the text of a script file. Raises InputError if it cannot be read."""
     try:
         with path.open("rb") as file:
@@ -103,7 +103,7 @@ def script_text(path: Path) -> str:
 
     Lines keep their numbers. Raises InputError if a file cannot be read.
     """
-    return attached(text_of(path), files_in(path.parent))
+    return attached(_text_of(path), files_in(path.parent))
 
 
 def files_in(folder: Path) -> Callable[[str], str]:
@@ -117,7 +117,7 @@ def files_in(folder: Path) -> Callable[[str], str]:
         found = (root / name).resolve()
         if not found.is_relative_to(root):
             raise InputError(f"{name} is not in the folder of the script.")
-        return text_of(found)
+        return _text_of(found)
 
     return opened
 
