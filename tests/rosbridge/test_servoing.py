@@ -15,7 +15,8 @@ from katana450.extensions.rosbridge.messages import (
     Vector3,
 )
 from katana450.extensions.rosbridge.servoing import (
-    SCALE,
+    LINEAR_SCALE,
+    ROTATIONAL_SCALE,
     Units,
     check_fresh,
     joint_rates,
@@ -38,7 +39,7 @@ def test_rates_of_a_twist_are_those_that_the_arm_can_have(arm: MountedArm, units
     axes = pitched_frame(arm.chain, Q)
     v, omega = np.array([0.05, -0.1, 0.2]), 0.3 * axes[:, 1] - 0.2 * axes[:, 0]
     rates = tool_rates(given(v, omega), np.eye(3), axes, units)
-    linear, angular = (SCALE.linear, SCALE.rotational) if units is Units.UNITLESS else (1.0, 1.0)
+    linear, angular = (LINEAR_SCALE, ROTATIONAL_SCALE) if units is Units.UNITLESS else (1.0, 1.0)
     assert rates == pytest.approx([*(linear * v), angular * 0.3, angular * -0.2])
     # The same velocities, given in another frame.
     R = axes

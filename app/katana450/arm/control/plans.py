@@ -66,13 +66,9 @@ def plan_to(
     state: State,
     q_goal: FloatArray,
     seed: int = 0,
-    tool_speed: float = TOOL_SPEED,
 ) -> Plan:
-    """Return the plan along ``path_to``, to be sent as ``Follow``.
-
-    tool_speed: maximum speed of the tool point [m/s].
-    """
-    return plan_along(arm, world, state, [path_to(arm, world, state, q_goal, seed)], tool_speed)
+    """Return the plan along ``path_to``, to be sent as ``Follow``."""
+    return plan_along(arm, world, state, [path_to(arm, world, state, q_goal, seed)])
 
 
 def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State) -> Plan:

@@ -9,7 +9,6 @@ rotation about another axis is refused. Other arms take any rotation.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -34,28 +33,14 @@ class Units(Enum):
     """Meaning of the numbers of a command, ``command_in_type`` of MoveIt Servo."""
 
     UNITLESS = "unitless"
-    """-1 to 1, fractions of ``Scale``."""
+    """-1 to 1, fractions of a scale."""
     SPEED_UNITS = "speed_units"
     """m/s and rad/s."""
 
 
-@dataclass(frozen=True)
-class Scale:
-    """Speeds that the value 1 of a command without unit stands for.
-
-    Attributes:
-        linear: of the tool point [m/s].
-        rotational: of pitch and roll [rad/s].
-        joint: of a joint [rad/s or m/s].
-    """
-
-    linear: float = 0.4
-    rotational: float = 0.8
-    joint: float = 0.5
-
-
-SCALE = Scale()
-"""The scale that MoveIt Servo comes with."""
+LINEAR_SCALE, ROTATIONAL_SCALE, JOINT_SCALE = 0.4, 0.8, 0.5
+"""Speeds that the value 1 of a command without unit stands for, as MoveIt Servo comes: of the tool
+point [m/s], of pitch and roll [rad/s], of a joint [rad/s or m/s]."""
 
 
 def check_fresh(header: GivenHeader, now: float) -> None:
@@ -76,7 +61,6 @@ def tool_rates(
     R_shoulder_frame: FloatArray,
     R_shoulder_pitched: FloatArray | None,
     units: Units,
-    scale: Scale = SCALE,
 ) -> FloatArray:
     """Return the rates of a jog along {S}.
 
@@ -89,13 +73,12 @@ def tool_rates(
         R_shoulder_pitched: (3, 3) the axes of ``pitched_frame`` in {S}; None for an arm outside the
             five-axis family.
         units: units of ``twist``.
-        scale: speeds that 1 stands for.
 
     Raises:
         InputError: a number is out of range, or the arm has no axis for the rotation.
     """
-    linear = _scaled(twist.linear, units, scale.linear, MAX_LINEAR_RATE, "linear", "m/s")
-    angular = _scaled(twist.angular, units, scale.rotational, MAX_ANGULAR_RATE, "angular", "rad/s")
+    linear = _scaled(twist.linear, units, LINEAR_SCALE, MAX_LINEAR_RATE, "linear", "m/s")
+    angular = _scaled(twist.angular, units, ROTATIONAL_SCALE, MAX_ANGULAR_RATE, "angular", "rad/s")
     v, omega = R_shoulder_frame @ linear, R_shoulder_frame @ angular
     if R_shoulder_pitched is None:
         return np.concatenate((v, omega))
@@ -113,9 +96,7 @@ def tool_rates(
     return np.array([*v, pitch_axis @ omega, roll_axis @ omega])
 
 
-def joint_rates(
-    jog: JointJog, joints: Sequence[str], units: Units, scale: Scale = SCALE
-) -> FloatArray:
+def joint_rates(jog: JointJog, joints: Sequence[str], units: Units) -> FloatArray:
     """Return the rates (n,) [rad/s or m/s] of ``joints``; those that ``jog`` does not name are 0.
 
     Raises InputError for unknown or repeated joints, and for numbers that are out of range.
@@ -132,7 +113,7 @@ def joint_rates(
     limit = 1.0 if units is Units.UNITLESS else MAX_ANGULAR_RATE
     for name, value in given.items():
         _check_range(value, limit, f"The velocity of {name}", units, "rad/s")
-    factor = scale.joint if units is Units.UNITLESS else 1.0
+    factor = JOINT_SCALE if units is Units.UNITLESS else 1.0
     return np.array([factor * given.get(name, 0.0) for name in joints])
 
 

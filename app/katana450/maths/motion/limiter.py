@@ -135,21 +135,18 @@ class Limiter:
         # first.
         return self.stop(now, dt)
 
-    def at_rate(
-        self, now: JointMotion, qd: FloatArray, dt: float, fraction: float = 1.0
-    ) -> JointMotion:
+    def at_rate(self, now: JointMotion, qd: FloatArray, dt: float) -> JointMotion:
         """Return the motion after ``dt`` [s] on its path to the joint rates ``qd`` (n,) [rad/s].
 
         The joints reach the rates together, which keeps the direction. A joint that could then not
         stop before its limit brakes as hard as possible, and the others continue unsynchronized.
-        ``fraction`` scales the maximum speed.
         """
         if dt <= 0.0:
             return now
-        wanted = np.clip(qd, -fraction * self.limits.speed, fraction * self.limits.speed)
+        wanted = np.clip(qd, -self.limits.speed, self.limits.speed)
         synchronization = Synchronization.Phase
         for _ in range(len(wanted) + 1):
-            ahead = self._rates(now, wanted, dt, fraction, synchronization)
+            ahead = self._rates(now, wanted, dt, synchronization)
             stopping_point = self.stopping_point(ahead)
             beyond = (stopping_point < self.limits.lower) | (stopping_point > self.limits.upper)
             if not beyond.any():
@@ -192,7 +189,7 @@ class Limiter:
         """Return the motion after ``dt`` [s] when every joint brakes as hard as possible."""
         if dt <= 0.0 or now.at_rest:
             return now
-        return self._rates(now, np.zeros(len(now.q)), dt, 1.0, Synchronization.No)
+        return self._rates(now, np.zeros(len(now.q)), dt, Synchronization.No)
 
     def stopping_point(self, now: JointMotion) -> FloatArray:
         """Return the place (n,) [rad] where the joints come to rest when they brake now."""
@@ -305,23 +302,22 @@ class Limiter:
         )
 
     def _brake(self, now: JointMotion) -> None:
-        self._aim_at_rates(now, [0.0] * len(now.q), 1.0, Synchronization.No)
+        self._aim_at_rates(now, [0.0] * len(now.q), Synchronization.No)
 
     def _rates(
         self,
         now: JointMotion,
         qd: FloatArray,
         dt: float,
-        fraction: float,
         synchronization: Synchronization,
     ) -> JointMotion:
-        self._aim_at_rates(now, qd.tolist(), fraction, synchronization)
+        self._aim_at_rates(now, qd.tolist(), synchronization)
         return self._at(dt, None, to_rest=not qd.any())
 
     def _aim_at_rates(
-        self, now: JointMotion, qd: list[float], fraction: float, synchronization: Synchronization
+        self, now: JointMotion, qd: list[float], synchronization: Synchronization
     ) -> None:
-        self._start(now, ControlInterface.Velocity, fraction)
+        self._start(now, ControlInterface.Velocity, 1.0)
         self._input.target_velocity = qd
         for choice in (synchronization, Synchronization.No):
             self._input.synchronization = choice

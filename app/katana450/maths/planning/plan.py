@@ -202,9 +202,9 @@ def plan(
     return replace(found, nearest=min(each, key=lambda n: n.contact.distance, default=None))
 
 
-def check_clear(path: Path, world: CollisionWorld, fingers: float, margin: float = MARGIN) -> None:
-    """Raise BlockedError, as `plan`, unless the whole of `path` keeps `margin` [m]."""
-    _clearance(path, world, fingers, margin, with_nearest=False)
+def check_clear(path: Path, world: CollisionWorld, fingers: float) -> None:
+    """Raise BlockedError, as `plan`, unless the whole of `path` keeps MARGIN."""
+    _clearance(path, world, fingers, MARGIN, with_nearest=False)
 
 
 def _clearance(
