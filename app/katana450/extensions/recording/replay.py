@@ -7,7 +7,6 @@ bit, with the same libraries and rounding.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,15 +95,6 @@ def after(session: Session, before: State, tick: TickInput) -> State:
             f"The tick at t = {tick.t:.3f} s cannot be simulated "
             f"({type(error).__name__}: {error}). The recording is of another robot, or was changed."
         ) from error
-
-
-def replay(session: Session, start: State, ticks: Iterable[TickInput]) -> Iterator[State]:
-    """Yield the state after each of ``ticks``, from the recorded state ``start``."""
-    check_fits(session, start)
-    state = start
-    for tick in ticks:
-        state = after(session, state, tick)
-        yield state
 
 
 def check_fits(session: Session, state: State) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse import Solution, inverse
+from katana450.maths.kinematics.inverse import Solution
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.velocity import singular_values
 
@@ -56,11 +56,3 @@ class BranchMetrics:
             time=float((turns / chain.speed).max()),
             smallest_singular_value=float(singular_values(chain, found.q)[-1]),
         )
-
-
-def branches(chain: Chain, T: npt.ArrayLike, q: npt.ArrayLike) -> tuple[BranchMetrics, ...]:
-    """Return every branch of the pose `T` (4, 4) = T_S_tool [m], seen from `q` (5,) [rad].
-
-    The branches are in the order of BRANCHES. `T` and the errors are those of `inverse`.
-    """
-    return tuple(BranchMetrics.of(chain, solution, q) for solution in inverse(chain, T, q_hint=q))

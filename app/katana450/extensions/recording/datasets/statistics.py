@@ -12,9 +12,6 @@ from katana450.maths.geometry.arrays import FloatArray
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 """Quantiles by their names."""
 
-NAMES = ("min", "max", "mean", "std", "count", *QUANTILES)
-"""Names of the statistics of a feature."""
-
 LEVELS = 256
 """Number of levels of a colour."""
 
