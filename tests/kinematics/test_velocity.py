@@ -201,7 +201,9 @@ def test_invalid_jog_is_refused(
 
 def test_branch_metrics_give_the_cost_of_a_branch(chain: Chain) -> None:
     T = forward(chain, READY)
-    all_metrics = [BranchMetrics.of(chain, found, READY) for found in inverse(chain, T, READY)]
+    all_metrics = [
+        BranchMetrics.of(chain, found, READY) for found in inverse(chain, T, q_hint=READY)
+    ]
     assert tuple(metrics.branch for metrics in all_metrics) == BRANCHES
     here = all_metrics[0]
     assert here.distance == pytest.approx(0.0, abs=1e-9)
