@@ -1,11 +1,11 @@
-"""The Paden-Kahan subproblems: a rotation about one or two axes, solved by geometry.
+"""The Paden-Kahan subproblems: a rotation about one axis, solved by geometry.
 
 Axes are given by a unit direction `omega` and a point `r` [m] on them, of any orientation. Angles
 are in rad, in (-pi, pi]. If no exact angle exists, the angle of the smallest misfit is returned
 with `exact` False. Every angle is an atan2: an arccos loses half its digits where its argument
 nears 1.
 
-Sources: Paden (1986); Murray, Li & Sastry (1994), ch. 3.2.2 (subproblems 1 to 3). Subproblem 4 is
+Sources: Paden (1986); Murray, Li & Sastry (1994), ch. 3.2.2 (subproblems 1 and 3). Subproblem 4 is
 the part of the second that remains for an arm whose first joint alone turns its plane.
 """
 
@@ -18,12 +18,10 @@ from katana450 import tolerances
 from katana450.maths.kinematics.turns import wrapped
 from katana450.maths.water.vectors import (
     Vector,
-    add,
     cross,
     dot,
     norm,
     perpendicular,
-    scale,
     sub,
 )
 
@@ -43,18 +41,6 @@ class Rotations:
     """
 
     angles: tuple[float, ...]
-    exact: bool
-    free: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class RotationPairs:
-    """All pairs (theta1, theta2) [rad] that solve a subproblem in two angles.
-
-    `exact` and `free` are those of `Rotations`.
-    """
-
-    pairs: tuple[tuple[float, float], ...]
     exact: bool
     free: bool = False
 
@@ -79,50 +65,6 @@ def subproblem1(omega: Vector, r: Vector, p: Vector, q: Vector) -> Rotations:
     if min(radius_u, radius_v) <= tolerances.ON_AXIS:
         return Rotations((0.0,), exact, free=True)
     return Rotations((wrapped(math.atan2(dot(omega, cross(u, v)), dot(u, v))),), exact)
-
-
-def subproblem2(omega1: Vector, omega2: Vector, r: Vector, p: Vector, q: Vector) -> RotationPairs:
-    """Turn p about axis 2, then about axis 1, onto q; the axes intersect in r.
-
-    exp(omega1 theta1) exp(omega2 theta2) p = q. Two solutions, which coincide where the circles of
-    p and q touch. Without an exact solution, the single pair that brings p nearest to q. Ill-posed
-    with parallel axes (only the sum counts: theta2 is 0), and with p or q in r or on the axis of
-    its first or last turn (that angle is 0). Murray, Li & Sastry, subproblem 2.
-    """
-    u, v = sub(p, r), sub(q, r)
-    length_u, length_v = norm(u), norm(v)
-    normal = cross(omega1, omega2)
-    sine = norm(normal)
-    if sine <= tolerances.PARALLEL:
-        single = subproblem1(omega1, r, p, q)
-        return RotationPairs(((single.angles[0], 0.0),), single.exact, free=True)
-    if min(length_u, length_v) <= tolerances.ON_AXIS:
-        misfit = abs(length_u - length_v)
-        exact = misfit <= EXACT
-        return RotationPairs(((0.0, 0.0),), exact, free=True)
-
-    # On the unit sphere the same angles have the smallest misfit, for any two lengths.
-    u, v = scale(1.0 / length_u, u), scale(1.0 / length_v, v)
-    cosine = dot(omega1, omega2)
-    on1, on2 = dot(omega1, v), dot(omega2, u)
-    alpha = (on1 - cosine * on2) / (sine * sine)
-    beta = (on2 - cosine * on1) / (sine * sine)
-    in_plane = add(scale(alpha, omega1), scale(beta, omega2))
-    reach = norm(in_plane)
-    radicand = (1.0 - reach) * (1.0 + reach)
-    meets = radicand >= -tolerances.RADICAND
-    gamma = _sqrt(radicand) / sine
-    origin = (0.0, 0.0, 0.0)
-    pairs: list[tuple[float, float]] = []
-    free = False
-    for side in (gamma, -gamma) if meets else (0.0,):
-        c = add(in_plane, scale(side, normal))
-        theta2 = subproblem1(omega2, origin, u, c)
-        theta1 = subproblem1(omega1, origin, c, v)
-        free = free or theta1.free or theta2.free
-        pairs.append((theta1.angles[0], theta2.angles[0]))
-    exact = meets and abs(length_u - length_v) <= EXACT
-    return RotationPairs(tuple(pairs), exact, free)
 
 
 def subproblem3(omega: Vector, r: Vector, p: Vector, q: Vector, delta: float) -> Rotations:
