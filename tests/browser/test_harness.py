@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,10 +14,9 @@ import viser.transforms as vtf
 from playwright.sync_api import Browser
 from playwright.sync_api import Error as PlaywrightError
 
-from tests.browser import chromium
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import Axis, Matrix, ViserPage
-from tests.browser.server import BARE_APP, AppServer, ServerError
+from tests.browser.server import BARE_APP, AppServer
 
 MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 BOX, DIAL = "/arm/box", "/arm/dial"
@@ -181,68 +179,6 @@ def test_missing_parts_are_named(page: ViserPage) -> None:
         page.wait_ready(["/nowhere"], seconds=0.2)
     with pytest.raises(PlaywrightError, match=r"has no ring z; it has: ring y"):
         page.grip_ring(PITCH, "z")
-
-
-def test_a_server_that_dies_shows_its_output() -> None:
-    command = (sys.executable, "-c", "raise SystemExit('no arm on port {port}')")
-    server = AppServer(command, seconds=20.0)
-    with pytest.raises(ServerError, match=f"with status 1(.|\n)*no arm on port {server.port}"):
-        server.start()
-    assert not server.running
-
-
-def test_a_server_that_is_never_ready_is_ended() -> None:
-    server = AppServer((sys.executable, "-c", "import time; time.sleep(60)"), seconds=0.3)
-    with pytest.raises(ServerError, match=r"not ready after 0\.3 s"):
-        server.start()
-    assert not server.running
-
-
-def test_a_wrong_browser_in_the_environment_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(chromium.ENVIRONMENT_VARIABLE, "/nowhere/chromium")
-    with pytest.raises(chromium.BrowserError, match="KATANA450_BROWSER=/nowhere/chromium"):
-        chromium.find()
-
-
-@pytest.fixture
-def bare_path(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """Set PATH to an empty folder, as on a machine without a browser."""
-    monkeypatch.delenv(chromium.ENVIRONMENT_VARIABLE, raising=False)
-    monkeypatch.setattr(chromium, "APPLICATIONS", ())
-    monkeypatch.setenv("PATH", str(tmp_path))
-    return tmp_path
-
-
-def _write_program(path: Path, body: str) -> None:
-    path.write_text(f"#!/bin/sh\n{body}\n", encoding="utf-8")
-    path.chmod(0o755)
-
-
-def test_a_missing_browser_is_installed(bare_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    browser = bare_path / "chromium"
-    _write_program(bare_path / "sudo", 'shift; exec "$@"')
-    _write_program(
-        bare_path / "apt-get",
-        f"""[ "$1" = install ] || exit 0
-        printf '#!/bin/sh\\necho Chromium 1.2.3\\n' > {browser}
-        /bin/chmod +x {browser}""",
-    )
-    chromium.main()
-    assert f"Browser for the tests: {browser} (Chromium 1.2.3)" in capfd.readouterr().out
-
-
-def test_a_failed_installation_is_an_error(bare_path: Path) -> None:
-    _write_program(bare_path / "sudo", 'shift; exec "$@"')
-    _write_program(bare_path / "apt-get", "exit 100")
-    with pytest.raises(SystemExit, match="`apt-get update` failed with status 100"):
-        chromium.main()
-
-
-@pytest.mark.usefixtures("bare_path")
-def test_a_missing_browser_is_an_error_with_a_remedy() -> None:
-    with pytest.raises(SystemExit, match="Install Chromium or Chrome") as stopped:
-        chromium.main()
-    assert "KATANA450_BROWSER" in str(stopped.value)
 
 
 def test_features_that_playwright_disables_stay_disabled(browser: Browser) -> None:
