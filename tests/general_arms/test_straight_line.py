@@ -99,73 +99,6 @@ def test_free_angle_of_a_singular_wrist_is_that_of_the_caller(joint: int) -> Non
     assert min(abs(each[joint] - q[joint]) for each in written) < 1e-9
 
 
-def test_products_with_zero_and_one_vanish_and_equal_terms_are_computed_once() -> None:
-    terms = TermList()
-    a, b = terms.term("a"), terms.term("b")
-    assert 0.0 * a + 1.0 * b is b
-    assert b + 0.0 is b
-    assert b - 0.0 is b
-    negative = -a
-    assert -negative is a
-    assert a * 0.0 == 0.0
-    assert a - b is -(b - a)
-    assert a + -b is a - b
-    assert np.float64(1.0) * a is a
-    assert a * b is a * b
-    assert (a + 2.0) + 0.5 is a + 2.5
-    assert (a + 2.0) - 0.5 is a + 1.5
-    assert (2.0 - a) - 0.5 is 1.5 - a
-    assert -(a + 2.0) is -2.0 - a
-    assert (a - 2.0) + 2.0 is a
-    outputs = [[a * b + a * b, -2.0 * (-a)]]
-    assert terms.text("a, b = pose", outputs).count("a * b") == 1
-    assert terms.compiled("a, b = pose", outputs)((3.0, 5.0), ()) == [(30.0, 6.0)]
-
-
-def test_terms_that_differ_by_their_sign_are_computed_once() -> None:
-    terms = TermList()
-    a, b, c = (terms.term(name) for name in "abc")
-    assert a * b is b * a
-    assert a + b is b + a
-    assert -a - b is -(a + b)
-    assert -a + -b is -(a + b)
-    assert -a + b is b - a
-    assert (-a) * b is -(a * b)
-    assert (-a) / b is -(a / b)
-    assert a / -b is -(a / b)
-    assert 1.0 / -a is -(1.0 / a)
-    assert -3.0 * a is -(3.0 * a)
-    assert 2.0 - -a is a + 2.0
-    outputs = [[a * b - c, c + (-a) * b]]
-    text = terms.text("a, b, c = pose", outputs)
-    assert text.count("a * b") == 1
-    assert terms.compiled("a, b, c = pose", outputs)((3.0, 5.0, 4.0), ()) == [(11.0, -11.0)]
-
-
-def test_opposite_direction_and_quarter_turns_need_no_further_angle() -> None:
-    terms = TermList()
-    f = terms.operations()
-    x, y = terms.term("x"), terms.term("y")
-    angle = f.atan2(y, x)
-    outputs = [
-        terms.turned(each, -math.pi, math.pi)
-        for each in (
-            *(angle + quarters * math.pi / 2.0 for quarters in range(-5, 6)),
-            f.atan2(-y, -x),
-        )
-    ]
-    text = terms.text("x, y = pose", [outputs])
-    # That of the direction, and that of the direction after a quarter turn.
-    assert text.count("atan2") == 2
-    solve = terms.compiled("x, y = pose", [outputs])
-    for given in (0.3, 2.0, -0.4, -2.7):
-        (found,) = solve((math.cos(given), math.sin(given)), ())
-        expected = [given + quarters * math.pi / 2.0 for quarters in (*range(-5, 6), 2)]
-        away = np.array(found) - expected
-        np.testing.assert_allclose(away - math.tau * np.round(away / math.tau), 0.0, atol=1e-15)
-        assert np.abs(found).max() <= math.pi
-
-
 @pytest.mark.parametrize("quarters", range(-5, 6))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_half_turn_is_turned_from_both_sides(quarters: int, sign: float) -> None:
@@ -178,58 +111,6 @@ def test_half_turn_is_turned_from_both_sides(quarters: int, sign: float) -> None
         away = found - (sign * given + quarters * math.pi / 2.0)
         assert away - math.tau * round(away / math.tau) == pytest.approx(0.0, abs=1e-14)
         assert abs(found) <= math.pi
-
-
-def test_only_one_way_of_a_fork_is_computed_and_both_are_brought_into_a_turn() -> None:
-    terms = TermList()
-    f = terms.operations()
-    x, y = terms.term("x"), terms.term("y")
-    product, unused = x * y, x + y
-    angle, size = f.quickly(
-        x > 0.0,
-        lambda: (f.atan2(y, x), 1.0 / x),
-        lambda: (f.select(x <= -5.0, product * product, product) + 0.0, unused),
-    )
-    outputs = [[terms.turned(angle + math.pi, -math.pi, math.pi), size]]
-    text = terms.text("x, y = pose", outputs)
-    # What only the rare way needs is computed there.
-    assert text.index("else:") < text.index("x * y")
-    solve = terms.compiled("x, y = pose", outputs)
-    assert solve((1.0, 1.0), ()) == [(pytest.approx(-0.75 * math.pi), 1.0)]
-    assert solve((0.0, 2.0), ()) == [(pytest.approx(math.pi), 2.0)]
-    assert solve((-6.0, 0.5), ())[0][0] == pytest.approx(math.remainder(9.0 + math.pi, math.tau))
-    assert f.quickly(True, lambda: (1.0,), lambda: (2.0,)) == (1.0,)
-    assert f.quickly(x > 1.0, lambda: (3.0, x), lambda: (3.0, y))[0] == 3.0
-    unneeded = terms.text("x, y = pose", [[x]])
-    assert "if" not in unneeded
-
-
-def test_only_the_value_that_a_condition_selects_is_computed() -> None:
-    terms = TermList()
-    operations = terms.operations()
-    a = terms.term("a")
-    root = operations.root(a)
-    chosen = operations.select(a <= 0.0, 1.0, 1.0 / a)
-    solve = terms.compiled("a, = pose", [[root, chosen]])
-    assert solve((0.0,), ()) == [(0.0, 1.0)]
-    assert solve((4.0,), ()) == [(2.0, 0.25)]
-    assert operations.select(True, a, root) is a
-    assert operations.bounded(2.0) == 1.0
-    assert operations.hypot(3.0, 4.0) == 5.0
-
-
-def test_comparison_of_a_named_term_is_written_where_it_decides() -> None:
-    terms = TermList()
-    f = terms.operations()
-    a, b = terms.term("a"), terms.term("b")
-    size = a * b
-    outputs = [[f.select(size <= 1.0, a, b), f.select(size <= 1.0, b, size), abs(size)]]
-    text = terms.text("a, b = pose", outputs)
-    assert text.count("a * b") == 1
-    assert text.count("<= 1.0") == 2
-    solve = terms.compiled("a, b = pose", outputs)
-    assert solve((-2.0, 3.0), ()) == [(-2.0, 3.0, 6.0)]
-    assert solve((2.0, 3.0), ()) == [(3.0, 6.0, 6.0)]
 
 
 @pytest.mark.parametrize(
