@@ -98,7 +98,7 @@ def test_every_built_in_extension_is_found() -> None:
         ("programs", ["run", "demo"]),
         ("media", ["render"]),
         ("kinematics", ["fk", "ik"]),
-        ("server_commands", ["go", "access", "people"]),
+        ("server_commands", ["access", "people"]),
     ],
 )
 def test_commands_of_a_missing_extension_are_not_listed(
@@ -111,7 +111,6 @@ def test_commands_of_a_missing_extension_are_not_listed(
         "serve",
         "fk",
         "ik",
-        "go",
         "access",
         "people",
         "log",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,7 +11,6 @@ import pytest
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from tests.browser.server import AppServer
 from tests.gateway.virtual import VirtualServer
 
 TARGET = (0.008, 0.025, 0.443)
@@ -84,20 +81,3 @@ def test_stop_withdraws_the_offer(program: Client) -> None:
     with pytest.raises(RefusedError, match="No detour is offered"):
         program.ask(requests.Go())
     assert program.query(answers.State).detour is None
-
-
-@pytest.mark.long
-def test_command_line_takes_the_detour(live_program: Client, server: AppServer) -> None:
-    live_program.go(requests.Home())
-    live_program.ask(requests.ReleaseLease())
-    place = ",".join(f"{1e3 * x:g}" for x in TARGET)
-    done = subprocess.run(
-        [sys.executable, "-m", "katana450", "go", place, "--url", server.url],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Taking a 2.9 s detour." in done.stdout
-    assert distance(live_program.query(answers.State)) < 1e-6

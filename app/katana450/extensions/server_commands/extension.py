@@ -1,4 +1,4 @@
-"""The extension ``server_commands``: who may use a server, who is connected, and one motion."""
+"""The extension ``server_commands``: who may use a server, and who is connected."""
 
 from __future__ import annotations
 
@@ -7,17 +7,10 @@ from typing import TYPE_CHECKING
 
 from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.extensions.server_commands.access_options import add_access_options
-from katana450.extensions.server_commands.go_options import add_go_options
 from katana450.extensions.server_commands.people_options import add_people_options
 
 if TYPE_CHECKING:
     from katana450.server.service.request_handler import RequestHandler
-
-
-def _go(options: Namespace) -> int:
-    from katana450.extensions.server_commands.go import go
-
-    return go(options)
 
 
 def _access(options: Namespace) -> int:
@@ -41,9 +34,6 @@ def _handler() -> type[RequestHandler]:
 EXTENSION = Extension(
     "server_commands",
     (
-        CliCommand(
-            "go", "move the tool on a running server, by a detour if necessary", add_go_options, _go
-        ),
         CliCommand(
             "access", "give people links with which they sign in", add_access_options, _access
         ),
