@@ -34,7 +34,6 @@ class Settings:
         bare: whether the arm has no gripper.
         stop_port: TCP port that serves STOP alone; None for the port after ``port``, or a free one.
         clear_by: persons who may clear a stop; see ``server.service.stop_state.ClearBy``.
-        go_on_release: whether the arm takes a detour that it offers when a drag ends, without Go.
     """
 
     host: str = "127.0.0.1"
@@ -54,4 +53,3 @@ class Settings:
     bare: bool = False
     stop_port: int | None = None
     clear_by: str = "driver"
-    go_on_release: bool = False

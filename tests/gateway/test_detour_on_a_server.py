@@ -1,4 +1,4 @@
-"""A detour: offered by the state, taken by a request, a command on a server, or a setting."""
+"""A detour: offered by the state, and taken by a request."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ import time
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from types import SimpleNamespace
 from typing import Any, Self, TypeVar, cast
 from urllib.parse import unquote, urlsplit
@@ -401,8 +401,7 @@ class VirtualServer:
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
         self._detours: DetourPlanner | None = None
         if detours:
-            go = partial(hub.gate.submit, cmd.Go()) if options.go_on_release else None
-            self._detours = DetourPlanner(session, self.arm.state_publisher, worker, go)
+            self._detours = DetourPlanner(session, self.arm.state_publisher, worker)
             self._detours.start()
         self._tasks = [self.loop.create_task(each) for each in (self.arm.run(hub), self._watch())]
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from threading import Event
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
@@ -98,9 +97,7 @@ class Frontend:
             planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
             planning_worker.notify = gateway.announce
             planning_worker.redirected = guarded(hub.runner.redirected)
-            on_release = self._config.settings.go_on_release
-            go = partial(hub.gate.submit, cmd.Go()) if on_release else None
-            self._detours = DetourPlanner(session, pipe.state_publisher, planning_worker, go)
+            self._detours = DetourPlanner(session, pipe.state_publisher, planning_worker)
         pipe.start()
         gateway.attach(ArmHandle(robot, session, pipe, planning_worker, nodes))
         if self._detours is not None:

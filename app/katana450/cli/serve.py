@@ -81,7 +81,6 @@ def serve_with(options: Namespace) -> int:
         bare=options.bare,
         stop_port=options.stop_port,
         clear_by=options.clear_by,
-        go_on_release=options.go_on_release,
     )
     # The options are sent to another process, which does not need the command itself.
     values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})

@@ -72,12 +72,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "--bare", action="store_true", help="the arm without its gripper, as in the paper's circle"
     )
     parser.add_argument(
-        "--go-on-release",
-        action="store_true",
-        help="at the end of a drag that a gap held up, move along the detour that leads to its "
-        "target, without waiting for Go",
-    )
-    parser.add_argument(
         "--lines",
         type=_port,
         metavar="PORT",

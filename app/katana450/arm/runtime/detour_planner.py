@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.actor import Actor
-from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.plans import detour_from
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -37,7 +34,6 @@ class DetourPlanner:
         session: Session,
         state_publisher: StatePublisher,
         arm: PlanningWorker,
-        go: Callable[[Actor], object] | None = None,
     ) -> None:
         """Prepare the thread.
 
@@ -45,13 +41,10 @@ class DetourPlanner:
             session: the rules of the arm.
             state_publisher: the source of states.
             arm: the sink of the offers.
-            go: called with the actor of a drag that has ended, to follow its detour at once; may
-                raise KatanaError. None where detours are only offered.
         """
         self._session = session
         self._state_publisher = state_publisher
         self._arm = arm
-        self._go = go
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="detours", daemon=True)
 
@@ -68,14 +61,6 @@ class DetourPlanner:
     def _run(self) -> None:
         seen = self._state_publisher.snapshot
         while not self._stopping.is_set():
-            actor = self._arm.newest_actor
-            if self._go is not None and actor is not None and _may_go(seen.state):
-                try:
-                    self._go(actor)
-                except KatanaError as error:
-                    log.debug("No detour: %s", error)
-                seen = self._changed(seen)
-                continue
             wanted = _wants_detour(seen.state)
             new = self._state_publisher.wait_for_change(
                 seen, SETTLE_TIME if wanted else WAKE_INTERVAL, self._stopping.is_set
@@ -117,8 +102,3 @@ def _wants_detour(state: State) -> bool:
     """Return whether ``state`` rests at a gap without an offer."""
     resting = not (state.moving or state.paused or state.blocked)
     return resting and state.beyond_gap is not None and state.detour is None
-
-
-def _may_go(state: State) -> bool:
-    """Return whether ``state`` has a detour on offer after the end of its drag."""
-    return state.detour is not None and isinstance(state.target, JointTarget)
