@@ -25,17 +25,15 @@ COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4")
 
 
 def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out, ply = tmp_path / "map.npz", tmp_path / "map.ply"
-    assert (
-        main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out), "--ply", str(ply)]) == 0
-    )
+    out = tmp_path / "map.npz"
+    assert main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out)]) == 0
     printed = capsys.readouterr()
     stored = load_map(out)
     assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in printed.out
     assert f"{stored.fraction.max():.1%}" in printed.out
-    assert f"Written: {ply}" in printed.out
+    assert f"Written: {out}" in printed.out
     assert printed.err == ""
-    assert sorted(tmp_path.iterdir()) == [out, ply]
+    assert sorted(tmp_path.iterdir()) == [out]
     assert (stored.robot, stored.tool) == ("katana450", "grasp")
     assert stored.voxel == pytest.approx(0.17)
 
@@ -43,12 +41,10 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
 def test_map_of_six_axes_tells_where_the_tool_can_be_as_at_home(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    urdf, out, ply = (tmp_path / name for name in ("ur5e.urdf", "map.npz", "map.ply"))
+    urdf, out = (tmp_path / name for name in ("ur5e.urdf", "map.npz"))
     urdf.write_text(ur5e())
     coarse = ("--voxel", "350", "--pitches", "3", "--rolls", "1")
-    assert (
-        main(["workspace", "--urdf", str(urdf), *coarse, "--out", str(out), "--ply", str(ply)]) == 0
-    )
+    assert main(["workspace", "--urdf", str(urdf), *coarse, "--out", str(out)]) == 0
     printed, stored = capsys.readouterr().out, load_map(out)
     assert stored.at_home is not None
     assert 0 < stored.at_home.sum() < len(stored.points)
@@ -112,7 +108,6 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
         (["--pitches", "0"], "number of pitches is 0"),
         (["--rolls", "100000"], "must be from 1 to 720"),
         (["--out", "map.txt"], "must end in .npz"),
-        (["--ply", "map.npz"], "must end in .ply"),
         (["--out", "/nowhere/at/all/map.npz"], "no directory"),
     ],
 )

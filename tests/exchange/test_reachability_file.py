@@ -1,25 +1,21 @@
-"""Tests of map files: read again exactly, also by other programs; invalid files are refused."""
+"""Tests of map files: read again exactly; invalid files are refused."""
 
 from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import Reachability
 from katana450.extensions.reachability.reachability_file import (
     FORMAT,
     load_map,
     write_npz,
-    write_ply,
 )
 
 POINTS = np.array([[0.11, -0.2, 0.3], [0.13, -0.2, 0.3], [0.15, 0.2, 0.5]])
@@ -78,18 +74,6 @@ def test_an_empty_map_is_a_map(survey: Survey, tmp_path: Path) -> None:
     stored = load_map(path)
     assert stored.points.shape == (0, 3)
     assert stored.fraction.shape == (0,)
-    ply = io.BytesIO()
-    write_ply(ply, empty)
-    assert b"element vertex 0\n" in ply.getvalue()
-
-
-def test_another_program_reads_the_point_cloud() -> None:
-    ply = io.BytesIO()
-    write_ply(ply, FOUND)
-    ply.seek(0)
-    cloud: Any = trimesh.load(ply, file_type="ply")
-    assert np.allclose(cloud.vertices, POINTS, atol=1e-7)
-    assert np.array_equal(cloud.colors[:, :3], fraction_colors(FRACTION))
 
 
 GOOD = {

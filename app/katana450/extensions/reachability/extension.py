@@ -43,9 +43,6 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         "six axes on 2, 4 or 6)",
     )
     parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for the map")
-    parser.add_argument(
-        "--ply", type=Path, metavar="FILE.ply", help="file for the map as coloured points"
-    )
     add_arm_options(parser)
 
 

@@ -23,11 +23,12 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.reachability import postures
+from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.extensions.reachability.grid import IntArray, VoxelGrid
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 
 BoolArray = npt.NDArray[np.bool]
@@ -109,10 +110,10 @@ class Reachability:
             rolls = slice(roll, roll + 1) if beside else slice(None)
             for poses in self.tool_poses(p[near], roll):
                 T = poses.reshape(-1, 4, 4)
-                q = postures.at(self.chain, T)
+                q = inverse_batch(self.chain, T).q
                 pose, branch = np.nonzero(self._free(q))
                 # Postures for a pose out of reach are only near it.
-                exact = _same(postures.poses(self.chain, q[pose, branch]), T[pose])
+                exact = _same(forward_batch(self.chain, q[pose, branch]), T[pose])
                 pose, branch = pose[exact], branch[exact]
                 rollable = self._rollable(q[pose, branch, 4])
                 if beside:

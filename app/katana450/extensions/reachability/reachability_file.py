@@ -1,4 +1,4 @@
-"""Files of a reachability map: .npz to be read again, and .ply for programs that show points.
+"""Files of a reachability map.
 
 Keys of the .npz, lengths in m, angles in rad, points in the base frame:
 
@@ -24,7 +24,6 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
 from katana450.extensions.reachability.reachability import BoolArray
 from katana450.maths.geometry.arrays import FloatArray, finite_array
@@ -131,23 +130,3 @@ def _checked(
     checked.setflags(write=False)
     fractions.setflags(write=False)
     return checked, fractions
-
-
-def write_ply(file: BinaryIO, found: ReachabilityMap) -> None:
-    """Write the voxel centres as binary .ply: x, y, z [m], colour, and the fraction."""
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        "comment Katana450 reachability: metres in the base frame, fraction of orientations\n"
-        f"element vertex {len(found.points)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-        "property float fraction\nend_header\n"
-    )
-    vertices = np.empty(
-        len(found.points), dtype=[("xyz", "<f4", 3), ("color", "u1", 3), ("fraction", "<f4")]
-    )
-    vertices["xyz"] = found.points
-    vertices["color"] = fraction_colors(found.fraction)
-    vertices["fraction"] = found.fraction
-    file.write(header.encode("ascii"))
-    file.write(vertices.tobytes())

@@ -14,12 +14,12 @@ import numpy as np
 
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_arm
-from katana450.atomic import Writer, check_writable, write_files
+from katana450.atomic import check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
 from katana450.extensions.reachability.grid import IntArray
 from katana450.extensions.reachability.map import ReachabilityMap, Survey
-from katana450.extensions.reachability.reachability_file import write_npz, write_ply
+from katana450.extensions.reachability.reachability_file import write_npz
 from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.settings import Settings
 
@@ -28,8 +28,12 @@ MIN_SHARED_CHUNKS = 8
 
 
 def workspace(options: argparse.Namespace) -> int:
-    """Map the workspace, write the requested files, print a summary. Raises InputError."""
-    _check_files(options.out, options.ply)
+    """Map the workspace, write the requested file, print a summary. Raises InputError."""
+    out: Path | None = options.out
+    if out is not None:
+        if out.suffix.lower() != ".npz":
+            raise InputError(f"{out} must end in .npz.")
+        check_writable(out)
     robot = read_robot(options.urdf, options.tool, find_arm)
     arm = robot.require_arm()
     for note in (*arm.notes, *robot.notes):
@@ -47,24 +51,12 @@ def workspace(options: argparse.Namespace) -> int:
         ),
     )
     found = survey.map(_counts(survey))
-    files: dict[Path, Writer] = {}
-    if options.out:
-        files[options.out] = lambda file: write_npz(file, survey, found, robot.name, tool)
-    if options.ply:
-        files[options.ply] = lambda file: write_ply(file, found)
-    write_files(files)
+    if out is not None:
+        write_files({out: lambda file: write_npz(file, survey, found, robot.name, tool)})
     print(_summary(survey, found, tool))
-    for path in files:
-        print(f"Written: {path}")
+    if out is not None:
+        print(f"Written: {out}")
     return 0
-
-
-def _check_files(out: Path | None, ply: Path | None) -> None:
-    for path, suffix in ((out, ".npz"), (ply, ".ply")):
-        if path is not None:
-            if path.suffix.lower() != suffix:
-                raise InputError(f"{path} must end in {suffix}.")
-            check_writable(path)
 
 
 def _counts(survey: Survey) -> list[IntArray]:
