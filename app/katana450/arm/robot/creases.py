@@ -98,7 +98,7 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
     linear = to_light(shape.colours[:, :3] / 255.0)
     blocks = (
         (shape.vertices, np.float32, FLOAT, "VEC3", ARRAY),
-        (_normals(shape), np.float32, FLOAT, "VEC3", ARRAY),
+        (smooth_normals(shape.vertices, shape.faces), np.float32, FLOAT, "VEC3", ARRAY),
         (np.concatenate((linear, alpha), axis=1), np.float32, FLOAT, "VEC4", ARRAY),
         (shape.faces.ravel(), np.uint32, UINT, "SCALAR", ELEMENT),
     )
@@ -146,12 +146,24 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
-def _normals(shape: Drawn) -> FloatArray:
-    """Return the normals (n, 3) of the vertices, weighted by the areas of their faces."""
-    a, b, c = shape.vertices[shape.faces].transpose(1, 0, 2)
-    faces = np.cross(b - a, c - a)
-    sums = np.zeros_like(shape.vertices)
-    for corner in shape.faces.T:
-        np.add.at(sums, corner, faces)
-    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
-    return np.where(lengths > 0.0, sums / np.where(lengths > 0.0, lengths, 1.0), (0.0, 0.0, 1.0))
+def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return normals (n, 3) of ``vertices`` (n, 3), weighted by the angles of their faces (m, 3).
+
+    Source: G. Thürmer and C. A. Wüthrich, Computing Vertex Normals from Polygonal Facets, 1998.
+    """
+    corners = vertices[faces]
+    sides = _unit(np.roll(corners, -1, axis=1) - corners)
+    cosines = -np.einsum("mij,mij->mi", sides, np.roll(sides, 1, axis=1))
+    angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+    across = _unit(np.cross(sides[:, 0], sides[:, 1]))
+    sums = np.zeros(vertices.shape)
+    np.add.at(sums, faces, angles[:, :, None] * across[:, None])
+    normals = _unit(sums)
+    return np.where(normals.any(axis=1, keepdims=True), normals, (0.0, 0.0, 1.0))
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    """Return vectors (..., 3) of length 1; zero vectors stay 0."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    unit: FloatArray = np.divide(v, length, out=np.zeros(v.shape), where=length > 0.0)
+    return unit

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.robot.creases import drawn, smooth_normals
 from katana450.arm.robot.visual import Visual, scene_in
 from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.srgb import to_srgb
-
-EDGE = math.radians(30.0)
-"""[rad] Minimum angle between two triangles with separate normals."""
 
 
 class Material(NamedTuple):
@@ -89,37 +86,37 @@ def _read(visual: Visual) -> list[VisualMesh]:
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),
     )
     if not isinstance(visual.source, Path):
-        return [_shape(_edged(visual.mesh), np.eye(4), plain)]
+        return [_shape(visual.mesh, np.eye(4), plain)]
     import trimesh
 
-    bare = visual.source.suffix.lower() == ".stl"
     T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
     scene, shapes = scene_in(visual.source), []
     for node in scene.graph.nodes_geometry:
         T_file, name = scene.graph[node]
         mesh = scene.geometry[name]
         if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-            made = _edged(mesh) if bare else mesh
-            shapes.append(_shape(made, T @ T_file, _material(mesh, plain)))
+            shapes.append(_shape(mesh, T @ T_file, _material(mesh, plain)))
     return shapes
 
 
-def _edged(mesh: Any) -> Any:
-    """Return a mesh without normals, with those of a surface that is smooth up to an edge."""
-    import trimesh
-
-    return trimesh.graph.smooth_shade(mesh, angle=EDGE)
-
-
 def _shape(mesh: Any, T: FloatArray, material: Material) -> VisualMesh:
+    """Return ``mesh`` moved by ``T``, with its own normals or those of its creases."""
+    vertices = np.asarray(mesh.vertices)
+    faces = np.asarray(mesh.faces, dtype=np.int64)
+    # Those that trimesh would compute need SciPy, and are smooth over each edge.
+    if "vertex_normals" in mesh._cache:
+        normals = np.asarray(mesh.vertex_normals)
+    else:
+        split = drawn(vertices, faces)
+        vertices, faces = split.vertices, split.faces
+        normals = smooth_normals(vertices, faces)
     A = T[:3, :3]
-    normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(A)
+    normals = normals @ np.linalg.inv(A)
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(size > 0.0, normals / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
-    faces = np.asarray(mesh.faces, dtype=np.int64)
     # Mirroring turns the faces inside out.
     faces = faces[:, ::-1] if np.linalg.det(A) < 0.0 else faces
-    vertices = np.asarray(mesh.vertices) @ A.T + T[:3, 3]
+    vertices = vertices @ A.T + T[:3, 3]
     return VisualMesh(material, frozen(vertices), frozen(normals), faces)
 
 

@@ -93,17 +93,6 @@ def unit(v: npt.NDArray[Any]) -> Floats:
     return np.asarray(found, dtype=np.float32)
 
 
-def smooth(vertices: npt.NDArray[Any], faces: npt.NDArray[Any]) -> FloatArray:
-    """Return normals (n, 3) of vertices (n, 3): means over the faces (m, 3), weighted by area."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    across = np.cross(b - a, c - a)
-    found = np.zeros(vertices.shape)
-    for corner in range(3):
-        np.add.at(found, faces[:, corner], across)
-    size = np.linalg.norm(found, axis=1, keepdims=True)
-    return np.where(size > 0.0, found / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
-
-
 def _stacked(parts: Sequence[Any], kind: Any) -> npt.NDArray[Any]:
     if not parts or not len(parts[0]):
         return np.empty((0, 3), dtype=kind)

@@ -10,6 +10,7 @@ import numpy as np
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
@@ -18,7 +19,7 @@ from katana450.caching import cached_property
 from katana450.extensions.conduit.rings import PITCH, poses, ring
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent
-from katana450.extensions.media.scene import Item, smooth
+from katana450.extensions.media.scene import Item
 from katana450.extensions.media.water import translucents_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -98,7 +99,7 @@ class _BendableStretch:
     def __init__(self, stretch: ConduitStretch) -> None:
         self.stretch = stretch
         self._vertices, self._faces = ring(stretch.radius)
-        self._normals = smooth(self._vertices, self._faces)
+        self._normals = smooth_normals(self._vertices, self._faces)
 
     @cached_property
     def _poses(self) -> FloatArray:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.picture import Translucent
-from katana450.extensions.media.scene import Item, smooth
+from katana450.extensions.media.scene import Item
 from katana450.extensions.water.nodes import (
     CLEAR,
     FLAT,
@@ -80,4 +81,4 @@ def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[T
 
 def _shape(corners: FloatArray, faces: Faces) -> VisualMesh:
     whole = faces.astype(np.int64)
-    return VisualMesh(MATERIAL, corners, smooth(corners, whole), whole)
+    return VisualMesh(MATERIAL, corners, smooth_normals(corners, whole), whole)

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state import State
+from katana450.arm.robot.creases import smooth_normals
 from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -226,5 +227,6 @@ def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> byt
         alphaMode="BLEND",
     )
     mesh = trimesh.Trimesh(corners, faces, process=False, visual=textured(material=material))
+    mesh.vertex_normals = smooth_normals(corners, faces)
     glb: Any = mesh.export(file_type="glb", include_normals=True)
     return bytes(glb)

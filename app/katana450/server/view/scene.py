@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import VisualMesh
@@ -266,9 +267,8 @@ def _surface(visual: Visual) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     mesh = visual.mesh.copy()
     # One vertex per corner halves the data that is sent.
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    return coarse(
-        mesh.vertices + COAT_THICKNESS * mesh.vertex_normals, np.asarray(mesh.faces), DETAIL
-    )
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    return coarse(vertices + COAT_THICKNESS * smooth_normals(vertices, faces), faces, DETAIL)
 
 
 def coarse(
