@@ -139,16 +139,6 @@ def test_name_and_file_together_are_refused(capsys: pytest.CaptureFixture[str]) 
     assert "name two robots" in capsys.readouterr().err
 
 
-def test_without_the_package_the_command_says_what_to_install(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "robot_descriptions", None)
-    assert main(["serve", "--arm", "ur5e"]) == 1
-    assert "pip install 'katana450[gallery]'" in capsys.readouterr().err
-    assert main(["arms"]) == 1
-    assert "pip install 'katana450[gallery]'" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("address", ["tcp://192.0.2.1", "192.0.2.1", "ur5e.urdf"])
 def test_address_of_a_real_arm_is_refused_where_only_names_are_possible(
     address: str, capsys: pytest.CaptureFixture[str]

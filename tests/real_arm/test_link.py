@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -12,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from katana450.errors import ConfigurationError, InputError
+from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies, requests
 from katana450.extensions.real_arm.codec.crc import with_crc
 from katana450.extensions.real_arm.codec.firmware_codec import (
@@ -149,12 +148,6 @@ def test_address_is_read_and_shown(text: str, url: ArmUrl) -> None:
 def test_other_address_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="not the address of an arm"):
         ArmUrl.parse(text)
-
-
-def test_missing_pyserial_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(ConfigurationError, match=r"pip install 'katana450\[serial\]'"):
-        ArmUrl("/dev/ttyUSB0", None).open()
 
 
 def test_serial_device_is_used_like_a_socket() -> None:

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from katana450.errors import ConfigurationError, KatanaError
+from katana450.errors import KatanaError
+from katana450.extras import library
 
 
 class SerialPort:
@@ -22,15 +23,10 @@ class SerialPort:
             lost: the error of a port that cannot be opened or is lost.
 
         Raises:
-            ConfigurationError: pyserial is not installed.
+            MissingExtraError: pyserial is not installed.
             KatanaError: ``lost``.
         """
-        try:
-            import serial
-        except ImportError:
-            raise ConfigurationError(
-                "A serial port needs pyserial: run pip install 'katana450[serial]'."
-            ) from None
+        serial = library("serial", "serial", "Serial ports")
         self._device, self._lost = device, lost
         try:
             self._port: Any = serial.Serial(name, baud, exclusive=True)

@@ -47,10 +47,6 @@ def demo(options: Namespace) -> int:
 
 
 def _run(text: str, source: str, options: Namespace) -> int:
-    if options.report is not None:
-        from katana450.extensions.media.tracer import check_traceable
-
-        check_traceable()
     try:
         script = parse(text)
         report = None

@@ -29,6 +29,7 @@ from katana450.extensions.programs.script_scene import begun
 from katana450.extensions.programs.simulation import Simulation
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.profile import profile_named
+from katana450.extras import MissingExtraError
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
@@ -103,9 +104,12 @@ def simulate(script: Script, options: Namespace) -> Simulated:
         # Imported here, because only the pictures of a report need the renderer.
         from katana450.extensions.media.report_pictures import stage_pictures
 
-        pictures = stage_pictures(
-            program, robot, plan.session, load_props(), simulation.states, report.trace
-        )
+        try:
+            pictures = stage_pictures(
+                program, robot, plan.session, load_props(), simulation.states, report.trace
+            )
+        except MissingExtraError as error:
+            print(f"The report has figures, but no pictures of the arm. {error}")
     found = Simulated(exit_status(report, later=not options.headless), report, pictures)
     if options.report is not None:
         found.write(options.report)

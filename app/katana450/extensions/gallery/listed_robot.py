@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import Any
 
 from katana450.errors import ConfigurationError
+from katana450.extras import library
 
 PACKAGE = "robot_descriptions"
 
@@ -61,21 +62,10 @@ class ListedRobot:
 def listed_robots() -> dict[str, ListedRobot]:
     """Return all descriptions by name. Raises ConfigurationError without the package."""
     try:
-        descriptions = import_module(PACKAGE).DESCRIPTIONS
-    except ImportError as error:
-        if error.name not in (None, PACKAGE):
-            raise ConfigurationError(
-                f"The gallery cannot be read: {error}. Install it again: "
-                "pip install 'katana450[gallery]'."
-            ) from error
-        raise ConfigurationError(
-            "The gallery is not installed. Install it with pip install 'katana450[gallery]', or "
-            "name a file with --urdf."
-        ) from error
+        descriptions = library(PACKAGE, "gallery", "Robots of the gallery").DESCRIPTIONS
     except AttributeError as error:
         raise ConfigurationError(
-            f"This version of {PACKAGE} has no list of robots. Install a newer one: "
-            "pip install 'katana450[gallery]'."
+            f"This version of {PACKAGE} has no list of robots. Install a newer one."
         ) from error
     repositories = _repositories()
     found = [_listed(key, each, repositories) for key, each in sorted(descriptions.items())]

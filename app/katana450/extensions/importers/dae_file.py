@@ -7,6 +7,7 @@ of the scene are taken from pycollada. No entity is expanded and no other file i
 from __future__ import annotations
 
 import io
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser, fromstring
 
 import numpy as np
 from collada import Collada
@@ -15,7 +16,6 @@ from collada.material import Map
 from collada.polylist import BoundPolylist
 from collada.primitive import BoundPrimitive
 from collada.triangleset import BoundTriangleSet
-from lxml import etree
 
 from katana450.errors import InputError
 from katana450.extensions.importers.library_errors import failures_in_words
@@ -51,9 +51,7 @@ def read_dae(data: bytes, name: str) -> MeshReading:
     root = _document(data, name)
     builder = MeshBuilder(name)
     with failures_in_words(name):
-        document = Collada(
-            io.BytesIO(etree.tostring(root)), ignore=[DaeError], aux_file_loader=_no_file
-        )
+        document = Collada(io.BytesIO(data), ignore=[DaeError], aux_file_loader=_no_file)
         if document.scene is None:
             raise InputError(f"{name} shows no scene.")
         for number, part in enumerate(document.scene.objects("geometry")):
@@ -78,19 +76,29 @@ def read_dae(data: bytes, name: str) -> MeshReading:
     )
 
 
-def _document(data: bytes, name: str) -> etree._Element:
+def _document(data: bytes, name: str) -> Element:
     """Return the root of a document without entities. Raises InputError with the line."""
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
     try:
-        root = etree.fromstring(data, parser)
-    except (etree.XMLSyntaxError, ValueError) as error:
-        reason = " ".join(str(error).split())[:120].rstrip(".")
-        raise InputError(f"{name} is corrupt or not COLLADA: {reason}.") from error
-    if root.getroottree().docinfo.doctype:
-        raise InputError(f"{name} declares XML entities, which are not supported.")
-    if etree.QName(root).localname != "COLLADA":
+        root = fromstring(data, XMLParser(target=_PlainBuilder(name)))
+    except InputError:
+        raise
+    except (ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{name} is corrupt or not COLLADA: {error}.") from error
+    if root.tag.rpartition("}")[2] != "COLLADA":
         raise InputError(f"{name} is not COLLADA: its root element has another name.")
     return root
+
+
+class _PlainBuilder(TreeBuilder):
+    """Builds the tree of a document that declares nothing."""
+
+    def __init__(self, file: str) -> None:
+        super().__init__()
+        self._file = file
+
+    def doctype(self, *_: object) -> None:
+        """Refuse the document, before any entity of it is expanded."""
+        raise InputError(f"{self._file} declares XML entities, which are not supported.")
 
 
 def _no_file(_path: str) -> None:

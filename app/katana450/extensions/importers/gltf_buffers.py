@@ -19,6 +19,7 @@ from katana450.extensions.importers.companions import Companions
 from katana450.extensions.importers.gltf_document import Accessor, Document, DracoPart, MeshoptView
 from katana450.extensions.importers.library_errors import failures_in_words
 from katana450.extensions.importers.surface import doubles
+from katana450.extras import library
 from katana450.maths.geometry.arrays import FloatArray
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -77,10 +78,9 @@ class Buffers:
     def draco(self, part: DracoPart) -> tuple[dict[str, npt.NDArray[Any]], npt.NDArray[Any]]:
         """Return the attributes of a compressed primitive by their names, and its triangles."""
         data = self._view(part.buffer_view)
+        decoder = library("DracoPy", "meshes", "glTF files with Draco compression")
         with failures_in_words(self._name):
-            import DracoPy
-
-            found = DracoPy.decode(data)
+            found = decoder.decode(data)
             by_id = {each["unique_id"]: each["data"] for each in found.attributes}
             faces = np.asarray(getattr(found, "faces", np.zeros((0, 3), np.uint32)))
         attributes = {

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.errors import InputError
+from katana450.errors import KatanaError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.importers.archive import ChoiceError
 from katana450.extensions.importers.shape_file import (
@@ -60,7 +60,7 @@ def answer(
         shape = read_shape(data, format, name, unit, up, main=main, missing=missing)
         body = convex_body(shape.vertices * shape.scale)
         shape = drawn(shape)
-    except InputError as error:
+    except KatanaError as error:
         found["error"] = str(error)
         if isinstance(error, ChoiceError):
             found["choices"] = error.choices

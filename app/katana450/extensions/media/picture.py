@@ -68,7 +68,7 @@ def picture(
 ) -> Picture:
     """Return the picture of the items as ``camera`` sees them.
 
-    Raises ConfigurationError without embreex.
+    Raises MissingExtraError without embreex.
     """
     return _Renderer(items, translucents, camera, theme).picture
 

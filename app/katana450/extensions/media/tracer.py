@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from katana450.errors import ConfigurationError
 from katana450.extensions.media.scene import Bools, Floats, Ints, RenderScene
+from katana450.extras import require
 
 NOTHING = -1
 """Triangle number of a ray that hits nothing."""
 
 
 def check_traceable() -> None:
-    """Raise ConfigurationError if embreex is missing, to report this before a long run.
-
-    It is a dependency on all platforms except Linux on arm64.
-    """
-    if importlib.util.find_spec("embreex") is None:
-        raise ConfigurationError(
-            "Pictures and films need embreex, which is not installed and has no wheel for Linux on "
-            "arm64. Build it from source: https://github.com/trimesh/embreex."
-        )
+    """Raise MissingExtraError if embreex is missing, to report this before a long run."""
+    require("embreex", "pictures", "Pictures and films")
 
 
 class Meeting(NamedTuple):
@@ -47,10 +39,10 @@ class Tracer:
     """A scene prepared for ray queries."""
 
     def __init__(self, scene: RenderScene) -> None:
-        """Build the acceleration structure. Raises ConfigurationError without embreex."""
+        """Build the acceleration structure. Raises MissingExtraError without embreex."""
         check_traceable()
-        rtcore: Any = importlib.import_module("embreex.rtcore_scene")
-        meshes: Any = importlib.import_module("embreex.mesh_construction")
+        rtcore: Any = import_module("embreex.rtcore_scene")
+        meshes: Any = import_module("embreex.mesh_construction")
         self._scene = rtcore.EmbreeScene()
         self._empty = not len(scene.faces)
         if not self._empty:

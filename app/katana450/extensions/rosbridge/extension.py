@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from katana450.errors import ConfigurationError
 from katana450.extension import Extension, ServeExtension
+from katana450.extras import require
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
@@ -50,11 +49,9 @@ def _origin(text: str) -> str:
 
 
 def _check_installed(options: Namespace, _facts: ServerFacts) -> None:
-    """Raise ConfigurationError, before the server starts, if the extra is missing."""
-    if options.foxglove is not None and find_spec("foxglove") is None:
-        raise ConfigurationError(
-            "--foxglove needs a library: pip install 'katana450[foxglove]', or leave it out."
-        )
+    """Raise MissingExtraError, before the server starts, if the extra is missing."""
+    if options.foxglove is not None:
+        require("foxglove", "foxglove", "Connections of Foxglove")
 
 
 def _routes(context: RouteContext) -> list[BaseRoute]:

@@ -41,7 +41,7 @@ class PictureViews:
     def __init__(
         self, views: Sequence[str], size: tuple[int, int], urdf: Path | None, bare: bool
     ) -> None:
-        """Take pictures of ``size`` [px]. Raises ConfigurationError without the renderer.
+        """Take pictures of ``size`` [px]. Raises MissingExtraError without the renderer.
 
         Args:
             views: names of the cameras.

@@ -1,0 +1,39 @@
+"""Libraries that only an extra of the package installs, and the command that adds them."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from katana450.errors import ConfigurationError
+
+
+class MissingExtraError(ConfigurationError):
+    """An extra of the package is not installed; the text has the command that installs it."""
+
+    def __init__(self, extra: str, purpose: str) -> None:
+        """``purpose``: what needs the ``extra``, in the plural, with a capital letter."""
+        python = shlex.quote(sys.executable)
+        # Environments of uv have no pip.
+        command = f"{python} -m pip install" if find_spec("pip") else f"uv pip install -p {python}"
+        super().__init__(f"{purpose} need the extra {extra!r}: {command} 'katana450[{extra}]'.")
+
+
+def library(module: str, extra: str, purpose: str) -> Any:
+    """Return the library ``module`` of an ``extra``, which ``purpose`` needs.
+
+    Raises MissingExtraError.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingExtraError(extra, purpose) from error
+
+
+def require(module: str, extra: str, purpose: str) -> None:
+    """Raise MissingExtraError as `library`, but do not load ``module``, which may take long."""
+    if find_spec(module) is None:
+        raise MissingExtraError(extra, purpose)
