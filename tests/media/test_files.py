@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,9 +13,10 @@ import numpy.typing as npt
 import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 
-from katana450.errors import ConfigurationError, InputError
+from katana450.errors import InputError
+from katana450.extensions.media.ffmpeg import ffmpeg
 from katana450.extensions.media.film import write_film
-from katana450.extensions.media.tracer import check_traceable
+from katana450.extras import MissingExtraError
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -87,7 +90,38 @@ def test_invalid_film_is_refused(
         write_film(tmp_path / "film.mp4", frames(), size, fps)
 
 
-def test_missing_embreex_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    with pytest.raises(ConfigurationError, match="need embreex"):
-        check_traceable()
+@pytest.fixture
+def on_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Return the path of a program ``ffmpeg`` that would be found first."""
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=os.pathsep)
+    ffmpeg.cache_clear()
+    yield tmp_path / "ffmpeg"
+    ffmpeg.cache_clear()
+
+
+def script(path: Path, text: str) -> None:
+    path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    path.chmod(0o755)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the program is a shell script")
+def test_ffmpeg_of_the_system_is_used_if_it_has_the_codec(
+    on_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script(on_path, "echo ' V....D libx264'")
+    assert ffmpeg() == str(on_path)
+    ffmpeg.cache_clear()
+    script(on_path, "echo ' V....D mpeg4'")
+    assert ffmpeg() == get_ffmpeg_exe()
+    ffmpeg.cache_clear()
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'katana450\[films\]'"):
+        ffmpeg()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="the program is a shell script")
+def test_failure_of_ffmpeg_is_reported(on_path: Path, tmp_path: Path) -> None:
+    script(on_path, "echo libx264; cat > /dev/null; exit 1")
+    with pytest.raises(InputError, match="cannot be written: ffmpeg has failed"):
+        write_film(tmp_path / "film.mp4", frames(2), (WIDTH, HEIGHT), 25.0)
+    assert [each.name for each in tmp_path.iterdir()] == ["ffmpeg"]

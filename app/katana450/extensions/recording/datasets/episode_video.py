@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from katana450.errors import InputError
-from katana450.extensions.recording.datasets.lerobot_form import (
-    PIXEL_FORMAT,
-    VIDEO_MB,
-    VIDEO_PATH,
-    place,
-)
+from katana450.extensions.media.ffmpeg import VideoEncoder
+from katana450.extensions.recording.datasets.lerobot_form import VIDEO_MB, VIDEO_PATH, place
 from katana450.extensions.recording.datasets.statistics import PixelCounts
 
 CRF = 18
@@ -41,7 +34,7 @@ class EpisodeVideo:
             fps: pictures per second.
         """
         self._folder, self._feature, self._size, self._fps = folder, feature, size, fps
-        self._writer: Any = None
+        self._encoder: VideoEncoder | None = None
         self._path = folder
         self._file = -1
         self._written = self._begin = 0
@@ -51,9 +44,9 @@ class EpisodeVideo:
 
     def add(self, picture: npt.NDArray[np.uint8]) -> None:
         """Add the next ``picture`` (height, width, 3) of the present episode."""
-        if self._writer is None:
-            self._open()
-        self._writer.send(np.ascontiguousarray(picture))
+        if self._encoder is None:
+            self._encoder = self._open()
+        self._encoder.add(picture)
         self._episode.add(picture)
         self._written += 1
 
@@ -75,46 +68,23 @@ class EpisodeVideo:
         return row, statistics
 
     def finish(self) -> None:
-        """Complete the present file. Raises InputError if it lacks pictures, as on a full disk."""
-        if self._writer is None:
-            return
-        self._writer.close()
-        self._writer = None
-        ffmpeg: Any = import_module("imageio_ffmpeg")
-        found, _ = ffmpeg.count_frames_and_secs(str(self._path))
-        if found != self._written:
-            raise InputError(
-                f"The video of {self._feature} has {found} of {self._written} pictures. Is the "
-                "disk full?"
-            )
+        """Complete the present file. Raises OSError if that fails, as on a full disk."""
+        if self._encoder is not None:
+            self._encoder.finish()
+            self._encoder = None
 
     def abandon(self) -> None:
         """End the encoder, whatever it has written."""
-        if self._writer is not None:
-            with suppress(OSError):
-                self._writer.close()
+        if self._encoder is not None:
+            self._encoder.abandon()
 
-    def _open(self) -> None:
+    def _open(self) -> VideoEncoder:
         self._file += 1
         chunk, file = place(self._file)
         name = VIDEO_PATH.format(video_key=self._feature, chunk_index=chunk, file_index=file)
         self._path = self._folder / name
         self._path.parent.mkdir(parents=True, exist_ok=True)
         self._written = self._begin = 0
-        ffmpeg: Any = import_module("imageio_ffmpeg")
-        self._writer = ffmpeg.write_frames(
-            str(self._path),
-            self._size,
-            fps=self._fps,
-            codec="libx264",
-            pix_fmt_out=PIXEL_FORMAT,
-            quality=None,
-            macro_block_size=2,
-            ffmpeg_log_level="error",
-            # Pictures that refer to later ones would not begin at time 0.
-            output_params=[
-                *("-crf", str(CRF), "-g", str(KEY_PICTURES), "-bf", "0"),
-                *("-movflags", "+faststart"),
-            ],
-        )
-        self._writer.send(None)
+        # Pictures that refer to later ones would not begin at time 0.
+        options = ("-crf", str(CRF), "-g", str(KEY_PICTURES), "-bf", "0")
+        return VideoEncoder(self._path, self._size, self._fps, *options)
