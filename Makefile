@@ -143,11 +143,13 @@ bench-kinematics: $(dev_ok)   ## inverse kinematics beside other libraries and b
 bench-kinematics-arms: $(dev_ok) ## the same for arms with six and seven axes
 	$(bin)/python -m benchmarks.kinematics_arms $(ARGS)
 
+# With the extra `gallery`, which is small. The tests use all others but `foxglove`.
 lock: $(dev_ok)               ## resolve the dependencies again into the two lock files
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
-	  --no-header pyproject.toml --group build --output-file requirements.lock
+	  --no-header pyproject.toml --group build --extra gallery --output-file requirements.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
-	  --no-header pyproject.toml --group dev --constraint requirements.lock \
+	  --no-header pyproject.toml --group dev --extra gallery --extra datasets --extra films \
+	  --extra meshes --extra pictures --extra serial --constraint requirements.lock \
 	  --output-file requirements-dev.lock
 	$(bin)/uv pip compile --upgrade --universal --generate-hashes --python-version 3.11 --quiet \
 	  --no-header --group pyproject.toml:js --output-file $(javascript)/requirements.lock

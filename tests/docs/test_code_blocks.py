@@ -52,6 +52,7 @@ ELSEWHERE = {
     "apt-get": "changes the system",
     "sudo apt": "changes the system",
     "uv tool install": "tests/packaging/test_tool_install.py",
+    "python -m pip install": "downloads; tests/packaging/test_extras.py has the messages",
     "pipx install": "installs the same package as uv; pipx is not among the dependencies",
     "docker": "needs a container service; .ci/image builds and runs the image without one",
     "export": "sets a variable for docker",

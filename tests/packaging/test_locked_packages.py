@@ -1,34 +1,67 @@
-"""Reports and films work with only the packages that ``make run`` installs."""
+"""The packages that ``make run`` installs are enough for what the README shows."""
 
 from __future__ import annotations
 
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
+
+from tests.exchange.compressed_gltf import draco_glb, meshopt_glb
+from tests.exchange.test_library_formats import dae, threemf
 
 ROOT = Path(__file__).resolve().parents[2]
-LOADED_ON_USE = ("imageio_ffmpeg", "matplotlib", "xacro")
-NOT_LOCKED = ("hypothesis", "mypy", "playwright", "pyarrow", "pytest")
+LOADED_ON_USE = ("git", "imageio_ffmpeg", "matplotlib", "xacro")
+EXTRAS = ("DracoPy", "embreex", "imageio_ffmpeg", "lxml", "networkx", "pyarrow", "serial")
+NOT_LOCKED = (*EXTRAS, "hypothesis", "mypy", "playwright", "pytest", "yourdfpy")
 MOTION = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
+VRML = """#VRML V2.0 utf8
+Shape { geometry IndexedFaceSet {
+  coord Coordinate { point [0 0 0, 30 0 0, 0 30 0, 0 0 30] }
+  coordIndex [0 2 1 -1 0 1 3 -1 0 3 2 -1 1 2 3 -1] } }
+"""
+READ = """
+from pathlib import Path
+from katana450.errors import KatanaError
+from katana450.extensions.importers.mesh_file import read_mesh
+for path in sorted(Path().iterdir()):
+    try:
+        print(path.name, len(read_mesh(path.read_bytes(), path.name, "mm").faces))
+    except KatanaError as error:
+        print(path.name, str(error)[-23:])
+"""
+DRAWN = """
+import sys
+from pathlib import Path
+from katana450.arm.robot.loader import load
+from katana450.extensions.export.glb import glb_files
+robot = load(Path(sys.argv[1]))
+print(all(glb_files(robot, robot.values(())).values()))
+"""
+ROBOT = """<robot name="parts"><link name="base">
+  <visual><geometry><mesh filename="part.dae"/></geometry></visual>
+  <visual><geometry><mesh filename="part.stl"/></geometry></visual>
+  <visual><geometry><cylinder radius="0.1" length="0.2"/></geometry></visual></link></robot>"""
 
 
-def run(folder: Path, *command: str | Path, seconds: float = 120.0) -> str:
-    """Return the output of ``command``, started in ``folder``."""
+def run(folder: Path, *command: str | Path, seconds: float = 120.0, status: int = 0) -> str:
+    """Return the output of ``command``, started in ``folder``; the errors if it has a status."""
     words = [str(part) for part in command]
     done = subprocess.run(
         words, cwd=folder, capture_output=True, text=True, check=False, timeout=seconds
     )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    assert done.returncode == status, done.stderr
+    return done.stderr if status else done.stdout
 
 
-def test_libraries_are_installed_without_those_of_the_tests(python: Path, tmp_path: Path) -> None:
+def test_libraries_of_extras_and_tests_are_not_installed(python: Path, tmp_path: Path) -> None:
     words = (
-        "import embreex.rtcore_scene, imageio_ffmpeg, matplotlib.pyplot, PIL.Image; "
-        f"from importlib.util import find_spec; print(*filter(find_spec, {NOT_LOCKED})); "
-        "imageio_ffmpeg.get_ffmpeg_exe()"
+        "import matplotlib.pyplot, PIL.Image; "
+        f"from importlib.util import find_spec; print(*filter(find_spec, {NOT_LOCKED}))"
     )
     assert run(tmp_path, python, "-c", words).split() == []
 
@@ -42,27 +75,53 @@ def test_libraries_are_loaded_on_use_only(python: Path, tmp_path: Path) -> None:
     assert run(tmp_path, python, "-c", words).split() == []
 
 
-@pytest.mark.long
-def test_report_of_a_demo(python: Path, tmp_path: Path) -> None:
-    """The command of the README."""
-    katana450 = python.parent / "katana450"
-    run(tmp_path, katana450, "demo", "circle", "--headless", "--report", "out")
-    found = {path.name for path in (tmp_path / "out").iterdir()}
-    assert found >= {"report.html", "report.json", "trace.csv", "tracing.png", "path.png"}
-
-
-@pytest.mark.long
-def test_film_of_a_motion(python: Path, tmp_path: Path) -> None:
+def test_films_ask_for_an_extra(python: Path, tmp_path: Path) -> None:
     (tmp_path / "m.csv").write_text(MOTION, encoding="utf-8")
     words = ("--trajectory", "m.csv", "--size", "64x48", "--fps", "4", "--out", "m.mp4")
-    run(tmp_path, python.parent / "katana450", "render", *words)
-    assert (tmp_path / "m.mp4").read_bytes()[4:8] == b"ftyp"
+    katana450 = python.parent / "katana450"
+    assert "'katana450[pictures]'" in run(tmp_path, katana450, "render", *words, status=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["m.csv"]
 
 
-def test_documents_name_no_further_installation() -> None:
-    for page in (
-        ROOT / "README.md",
-        ROOT / "examples" / "README.md",
-        *(ROOT / "docs").glob("*.md"),
-    ):
-        assert not re.search(r"\[report\]", page.read_text(encoding="utf-8")), page
+@pytest.mark.long
+def test_demo_writes_its_report_without_pictures(python: Path, tmp_path: Path) -> None:
+    """The command of the README."""
+    katana450 = python.parent / "katana450"
+    said = run(tmp_path, katana450, "demo", "circle", "--headless", "--report", "out")
+    assert said.count("'katana450[pictures]'") == 1
+    found = {path.name for path in (tmp_path / "out").iterdir()}
+    assert found >= {"report.html", "report.json", "trace.csv", "path.png", "joints.png"}
+    assert "tracing.png" not in found
+
+
+@pytest.mark.long
+def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
+    box = trimesh.creation.box((10.0, 20.0, 30.0))
+    for kind in ("stl", "obj", "ply", "off", "glb"):
+        box.export(tmp_path / f"box.{kind}")
+    (tmp_path / "draco.glb").write_bytes(draco_glb())
+    (tmp_path / "meshopt.glb").write_bytes(meshopt_glb())
+    (tmp_path / "l.3mf").write_bytes(threemf())
+    (tmp_path / "l.dae").write_bytes(dae())
+    (tmp_path / "v.wrl").write_text(VRML, encoding="utf-8")
+    found = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
+    assert found.pop("draco.glb").endswith("'katana450[meshes]'.")
+    assert found.pop("l.3mf").endswith("'katana450[meshes]'.")
+    assert len(found) == 8
+    assert all(int(faces) >= 2 for faces in found.values()), found
+
+
+def test_robots_of_other_files_are_drawn_without_extras(python: Path, tmp_path: Path) -> None:
+    (tmp_path / "part.dae").write_bytes(dae())
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    ball.vertices *= np.array((1.0, 2.0, 3.0))
+    ball.export(tmp_path / "part.stl")
+    (tmp_path / "arm.urdf").write_text(ROBOT, encoding="utf-8")
+    assert run(tmp_path, python, "-c", DRAWN, "arm.urdf").split() == ["True"]
+
+
+def test_documents_list_the_extras_of_the_project() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert sorted(listed) == sorted(project["optional-dependencies"])
