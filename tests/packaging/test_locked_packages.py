@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
 import numpy as np
+import pip
 import pytest
 import trimesh
 
@@ -17,7 +19,12 @@ from tests.exchange.test_library_formats import dae, threemf
 ROOT = Path(__file__).resolve().parents[2]
 LOADED_ON_USE = ("git", "imageio_ffmpeg", "matplotlib", "xacro")
 EXTRAS = ("DracoPy", "embreex", "imageio_ffmpeg", "lxml", "networkx", "pyarrow", "serial")
-NOT_LOCKED = (*EXTRAS, "hypothesis", "mypy", "playwright", "pytest", "yourdfpy")
+NOT_LOCKED = (*EXTRAS, "hypothesis", "mypy", "playwright", "pytest", "scipy", "yourdfpy")
+MAX_SIZE = 330
+"""[MiB] What `make run` may put into `.venv` on Linux."""
+TOOLS = ("pip", "setuptools")
+"""Packages that are in each new environment, setuptools before Python 3.12."""
+
 MOTION = "t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n0.5,1,-1.19,1.48,0.14\n"
 VRML = """#VRML V2.0 utf8
 Shape { geometry IndexedFaceSet {
@@ -64,6 +71,16 @@ def test_libraries_of_extras_and_tests_are_not_installed(python: Path, tmp_path:
         f"from importlib.util import find_spec; print(*filter(find_spec, {NOT_LOCKED}))"
     )
     assert run(tmp_path, python, "-c", words).split() == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="wheels of other systems have other sizes")
+def test_first_installation_is_small(python: Path, tmp_path: Path) -> None:
+    # The fixture has links to the packages, and each file counts once.
+    (site,) = python.parents[1].glob("lib/python*/site-packages")
+    tools = [Path(pip.__file__).parent.parent / name for name in TOOLS]
+    folders = [site, *(folder for folder in tools if folder.is_dir())]
+    used = run(tmp_path, "du", "--summarize", "--total", "-mL", *folders).splitlines()
+    assert int(used[-1].split()[0]) <= MAX_SIZE
 
 
 def test_libraries_are_loaded_on_use_only(python: Path, tmp_path: Path) -> None:

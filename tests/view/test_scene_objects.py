@@ -115,6 +115,10 @@ def test_mesh_without_triangles_is_drawn_as_its_convex_body(
     shape = internals.nodes(server)[f"{PATH}/shape"]
     assert isinstance(shape, viser.MeshHandle)
     np.testing.assert_allclose(np.ptp(shape.vertices, axis=0), mesh.solid.size, atol=1e-6)
+    # Its faces look outwards, or the volume would be another one.
+    hull = trimesh.Trimesh(mesh.solid.corners).convex_hull
+    body = trimesh.Trimesh(shape.vertices, shape.faces)
+    assert body.volume == pytest.approx(hull.volume, rel=1e-4)
     nodes.follow(seen(state))
 
 

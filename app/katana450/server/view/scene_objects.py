@@ -14,6 +14,7 @@ from katana450.arm.robot.creases import Drawn, drawn, glb
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.visual import Visual
+from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.server.view.scene import Window
@@ -211,7 +212,12 @@ def _hull(solid: Solid) -> Any:
     """Return the convex body that stands for a mesh."""
     import trimesh
 
-    return trimesh.Trimesh(solid.corners).convex_hull
+    points, faces = solid.corners, hull_triangles(solid.corners)
+    a, b, c = points[faces].transpose(1, 0, 2)
+    outwards = np.cross(b - a, c - a)
+    turned = np.einsum("mi,mi->m", outwards, a - points.mean(axis=0)) < 0.0
+    faces[turned] = faces[turned, ::-1]
+    return trimesh.Trimesh(points, faces)
 
 
 def form(scene_object: SceneObject) -> Any:
