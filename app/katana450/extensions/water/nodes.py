@@ -226,7 +226,7 @@ def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> byt
         roughnessFactor=ROUGH,
         alphaMode="BLEND",
     )
-    mesh = trimesh.Trimesh(corners, faces, process=False, visual=textured(material=material))
-    mesh.vertex_normals = smooth_normals(corners, faces)
+    mesh: Any = trimesh.Trimesh(corners, faces, process=False, visual=textured(material=material))
+    mesh.vertex_normals = smooth_normals(corners, faces.astype(np.int64))
     glb: Any = mesh.export(file_type="glb", include_normals=True)
     return bytes(glb)
