@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -102,32 +101,6 @@ def test_log_shows_the_exchanges_in_words(server: EmulatorServer, tmp_path: Path
     assert lines[4].startswith("< refused")
     assert lines[5] == "> ErrorQuery"
     assert "axis is not calibrated" in lines[6]
-
-
-def test_log_is_followed_line_by_line(tmp_path: Path) -> None:
-    file = tmp_path / "exchanges.log"
-    file.write_text("1.5 =\n")
-    process = subprocess.Popen(
-        [*KATANA450, "arm", "log", str(file), "--follow"],
-        stdout=subprocess.PIPE,
-        text=True,
-        cwd=ROOT,
-    )
-    assert process.stdout is not None
-    try:
-        assert process.stdout.readline().endswith("connected\n")
-        with file.open("a") as log:
-            log.write("2.5 > 01 18 01 5A")
-            log.flush()
-            time.sleep(0.3)
-            log.write(" 3B 80\n")
-        killer = threading.Timer(TIMEOUT, process.kill)
-        killer.start()
-        assert process.stdout.readline().endswith("> EchoRequest\n")
-        killer.cancel()
-    finally:
-        process.kill()
-        process.communicate()
 
 
 def test_line_that_is_none_of_a_log_is_reported() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
@@ -20,9 +19,6 @@ from katana450.extensions.real_arm.codec.host_codec import (
 from katana450.extensions.real_arm.codec.replies import FirmwareError
 from katana450.extensions.real_arm.codec.wire_message import WireMessage
 from katana450.extensions.real_arm.link import logged
-
-EVERY = 0.2
-"""[s] Interval at which further lines are looked for."""
 
 
 class ExchangeDecoder:
@@ -100,27 +96,13 @@ def _shown(value: object) -> str:
 
 def show_log(options: Namespace) -> int:
     """Run ``katana450 arm log`` and return the exit status. Raises InputError."""
+    path: Path = options.file
     decoder = ExchangeDecoder()
-    for line in _lines(options.file, follow=options.follow):
-        for words in decoder.words(line):
-            print(words, flush=options.follow)
-    return 0
-
-
-def _lines(path: Path, *, follow: bool) -> Iterator[str]:
     try:
         with path.open(encoding="ascii", errors="replace") as file:
-            begun = ""
-            while True:
-                part = file.readline()
-                if part.endswith("\n"):
-                    yield begun + part
-                    begun = ""
-                elif not follow:
-                    return
-                else:
-                    # The rest of a line that is being written follows.
-                    begun += part
-                    time.sleep(EVERY)
+            for line in file:
+                for words in decoder.words(line):
+                    print(words)
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from error
+    return 0

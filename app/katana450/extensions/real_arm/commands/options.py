@@ -94,9 +94,6 @@ def add_arm_command_options(parser: argparse.ArgumentParser) -> None:
     probe.add_argument("url", metavar="URL", help=ADDRESS_HELP)
     log = acts.add_parser("log", help="show the exchanges that `serve --arm-log FILE` has written")
     log.add_argument("file", type=Path, metavar="FILE", help="file of the exchanges")
-    log.add_argument(
-        "--follow", action="store_true", help="wait for further exchanges until Ctrl-C"
-    )
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
