@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from benchmarks.collision import DRIVES, RawMeshes, main, tick_rows, world_on_table
+from benchmarks.collision import DRIVES, main, tick_rows, world_on_table
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 
@@ -17,15 +16,6 @@ def test_both_tables_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "the nearest pair" in printed
     for drive in DRIVES:
         assert drive in printed
-
-
-def test_raw_meshes_are_no_nearer_than_the_hulls(robot: Robot) -> None:
-    world = world_on_table(robot)
-    raw = RawMeshes(robot, world)
-    for x in np.random.default_rng(1).uniform(-0.5, 0.5, (5, 6)):
-        contact = world.nearest(x)
-        assert contact is not None
-        assert raw.nearest(x) >= contact.distance - 1e-6
 
 
 def test_drives_end_as_their_names_say(robot: Robot, arm: MountedArm) -> None:
