@@ -21,7 +21,6 @@ from katana450.client import Client, RefusedError
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import (
-    AllowUnattended,
     Breakpoints,
     Program,
     ProgramOrder,
@@ -151,7 +150,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
     }  # fmt: skip
     # A five-axis arm refuses a rotation; tests/general_arms has it.
     other_arms = {requests.Orient}
-    commands = {*EVERY_REQUEST} - {Breakpoints, AllowUnattended}
+    commands = {*EVERY_REQUEST} - {Breakpoints}
     assert {*samples} | no_commands | other_arms <= commands
     plain = commands - {*samples} - no_commands - other_arms
     samples |= {kind: [plain_sample(kind)] for kind in sorted(plain, key=str)}

@@ -19,7 +19,7 @@ from katana450.extensions.programs.extension import OWNER_SILENCE
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests
-from katana450.server.api.program_requests import AllowUnattended, ProgramOrder, Steer
+from katana450.server.api.program_requests import ProgramOrder, Steer
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
@@ -106,37 +106,6 @@ def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
     table.programs.steer(other, ProgramOrder.END)
     assert table.status == "stopped"
     assert table.arm.holds
-
-
-def test_admin_forbids_unattended_programs(table: Staged) -> None:
-    owner, admin = table.join(PAGES[0], Role.OPERATOR), table.join(PAGES[1], Role.ADMIN)
-    run(table, owner)
-    table.wait(LONG, admin)
-    dispatcher, budget = Dispatcher(table.hub), Budgets(table.hub.clock).of("owner")
-    with pytest.raises(LeaseError, match="Only an admin"):
-        dispatcher.handle(owner, AllowUnattended(allowed=False), budget)
-    table.wait(2.0 * OWNER_SILENCE, admin)
-    assert table.status == "running"
-    table.programs.handle(admin, AllowUnattended(allowed=False))
-    table.wait(0.1, admin)
-    assert table.status == "stopped"
-    table.plan(owner)
-    with pytest.raises(LeaseError, match="not allowed"):
-        table.programs.handle(owner, Steer(order=ProgramOrder.RUN, unattended=True))
-    assert table.status == "ready"
-    table.programs.handle(admin, AllowUnattended(allowed=True))
-    run(table, owner)
-
-
-def test_forbidden_program_runs_on_while_its_owner_is_there(table: Staged) -> None:
-    owner, admin = table.join(PAGES[0], Role.OPERATOR), table.join(PAGES[1], Role.ADMIN)
-    run(table, owner)
-    table.wait(2.0, owner, admin)
-    table.programs.handle(admin, AllowUnattended(allowed=False))
-    table.wait(2.0, owner, admin)
-    assert table.status == "running"
-    table.wait(2.0 * OWNER_SILENCE, admin)
-    assert table.status == "stopped"
 
 
 def test_server_option_forbids_unattended_programs(session: Session) -> None:

@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar
 from msgspec import Meta
 
 from katana450.server.api.fields import (
-    ADMIN,
     COMMAND,
     MAX_REQUEST_BYTES,
     MotionRequest,
@@ -61,11 +60,11 @@ class Steer(MotionRequest, frozen=True, kw_only=True):
 
     A program drives as a participant of its own. Its owner must stay connected unless ``run`` or
     ``step`` begins it with ``unattended``; then it ends by itself, by STOP, by ``end`` of its owner
-    or an admin, or when an admin takes the lease or forbids unattended programs. During planning,
-    ``run`` and ``step`` take effect afterwards, unless the arm is commanded to move, hold or stop
-    in between; ``pause`` makes it start paused, and ``end`` cancels the planning. A program that is
-    to run from another posture or scene than it was planned for is planned again first. An arm that
-    is paused when a program begins stays paused until ``resume``.
+    or an admin, or when an admin takes the lease. During planning, ``run`` and ``step`` take effect
+    afterwards, unless the arm is commanded to move, hold or stop in between; ``pause`` makes it
+    start paused, and ``end`` cancels the planning. A program that is to run from another posture or
+    scene than it was planned for is planned again first. An arm that is paused when a program
+    begins stays paused until ``resume``.
 
     ``run`` and ``step`` with ``at`` begin at this step, from 1, from where the arm stands; the
     steps before it are left out, except those that choose the tool frame or the speed. A program
@@ -93,16 +92,5 @@ class Breakpoints(Request, frozen=True, kw_only=True):
     steps: Annotated[tuple[Annotated[int, Meta(ge=1)], ...], Meta(max_length=MAX_BREAKPOINTS)]
 
 
-class AllowUnattended(Request, frozen=True, kw_only=True):
-    """Allow or forbid programs that run without their owner. For admins only.
-
-    If forbidden, a running one ends unless its owner sends heartbeats.
-    """
-
-    traits: ClassVar[RequestTraits] = ADMIN
-
-    allowed: bool
-
-
-REQUESTS = (Program, Steer, Breakpoints, AllowUnattended)
+REQUESTS = (Program, Steer, Breakpoints)
 """All requests of this module."""

@@ -78,15 +78,6 @@ class ProgramOwner:
         if unattended and not self._allowed:
             raise LeaseError("Unattended programs are not allowed on this server.")
 
-    def allow_unattended(self, by: Person, *, allowed: bool) -> None:
-        """Allow or forbid unattended programs. A running one needs its owner again if forbidden.
-
-        ``by`` is the admin who does so.
-        """
-        self._allowed = allowed
-        self.unattended = self.unattended and allowed
-        log.warning("%s %s unattended programs.", by.name, "allowed" if allowed else "forbade")
-
     @property
     def is_here(self) -> bool:
         """True if the owner is connected."""

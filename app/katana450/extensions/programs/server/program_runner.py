@@ -106,8 +106,6 @@ class ProgramRunner(Runner):
                 return answers.Done(ticket=ticket, outcome=None if ticket else ACCEPTED)
             case requests.Breakpoints(steps=steps):
                 self.set_breakpoints(participant, steps)
-            case requests.AllowUnattended(allowed=allowed):
-                self._owner.allow_unattended(participant.person, allowed=allowed)
         return answers.Done()
 
     def script(self, participant: Participant, text: str, *, more: bool, speed: float) -> None:
@@ -307,7 +305,6 @@ class ProgramRunner(Runner):
                 raise LeaseError(f"Not run: {changed}.")
             else:
                 check_may_drive(owner.person)
-                self._owner.check_unattended(unattended=unattended)
                 self._start(planning, owner, then, unattended=unattended)
         except LeaseError as error:
             planning.refused = str(error)
