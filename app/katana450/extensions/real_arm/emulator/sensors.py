@@ -37,15 +37,6 @@ def encoder_at_gap(gap: float) -> float:
     return CLOSED_ENCODER + turned * (OPEN_ENCODER - CLOSED_ENCODER)
 
 
-def gap_at_encoder(encoder: float) -> float:
-    """Return the gap of the finger tips [mm] at ``encoder`` counts of axis 6."""
-    turned = (encoder - CLOSED_ENCODER) / (OPEN_ENCODER - CLOSED_ENCODER)
-    angle = CLOSED_ANGLE + turned * (OPEN_ANGLE - CLOSED_ANGLE)
-    place = min(max(bisect_right(GAPS, angle, key=lambda row: row[0]), 1), len(GAPS) - 1)
-    (low, start), (high, end) = GAPS[place - 1], GAPS[place]
-    return start + (angle - low) / (high - low) * (end - start)
-
-
 def sensor_values(squeeze: float) -> tuple[int, ...]:
     """Return the bytes (16,) of all sensors. The others read 0: how they behave is not known.
 
