@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -11,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "app" / "katana450"
 GLOSSARY = ROOT / "docs" / "glossary.md"
 SECTION = "## One name, several classes"
+CLASS = re.compile(r"^class ([A-Za-z]\w*)", re.MULTILINE)
 
 
 def role(node: ast.ClassDef) -> str:
@@ -28,12 +30,16 @@ def role(node: ast.ClassDef) -> str:
 def defined_twice(package: Path) -> set[str]:
     """Return the names of public classes with several definitions at the top of modules.
 
-    A command, its request and its program step share a name.
+    A command, its request and its program step share a name. Most files are not parsed, as each
+    of their names is in one file only.
     """
+    texts = [file.read_text(encoding="utf-8") for file in sorted(package.rglob("*.py"))]
+    names = [CLASS.findall(text) for text in texts]
+    often = {name for name, times in Counter(sum(names, [])).items() if times > 1}
     roles: dict[str, list[str]] = {}
-    for file in sorted(package.rglob("*.py")):
-        for node in ast.parse(file.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+    for text in (text for text, found in zip(texts, names, strict=True) if often & {*found}):
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.ClassDef) and node.name in often:
                 roles.setdefault(node.name, []).append(role(node))
     return {
         name

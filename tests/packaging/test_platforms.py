@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import errno
 import os
+import re
 import signal
 import socket
 import stat
@@ -72,6 +73,8 @@ NAMES = {
     "windll",
 }
 PATHS = ("/tmp", "/proc", "/dev", "/etc")
+WORDS = re.compile("|".join(sorted(MODULES | NAMES | {"signal", *PATHS})))
+"""Text without any of them uses no such call."""
 
 SIGNALS = {"SIGINT", "SIG_IGN", "signal"}
 """Attributes of the module ``signal`` that every system has."""
@@ -79,7 +82,7 @@ SIGNALS = {"SIGINT", "SIG_IGN", "signal"}
 
 def used_names(source: str) -> Iterator[str]:
     """Yield the modules, names and paths in ``source`` that exist only on some systems."""
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(ast.parse(source)) if WORDS.search(source) else ():
         match node:
             case ast.Import(names=names):
                 yield from MODULES & {name.name.partition(".")[0] for name in names}
@@ -98,9 +101,7 @@ def used_names(source: str) -> Iterator[str]:
                 yield arg
             case ast.Constant(value=str(text)) if text in NAMES - {"poll", "nice"}:
                 yield text
-            case ast.Constant(value=str(text)) if text.startswith(
-                ("/tmp", "/proc", "/dev", "/etc")
-            ):
+            case ast.Constant(value=str(text)) if text.startswith(PATHS):
                 yield text
 
 
