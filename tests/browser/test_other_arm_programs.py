@@ -118,43 +118,6 @@ def test_script_is_previewed_paused_stopped_by_a_phone_and_continued(
     assert phone.errors == []
 
 
-@pytest.mark.long
-def test_drag_is_undone_and_a_server_lost_in_a_drag_is_found_again(
-    server: AppServer, open_page: OpenPage
-) -> None:
-    truth = Truth(server)
-    page = open_page(server.url, nodes=("/arm", MOVE), window=WIDE)
-    take(page)
-    before = truth.status()["goal"]
-    page.drag_arrow(MOVE, "z", -0.05)
-    at_rest(page, truth)
-    assert not np.allclose(truth.status()["goal"], before, atol=1e-3)
-    page.page.mouse.move(300, 300)
-    page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: np.allclose(truth.status()["goal"], before, atol=1e-6), "the undo")
-    at_rest(page, truth)
-
-    with page.grip_arrow(MOVE, "z") as grip:
-        grip.sweep(-0.06, 4)
-        server.kill()
-        page.wait_lost()
-        grip.sweep(0.02, 2)
-    server.start()
-    page.wait_until(lambda: page.connected, "the new server", seconds=60.0)
-    page.wait_ready(("/arm", MOVE))
-    truth = Truth(server)
-    rest = truth.status()["q"]
-    # The drag that was held is not taken up again.
-    page.page.wait_for_timeout(1000)
-    assert truth.status()["q"] == rest
-    take(page)
-    if truth.status()["stopped"] is not None:
-        clear_stop(page, truth)
-    page.drag_arrow(MOVE, "z", -0.04)
-    at_rest(page, truth)
-    assert not np.allclose(truth.status()["q"], rest, atol=1e-3)
-
-
 def test_taught_poses_of_six_axes_return_after_a_reload(
     server: AppServer, open_page: OpenPage
 ) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, connect
 from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer
@@ -55,18 +55,6 @@ def pose(client: Client) -> np.ndarray:
     return np.array(state(client).T)
 
 
-def test_description_has_a_tool(arm: Client) -> None:
-    found = description(arm)
-    assert found.joints_only == ""
-    assert found.default_tool == "tool0"
-    now = state(arm)
-    assert now.branch is not None
-    assert len(now.branch) == 3
-    assert now.pitch is None
-    assert now.margins is not None
-    assert now.margins.clearance is not None
-
-
 def test_pose_position_and_rotation_are_reached(arm: Client) -> None:
     T = pose(arm)
     T[:3, 3] += (0.05, 0.05, -0.05)
@@ -93,20 +81,6 @@ def test_step_has_six_numbers_and_undo_takes_it_back(arm: Client) -> None:
     np.testing.assert_allclose(pose(arm), T, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("request_", "why"),
-    [
-        (requests.StepTool(by=(0.0,) * 5), "6 numbers"),
-        (requests.Turn(pitch=0.0, roll=0.0), "pose or a rotation"),
-        (requests.Branch(name="left"), "left-up-noflip"),
-        (requests.Branch(shoulder="front", elbow="up"), "left-up-noflip"),
-    ],
-)
-def test_request_of_five_axes_is_refused(arm: Client, request_: requests.Request, why: str) -> None:
-    with pytest.raises(RefusedError, match=why):
-        arm.ask(request_)
-
-
 def test_branch_is_changed_around_contacts(arm: Client) -> None:
     T = pose(arm)
     found = arm.ask(requests.Query(at="branches"))
@@ -121,15 +95,6 @@ def test_branch_is_changed_around_contacts(arm: Client) -> None:
     arm.ask(requests.Branch(name=other.name, wait=60))
     assert "-".join(state(arm).branch or ()) == other.name
     np.testing.assert_allclose(pose(arm), T, atol=1e-6)
-
-
-def test_arm_stops_before_the_table(arm: Client) -> None:
-    T = pose(arm)
-    done = arm.ask(requests.Position(p=(T[0, 3], T[1, 3], -0.3), wait=30))
-    assert isinstance(done, answers.Done)
-    assert done.end is not None
-    assert done.end.how == "contact"
-    assert "table are" in done.end.why
 
 
 def test_gizmo_moves_and_turns_the_tool(server: AppServer, arm: Client) -> None:

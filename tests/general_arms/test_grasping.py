@@ -87,10 +87,6 @@ def place(scene_object: SceneObject) -> list[float]:
     return [x, y, z]
 
 
-def yaw(scene_object: SceneObject) -> float:
-    return float(np.degrees(np.arctan2(scene_object.T[1, 0], scene_object.T[0, 0])))
-
-
 def in_base(plan: Planned, state: State) -> FloatArray:
     """Return the pose (4, 4) of the object in the hand in the base frame."""
     assert state.held is not None
@@ -134,27 +130,6 @@ def test_fingers_close_on_the_sides_that_the_grasp_chose(name: str, tmp_path: Pa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", OF_FREE_AXES)
-def test_object_is_turned_as_the_script_says(name: str, tmp_path: Path) -> None:
-    box = item("part", "box", (40.0, 55.0, 60.0), (500.0, 100.0), 50.0)
-    steps = ["pick: part", "place: {at: {x: 400, y: -200, yaw: 25}}"]
-    end = played(planned(tmp_path, gripping_urdf(name), steps, box))[-1].objects[0]
-    assert place(end) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)
-    # Half a turn looks the same.
-    assert yaw(end) % 180.0 == pytest.approx(25.0, abs=1e-6)
-
-
-@pytest.mark.long
-def test_cylinder_is_grasped_from_the_front_and_set_down(tmp_path: Path) -> None:
-    can = item("can", "cylinder", (25.0, 110.0), (450.0, -150.0))
-    steps = ["grasp: {object: can, side: front}", "line: {by: {z: 80}}", "set_down:", "home"]
-    plan = planned(tmp_path, gripping_urdf("UR5e"), steps, can)
-    states = played(plan)
-    assert place(states[-1].objects[0]) == pytest.approx([450.0, -150.0, 0.0], abs=1e-6)
-    assert max(in_base(plan, state)[2, 3] for state in states if state.held) > 0.079
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     "name", ["OpenMANIPULATOR-X", pytest.param("Panda", marks=pytest.mark.long)]
 )
@@ -169,30 +144,6 @@ def test_box_is_stacked_on_another(name: str, tmp_path: Path) -> None:
     plan = planned(tmp_path, gripping_urdf(name), ["stack: {object: b, on: a}"], *boxes)
     b = next(each for each in played(plan)[-1].objects if each.name == "b")
     assert place(b) == pytest.approx([*bench.near, size[2]], abs=1e-6)
-
-
-@pytest.mark.long
-def test_released_object_stands_on_what_is_below_it(tmp_path: Path) -> None:
-    box = item("part", "box", (40.0, 50.0, 60.0), (500.0, 100.0))
-    steps = ["pick: part", "line: {by: {z: -53}}", "release", "home"]
-    states = played(planned(tmp_path, gripping_urdf("UR5e"), steps, box))
-    assert place(states[-1].objects[0]) == pytest.approx([500.0, 100.0, 0.0], abs=1e-6)
-
-
-@pytest.mark.long
-def test_low_box_is_held_by_the_fingertips(tmp_path: Path) -> None:
-    steps = ["pick: plate", "place: {at: {x: 400, y: -200}}"]
-    plan = planned(
-        tmp_path, gripping_urdf("UR5e"), steps, item("plate", "box", (40, 40, 14), (450, 0))
-    )
-    states = played(plan)
-    assert place(states[-1].objects[0]) == pytest.approx([400.0, -200.0, 0.0], abs=1e-6)
-    held = next(state for state in states if state.grip is not None)
-    world, hand = plan.session.world_at(held), plan.session.environment.hand
-    assert world is not None
-    assert hand is not None
-    for finger in hand.fingers:
-        assert STOP < world.gap(held.x_setpoint, finger, "table") <= 0.010
 
 
 def test_held_object_keeps_clear_of_a_wall_as_the_arm_does(tmp_path: Path) -> None:

@@ -135,16 +135,6 @@ def test_drag_stops_before_the_wall(arm: Client, session: Session, wall: SceneOb
     assert gap(session, wall, arm.query(answers.State).q) > STOP - 1e-6
 
 
-def test_typed_pose_behind_the_wall_is_not_reached(
-    arm: Client, session: Session, wall: SceneObject
-) -> None:
-    T = np.array(arm.query(answers.State).T)
-    T[:3, 3] = in_shoulder(arm, at(arm) + np.array((0.0, 0.25 * side(arm, wall), 0.0)))
-    rows: Any = tuple(map(tuple, T.tolist()))
-    meets_wall(arm.ask(requests.Pose(T=rows, wait=60)))
-    assert gap(session, wall, arm.query(answers.State).q) > STOP - 1e-6
-
-
 def test_slider_stops_before_the_wall(arm: Client, session: Session, wall: SceneObject) -> None:
     q = arm.query(answers.State).q
     meets_wall(arm.ask(requests.Joint(axis=1, value=q[0] + 1.6 * side(arm, wall), wait=60)))

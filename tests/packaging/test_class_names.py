@@ -6,6 +6,7 @@ import ast
 import re
 from collections import Counter
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,7 +36,7 @@ def defined_twice(package: Path) -> set[str]:
     """
     texts = [file.read_text(encoding="utf-8") for file in sorted(package.rglob("*.py"))]
     names = [CLASS.findall(text) for text in texts]
-    often = {name for name, times in Counter(sum(names, [])).items() if times > 1}
+    often = {name for name, times in Counter(chain(*names)).items() if times > 1}
     roles: dict[str, list[str]] = {}
     for text in (text for text, found in zip(texts, names, strict=True) if often & {*found}):
         for node in ast.parse(text).body:

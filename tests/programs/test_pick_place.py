@@ -108,23 +108,6 @@ def test_three_boxes_are_stacked(stage: Stage) -> None:
     assert place(end["c"])[:2] == pytest.approx([240.0, -100.0], abs=1e-6)
 
 
-@pytest.mark.long
-def test_stacked_box_is_picked_from_the_stack_again(stage: Stage) -> None:
-    steps = (
-        "- stack: {object: b, on: a}\n"
-        "- pick: b\n- place: {at: {x: 170, y: 200}}\n"
-        "- pick: a\n- place: {on: b}\n"
-    )
-    end = played(
-        stage,
-        steps,
-        box("a", (240.0, -100.0), (40.0, 40.0, 50.0)),
-        box("b", (240.0, 60.0), (40.0, 40.0, 50.0)),
-    )
-    assert place(end["b"]) == pytest.approx([170.0, 200.0, 0.0], abs=1e-6)
-    assert place(end["a"]) == pytest.approx([170.0, 200.0, 50.0], abs=1e-6)
-
-
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
     steps = "- pick: b\n- line: {by: {z: -53}}\n- release\n- home\n"
     end = played(stage, steps, box("b", NEAR))
