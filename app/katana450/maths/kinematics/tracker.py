@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Final
 
 import numpy as np
@@ -29,8 +28,6 @@ from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_p
 from katana450.maths.kinematics.planar import Interval
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
-    ANGLE_WORTH_TELLING,
-    POSITION_WORTH_TELLING,
     Projection,
     measured,
 )
@@ -76,14 +73,6 @@ MIN_LEAP_GAIN: Final = 5e-5
 """Smallest gain [m], [rad] of a leap that is reported: half of the arm's precision."""
 
 
-class TrackingStatus(Enum):
-    """The relation of the goal to the target."""
-
-    OK = "ok"
-    LIMITED = "limited"
-    GAP = "gap"
-
-
 @dataclass(frozen=True, eq=False)
 class Tracked:
     """The next pose of the goal, and the pose that only a leap would reach.
@@ -99,17 +88,6 @@ class Tracked:
     best: Projection
     beyond_gap: Projection | None = None
     since: DragTarget | None = None
-
-    @property
-    def status(self) -> TrackingStatus:
-        """GAP with a better pose beyond a gap, OK without a reportable error, else LIMITED."""
-        if self.beyond_gap is not None:
-            return TrackingStatus.GAP
-        given_up = (
-            self.best.position_error > POSITION_WORTH_TELLING
-            or self.best.rotation_error > ANGLE_WORTH_TELLING
-        )
-        return TrackingStatus.LIMITED if given_up else TrackingStatus.OK
 
     def leap_ahead(self) -> tuple[int, float]:
         """Return the axis (from 0) that would leap farthest to the pose beyond the gap.

@@ -66,11 +66,6 @@ class HostCodec:
         self._request: ArmRequest | None = None
         self._is_broken = False
 
-    @property
-    def waits(self) -> bool:
-        """True while a request has no answer."""
-        return self._request is not None
-
     def send(self, request: ArmRequest) -> bytes:
         """Return the bytes of ``request``, whose reply is expected next.
 

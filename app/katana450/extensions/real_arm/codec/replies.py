@@ -51,11 +51,6 @@ class ArmIdentity(ArmReply):
     text: bytes
     end: bytes = b"\r\n"
 
-    @property
-    def words(self) -> str:
-        """The text without what fills it up."""
-        return self.text.decode("ascii", "replace").strip("\0 ")
-
 
 @dataclass(frozen=True)
 class CommandTable(ArmReply):

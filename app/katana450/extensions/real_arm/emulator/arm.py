@@ -91,11 +91,6 @@ class EmulatedArm:
                 axis.freeze()
 
     @property
-    def is_calibrated(self) -> bool:
-        """True once each axis is calibrated."""
-        return all(axis.is_calibrated for axis in self.axes)
-
-    @property
     def is_calibrating(self) -> bool:
         """True while the axes search their stops."""
         return self._calibration is not None
