@@ -1,9 +1,11 @@
 # docker build -t katana450 .
+# With extras of docs/installation.md: docker build --build-arg EXTRAS=pictures,films -t katana450 .
 # Here alone:       docker run --rm -p 127.0.0.1:8080:8080 -p 127.0.0.1:8081:8081 katana450 serve --host 0.0.0.0 --insecure
 # Other machines:   docker run --rm -p 8080:8080 -p 8081:8081 --user $(id -u) -v ./access.json:/access.json katana450
 # Any image with Python 3.11 or newer and its venv module will do.
 ARG BASE=docker.io/library/python:3.12.11-slim-bookworm
 FROM ${BASE} AS build
+ARG EXTRAS=
 WORKDIR /src
 COPY requirements.lock ./
 RUN python3 -m venv /opt/katana450 \
@@ -12,7 +14,7 @@ COPY pyproject.toml README.md LICENSE ./
 COPY app app
 COPY robot_description robot_description
 COPY static static
-RUN /opt/katana450/bin/pip install --no-cache-dir --no-deps --no-build-isolation .
+RUN /opt/katana450/bin/pip install --no-cache-dir --no-build-isolation ".${EXTRAS:+[$EXTRAS]}"
 
 FROM ${BASE}
 COPY --from=build /opt/katana450 /opt/katana450
