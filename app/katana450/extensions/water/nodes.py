@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import viser
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.creases import smooth_normals
+from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -27,8 +26,7 @@ from katana450.maths.water.surface import (
 )
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
 from katana450.server.view.layer import LayerContext, ViewLayer
-from katana450.server.view.scene import Window
-from katana450.srgb import to_light
+from katana450.server.view.scene import Window, glb
 
 IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
 """Opacity (0 to 1) of the water in each place."""
@@ -212,21 +210,8 @@ def _glossy(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes
 
 
 def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:
-    import trimesh
-    from trimesh.visual import TextureVisuals
-    from trimesh.visual.material import PBRMaterial
-
-    # trimesh has no types for these classes.
-    pbr: Any = PBRMaterial
-    textured: Any = TextureVisuals
-    material = pbr(
-        # glTF has linear colours.
-        baseColorFactor=[*to_light(np.divide(look[:3], 255.0)), look[3]],
-        metallicFactor=0.0,
-        roughnessFactor=ROUGH,
-        alphaMode="BLEND",
-    )
-    mesh: Any = trimesh.Trimesh(corners, faces, process=False, visual=textured(material=material))
-    mesh.vertex_normals = smooth_normals(corners, faces.astype(np.int64))
-    glb: Any = mesh.export(file_type="glb", include_normals=True)
-    return bytes(glb)
+    red, green, blue = (part / 255.0 for part in look[:3])
+    material = Material("water", (red, green, blue), rough=ROUGH)
+    triangles = faces.astype(np.int64)
+    shape = VisualMesh(material, corners, smooth_normals(corners, triangles), triangles)
+    return glb([shape], look[3])

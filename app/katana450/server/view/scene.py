@@ -162,7 +162,7 @@ def _as_made(server: Window, name: str, link: Link, number: int) -> viser.GlbHan
     """Draw the visual of this ``number`` of ``link`` as the node ``name``."""
     visual = link.visuals[number]
     if visual.glb is None:
-        return server.scene.add_glb(name, _glb(link.shapes_by_visual[number]))
+        return server.scene.add_glb(name, glb(link.shapes_by_visual[number]))
     return server.scene.add_glb(
         name,
         visual.glb.read_bytes(),
@@ -171,7 +171,7 @@ def _as_made(server: Window, name: str, link: Link, number: int) -> viser.GlbHan
     )
 
 
-def _glb(shapes: Sequence[VisualMesh]) -> bytes:
+def glb(shapes: Sequence[VisualMesh], opacity: float = 1.0) -> bytes:
     """Return a binary glTF file of ``shapes`` with their normals and materials."""
     # Imported here, because the import takes longer than the rest of the start.
     import trimesh
@@ -182,7 +182,8 @@ def _glb(shapes: Sequence[VisualMesh]) -> bytes:
     for shape in shapes:
         name, colour, metallic, rough = shape.material
         material = looks.material.PBRMaterial(name, metallicFactor=metallic, roughnessFactor=rough)
-        material.baseColorFactor = [*to_light(colour), 1.0]
+        material.baseColorFactor = [*to_light(colour), opacity]
+        material.alphaMode = None if opacity == 1.0 else "BLEND"
         mesh: Any = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
         mesh.vertex_normals = shape.normals
         mesh.visual = looks.TextureVisuals(material=material)
