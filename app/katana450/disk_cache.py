@@ -1,7 +1,7 @@
 """Values that take long to compute, kept in files of this user between starts.
 
-Reading the meshes of a robot imports trimesh, which takes longer than everything else at the start
-of a server. A value that is kept does not need it.
+Reading a robot imports trimesh, which takes longer than everything else at the
+start of a server. A value that is kept needs neither.
 
 A file is found by a hash of the inputs, of the version of Python and the libraries, and of the size
 and time of every file of this package, so an old value is never used. Its content begins with its
@@ -35,7 +35,7 @@ T = TypeVar("T")
 MAX_FILES = 500
 """Number of files after which those that were not used for longest are deleted."""
 
-LIBRARIES = ("mujoco_core", "numpy", "trimesh")
+LIBRARIES = ("mujoco_core", "numpy", "trimesh", "yourdfpy")
 """Libraries whose version may change a value."""
 
 HASH_LENGTH = hashlib.sha256().digest_size

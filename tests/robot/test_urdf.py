@@ -1,4 +1,4 @@
-"""A URDF file is read once, as yourdfpy reads it, and its plain values are complete."""
+"""A URDF file is read once, by yourdfpy, and its plain values are complete."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree.ElementTree import Element, fromstring
+from typing import Any
 from xml.parsers import expat
 
 import numpy as np
@@ -120,14 +120,16 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         opened.append(args)
         return create(*args, **options)  # type: ignore[arg-type]
 
-    def parsed(data: bytes) -> Element:
-        opened.append(data)
-        return fromstring(data)
+    parse = yourdfpy.URDF.load
+
+    def parsed(file: Any, **options: bool) -> yourdfpy.URDF:
+        opened.append(file)
+        return parse(file, **options)
 
     # Nothing is kept from an earlier test.
     monkeypatch.setattr(disk_cache, "_folder", lambda: None)
     monkeypatch.setattr(expat, "ParserCreate", counted)
-    monkeypatch.setattr("katana450.arm.robot.urdf.fromstring", parsed)
+    monkeypatch.setattr(yourdfpy.URDF, "load", parsed)
     robot = load(path)
     values = robot.values(())
     for files in (
@@ -136,14 +138,15 @@ def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         glb_files(robot, values),
     ):
         assert all(files.values())
-    # One pass of the checks, one of the reader.
+    # One pass of the checks, one of yourdfpy.
     assert len(opened) == 2
 
 
 def test_libraries_are_loaded_when_they_are_needed() -> None:
     script = (
         "import sys; from katana450.arm.robot.loader import load;"
-        "load(); print([*({'mujoco', 'trimesh', 'viser'} & set(sys.modules))])"
+        "first = {'trimesh', 'yourdfpy'} & set(sys.modules); load();"
+        "print([*first, *({'mujoco', 'viser'} & set(sys.modules))])"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
@@ -175,10 +178,11 @@ def test_described_robot_needs_no_engine_until_a_distance_is_measured() -> None:
     ["<gazebo>" * 300 + "</gazebo>" * 300, f"<gazebo a='{'x' * 11_000_000}'/>"],
     ids=["deep", "long"],
 )
-def test_foreign_elements_of_any_size_are_passed_over(tmp_path: Path, part: str) -> None:
+def test_file_that_yourdfpy_reads_in_part_is_refused(tmp_path: Path, part: str) -> None:
     path = tmp_path / "far.urdf"
     path.write_text(f"<robot name='far'><link name='root'/>{part}</robot>")
-    assert [link.name for link in load(path).links] == ["root"]
+    with pytest.raises(RobotDescriptionError, match=r"far\.urdf cannot be read"):
+        load(path)
 
 
 def test_robot_without_arm_says_why() -> None:

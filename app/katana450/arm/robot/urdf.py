@@ -1,16 +1,17 @@
-"""A URDF file as plain values: links, joints and shapes."""
+"""A URDF file, read with yourdfpy, as plain values: links, joints and shapes."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
-from xml.etree.ElementTree import Element, fromstring
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from katana450.arm.robot.visual import GREY, Color, PrimitiveShape, Visual, mesh_file
+from katana450.disk_cache import kept
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
@@ -122,131 +123,117 @@ class Urdf:
         return order
 
 
+FILENAME = re.compile(rb"filename\s*=\s*[\"']([^\"']*)[\"']")
+"""The name of a mesh file in the contents of a URDF file."""
+
+
+class _Stream:
+    """A file that is read once, in one piece.
+
+    After a fault yourdfpy would read the file again and keep the parts that its parser accepts.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+
+    def read(self, _: int = -1) -> bytes:
+        data, self._data = self._data, b""
+        return data
+
+
 def urdf_of(data: bytes, folder: Path) -> Urdf:
     """Return the robot in ``data``, the contents of a file that passed the checks.
 
     ``folder``: the folder of the file, to which the names of mesh files are relative.
     """
-    robot = fromstring(data)
-    colors = {
-        each.get("name"): color
-        for each in robot.findall("material")
-        if (color := _rgb(each)) is not None
-    }
-    links = [_link(each, colors, folder) for each in robot.findall("link")]
-    joints = [_joint(each) for each in robot.findall("joint")]
+    # Which file a name refers to depends on the files that exist.
+    files = [mesh_file(name.decode(errors="replace"), folder) for name in FILENAME.findall(data)]
+    found = [f"{each} {each.is_file()}" for each in files]
+    return kept(lambda: _read(data, folder), Urdf, data, str(folder), *found)
+
+
+def _read(data: bytes, folder: Path) -> Urdf:
+    # Imported here, because the import takes longer than reading a file.
+    import yourdfpy
+
+    options = {"build_scene_graph": False, "load_meshes": False}
+    robot = yourdfpy.URDF.load(_Stream(data), **options).robot
+    colors = {each.name: each.color for each in robot.materials if each.color is not None}
     return Urdf(
-        name=robot.attrib["name"],
-        links={link.name: link for link in links},
-        joints={joint.name: joint for joint in joints},
+        name=robot.name,
+        links={link.name: _link(link, colors, folder) for link in robot.links},
+        joints={joint.name: _joint(joint) for joint in robot.joints},
     )
 
 
-def _link(link: Element, colors: Mapping[str | None, Color], folder: Path) -> UrdfLink:
+def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink:
     missing: tuple[list[Path], list[Path]] = ([], [])
     visuals, collisions = (
         tuple(
             visual
-            for shape in link.findall(kind)
+            for shape in shapes
             if (visual := _visual(shape, colors, folder, files)) is not None
         )
-        for kind, files in zip(("visual", "collision"), missing, strict=True)
+        for shapes, files in zip((link.visuals, link.collisions), missing, strict=True)
     )
     mass, center = 0.0, np.zeros(3)
-    stated = link.find("inertial/mass")
-    if stated is not None:
-        mass = max(float(stated.get("value", 0.0)), 0.0)
-        center = _origin(link.find("inertial"))[:3, 3]
+    if link.inertial is not None and link.inertial.mass is not None:
+        mass, center = max(link.inertial.mass, 0.0), _origin(link.inertial)[:3, 3]
     lost = tuple(missing[0]), tuple(missing[1])
-    return UrdfLink(link.attrib["name"], visuals, collisions, mass, frozen(center), lost)
+    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), lost)
 
 
-def _joint(joint: Element) -> UrdfJoint:
-    parent, child = (joint.find(end) for end in ("parent", "child"))
-    limit, mimic = joint.find("limit"), joint.find("mimic")
-    bounds = [next(iter(_numbers(limit, name)), None) for name in UrdfLimit._fields]
-    assert parent is not None
-    assert child is not None
+def _joint(joint: Any) -> UrdfJoint:
+    limit, mimic = joint.limit, joint.mimic
     return UrdfJoint(
-        name=joint.attrib["name"],
-        type=joint.attrib["type"],
-        parent=parent.attrib["link"],
-        child=child.attrib["link"],
+        name=joint.name,
+        type=joint.type,
+        parent=joint.parent,
+        child=joint.child,
         origin=_origin(joint),
-        axis=frozen(_numbers(joint.find("axis"), "xyz", "1 0 0")),
-        limit=None if limit is None else UrdfLimit(*bounds),
-        mimic=None
-        if mimic is None
-        else UrdfMimic(
-            mimic.attrib["joint"],
-            float(mimic.get("multiplier", 1.0)),
-            float(mimic.get("offset", 0.0)),
-        ),
+        axis=frozen(joint.axis),
+        limit=None if limit is None else UrdfLimit(limit.lower, limit.upper, limit.velocity),
+        mimic=None if mimic is None else UrdfMimic(mimic.joint, mimic.multiplier, mimic.offset),
     )
 
 
 def _visual(
-    shape: Element, colors: Mapping[str | None, Color], folder: Path, missing: list[Path]
+    shape: Any, colors: Mapping[str | None, Any], folder: Path, missing: list[Path]
 ) -> UrdfShape | None:
     """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
-    geometry = shape.find("geometry")
-    assert geometry is not None
-    form, scale, file = geometry[0], np.ones(3), None
+    geometry, scale, file = shape.geometry, np.ones(3), None
     primitive = None
-    match form.tag:
-        case "box":
-            primitive = PrimitiveShape("box", {"extents": _numbers(form, "size")})
-        case "cylinder":
-            radius, height = float(form.attrib["radius"]), float(form.attrib["length"])
-            primitive = PrimitiveShape("cylinder", {"radius": radius, "height": height})
-        case "sphere":
-            radius = float(form.attrib["radius"])
-            primitive = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": radius})
-        case _:
-            file = mesh_file(form.attrib["filename"], folder)
-            if not file.is_file():
-                missing.append(file)
-                return None
-            scale = np.broadcast_to(_numbers(form, "scale", "1"), 3)
+    if geometry.box is not None:
+        primitive = PrimitiveShape("box", {"extents": np.asarray(geometry.box.size).tolist()})
+    elif geometry.cylinder is not None:
+        primitive = PrimitiveShape(
+            "cylinder", {"radius": geometry.cylinder.radius, "height": geometry.cylinder.length}
+        )
+    elif geometry.sphere is not None:
+        radius = geometry.sphere.radius
+        primitive = PrimitiveShape("icosphere", {"subdivisions": 3, "radius": radius})
+    else:
+        file = mesh_file(geometry.mesh.filename, folder)
+        if not file.is_file():
+            missing.append(file)
+            return None
+        if geometry.mesh.scale is not None:
+            scale = np.broadcast_to(np.asarray(geometry.mesh.scale, dtype=float), 3)
     return UrdfShape(_origin(shape), frozen(scale), _color(shape, colors), file, primitive)
 
 
-def _color(shape: Element, colors: Mapping[str | None, Color]) -> Color:
-    """Return the colour of its material, or of the robot's material of that name."""
-    material = shape.find("material")
+def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:
+    """Return red, green and blue (0..255) of its material, or of the robot's one of that name."""
+    material = getattr(shape, "material", None)
     if material is None:
         return GREY
-    return _rgb(material) or colors.get(material.get("name")) or GREY
-
-
-def _rgb(material: Element) -> Color | None:
-    """Return red, green and blue (0..255) of ``material``; None if it states no colour."""
-    color = material.find("color")
+    color = colors.get(material.name) if material.color is None else material.color
     if color is None:
-        return None
-    parts = _numbers(color, "rgba", "1 1 1 1")
-    red, green, blue = (round(255.0 * min(max(part, 0.0), 1.0)) for part in parts[:3])
+        return GREY
+    red, green, blue = (round(255.0 * min(max(part, 0.0), 1.0)) for part in color.rgba[:3].tolist())
     return red, green, blue
 
 
-def _origin(element: Element | None) -> FloatArray:
+def _origin(element: Any) -> FloatArray:
     """Return the pose (4, 4) of the origin of ``element`` [m]; the identity if none is stated."""
-    origin = None if element is None else element.find("origin")
-    if origin is None:
-        return frozen(np.eye(4))
-    T, R = np.eye(4), np.eye(4)
-    T[:3, 3] = _numbers(origin, "xyz", "0 0 0")
-    # In the order of trimesh and yourdfpy: what follows from a robot stays the same to the bit.
-    rpy = _numbers(origin, "rpy", "0 0 0")
-    (si, sj, sk), (ci, cj, ck) = map(np.sin, rpy), map(np.cos, rpy)
-    cc, cs, sc, ss = ci * ck, ci * sk, si * ck, si * sk
-    R[0, :3] = cj * ck, sj * sc - cs, sj * cc + ss
-    R[1, :3] = cj * sk, sj * ss + cc, sj * cs - sc
-    R[2, :3] = -sj, cj * si, cj * ci
-    return frozen(T @ R)
-
-
-def _numbers(element: Element | None, name: str, default: str = "") -> list[float]:
-    """Return the numbers of an attribute, which commas may separate."""
-    text = default if element is None else element.get(name, default)
-    return [float(word) for word in text.replace(",", " ").split()]
+    return frozen(np.eye(4) if element.origin is None else element.origin)
