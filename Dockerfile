@@ -9,7 +9,7 @@ ARG EXTRAS=
 WORKDIR /src
 COPY requirements.lock ./
 RUN python3 -m venv /opt/katana450 \
- && /opt/katana450/bin/pip install --no-cache-dir --require-hashes --requirement requirements.lock
+ && /opt/katana450/bin/pip install --no-cache-dir --no-deps --require-hashes --requirement requirements.lock
 COPY pyproject.toml README.md LICENSE ./
 COPY app app
 COPY robot_description robot_description

@@ -161,16 +161,18 @@ clean:
 $(bin)/python:
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if v >= (3, 11) else f"katana450 needs Python 3.11 or newer; $(PYTHON) is {v[0]}.{v[1]}. Name another one: make PYTHON=python3.12 $(MAKECMDGOALS)")'
 	$(PYTHON) -m venv $(VENV)
+	@# Python 3.11 puts it there, and nothing here needs it.
+	@$(bin)/python -m pip --disable-pip-version-check --quiet uninstall --yes setuptools
 
 $(run_ok): requirements.lock pyproject.toml | $(bin)/python
 	@echo "Installing the locked dependencies into $(VENV) ..."
-	$(install) --require-hashes --requirement requirements.lock
+	$(install) --no-deps --require-hashes --requirement requirements.lock
 	$(editable)
 	@touch $@
 
 $(dev_ok): requirements-dev.lock pyproject.toml | $(bin)/python
 	@echo "Installing the locked development dependencies into $(VENV) ..."
-	$(install) --require-hashes --requirement requirements-dev.lock
+	$(install) --no-deps --require-hashes --requirement requirements-dev.lock
 	$(editable)
 	@touch $(run_ok) $@
 

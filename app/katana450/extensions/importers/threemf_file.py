@@ -43,8 +43,7 @@ def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
     ``maximum`` [bytes] limits the total size of the files of the archive.
     """
     _check_archive(data, name, maximum)
-    for module in ("lxml", "networkx"):
-        require(module, "meshes", "3MF files")
+    require("networkx", "meshes", "3MF files")
     builder = MeshBuilder(name)
     with failures_in_words(name):
         found = load_3MF(io.BytesIO(data))  # type: ignore[no-untyped-call]
