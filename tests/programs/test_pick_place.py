@@ -125,7 +125,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         pytest.param(
             "- pick: part\n- pick: low\n", "already holds an object", marks=pytest.mark.long
         ),
-        ("- pick: part\n- release\n", "part would fall 60 mm. Lower it to at most 10 mm"),
+        pytest.param("- pick: part\n- release\n", "part would fall 60 mm", marks=pytest.mark.long),
         ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         # The pitch of the grasp has nothing to do with it.
         pytest.param(
@@ -181,11 +181,14 @@ def test_what_cannot_be_done_is_refused_with_its_reason(
         planned(stage, steps, *objects)
 
 
-@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("steps", "stopped"),
     [
-        ("- pick: c\n- place: {at: {x: 240, y: -110}}\n", "c cannot be placed there: .* meet b"),
+        pytest.param(
+            "- pick: c\n- place: {at: {x: 240, y: -110}}\n",
+            "c cannot be placed there: .* meet b",
+            marks=pytest.mark.long,
+        ),
         (
             (
                 "- gripper: closed\n- move: {x: 0, y: -240, z: 50, pitch: 90, roll: 0}\n"
