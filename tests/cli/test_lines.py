@@ -88,13 +88,13 @@ def test_ik_takes_no_posture_unless_it_counts() -> None:
 
 @pytest.mark.parametrize("decimals", [6, 5, 4])
 def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
-    """Check that all 2,000 poses are answered within the error that the rounding implies.
+    """Check that all 500 poses are answered within the error that the rounding implies.
 
     Next to a stretched elbow a rounded point can be out of reach at its orientation. The
     orientation then changes by more than the rounding; ``residual_rad`` reports that.
     """
     chain = arm.chain
-    poses = [forward(chain, q) for q in random_postures(arm, 2000)]
+    poses = [forward(chain, q) for q in random_postures(arm, 500)]
     answers = ask("ik", [{"T": pose.round(decimals).tolist()} for pose in poses])
     assert [answer["error"] for answer in answers if "error" in answer] == []
     rounding = 0.5 * 10.0**-decimals
@@ -111,7 +111,7 @@ def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
             assert np.linalg.norm(found[:3, 3] - pose[:3, 3]) <= math.sqrt(3.0) * rounding + 1e-9
             angle = so3.angle(found[:3, :3], pose[:3, :3])
             assert angle <= 1.01 * turned + answer["residual_rad"] + 1e-9
-    assert beyond <= 20
+    assert beyond <= 5
 
 
 def random_postures(arm: MountedArm, count: int) -> FloatArray:

@@ -34,7 +34,7 @@ from tests.general_arms.published_arms import (
 )
 
 ARMS = {**FOUR, **SIX, **SEVEN, "Puma 560 seen from the tool": reversed_chain(PUMA_560)}
-POSTURES = 200
+POSTURES = 80
 CLEAR = 0.02
 """[m] or [1] What a person sees as clearly more than nothing."""
 

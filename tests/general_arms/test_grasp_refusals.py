@@ -41,12 +41,7 @@ STRAIGHT = item("part", "box", (25.0, 20.0, 50.0), (200.0, 0.0))
             *(["grasp: {object: part, pitch: 5}"], LOW, "at its place: .* and table would"),
             marks=pytest.mark.long,
         ),
-        (["pick: part", "pick: part"], PART, "already holds an object"),
-        (["place: {at: {x: 400, y: 0}}"], PART, "holds nothing to place"),
         (["set_down:"], PART, "holds no object that this program grasped"),
-        (["pick: part", "release"], PART, "part would fall 60 mm"),
-        (["pick: part", "place: {at: {x: 1700, y: 0}}"], PART, "nothing carries it there"),
-        (["pick: part", "place: {at: {x: 400, y: 0, z: 30}}"], PART, "put it 30.0 mm lower"),
         (["grip: {until: 5}"], PART, "pads of this gripper are not known"),
     ],
 )

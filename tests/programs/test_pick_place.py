@@ -122,16 +122,13 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- pick: far\n", r"far cannot be grasped at its place: The tool grasp cannot be at"),
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
-        pytest.param(
-            "- pick: part\n- pick: low\n", "already holds an object", marks=pytest.mark.long
-        ),
+        ("- pick: part\n- pick: low\n", "already holds an object"),
         pytest.param("- pick: part\n- release\n", "part would fall 60 mm", marks=pytest.mark.long),
         ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         # The pitch of the grasp has nothing to do with it.
-        pytest.param(
+        (
             "- pick: part\n- place: {at: {x: 230, y: 720}}\n",
             "nothing carries it there.*choose a place on it.$",
-            marks=pytest.mark.long,
         ),
         pytest.param(
             "- pick: part\n- place: {at: {x: 100, y: -40}}\n",
@@ -144,11 +141,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
             "basin is open at its top and cannot carry part",
             marks=pytest.mark.long,
         ),
-        pytest.param(
-            "- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n",
-            "put it 30.0 mm lower",
-            marks=pytest.mark.long,
-        ),
+        ("- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
         pytest.param(
             "- pick: part\n- place: {on: ball}\n", "ball cannot carry part", marks=pytest.mark.long
         ),
