@@ -135,6 +135,9 @@ def test_a_thread_keeps_as_many_geometries_as_it_has_room_for() -> None:
     for k, other in ((0, len(balls) - 1), (3, 4)):
         wanted = other - k - 1e-3 * (2 + k + other)
         assert distance(placed, k, other) == pytest.approx(wanted, abs=1e-9)
+    ball = sphere(0.25)
+    placed = placement(*((ball, T) for T in [*places, *places]))
+    assert distance(placed, 0, len(places) + 1) == pytest.approx(0.5, abs=1e-9)
     random = np.random.default_rng(2)
     for _ in range(3 * engine.VERTICES // 900):
         around = random.normal(size=(900, 3))

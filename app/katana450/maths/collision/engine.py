@@ -216,17 +216,21 @@ class _Bench:
         """Make the first geoms those of ``geometries``."""
         new = dict.fromkeys(each for each in geometries if each not in self._meshes)
         vertices = sum(len(each.vertices) for each in new)
-        model = self._model
-        if len(self._meshes) + len(new) > model.nmesh or self._used + vertices > model.nmeshvert:
+        model, count = self._model, len(geometries)
+        if (
+            count > model.ngeom
+            or len(self._meshes) + len(new) > model.nmesh
+            or (self._used + vertices > model.nmeshvert)
+        ):
             self._forget()
             new = dict.fromkeys(geometries)
             vertices = sum(len(each.vertices) for each in new)
-            if len(geometries) > model.nmesh or vertices > model.nmeshvert:
+            if count > model.ngeom or vertices > model.nmeshvert:
                 # With room for objects to come.
-                self._start(2 * len(geometries), 2 * vertices)
+                self._start(max(GEOMETRIES, 2 * count), max(VERTICES, 2 * vertices))
+                model = self._model
         for geometry in new:
             self._add(geometry)
-        model, count = self._model, len(geometries)
         model.geom_type[:count] = [KINDS[each.kind] for each in geometries]
         model.geom_size[:count] = [each.size for each in geometries]
         model.geom_dataid[:count] = [self._meshes[each] for each in geometries]

@@ -187,20 +187,7 @@ class CollisionWorld:
 
         None means that no two parts can meet.
         """
-        if not len(self.first):
-            return None
-        placed = self.at(x)
-        found = placed.likely_nearest()
-        best = placed.distance(found)
-        pairs, bounds = placed.nearer_than(best)
-        for number in np.argsort(bounds).tolist():
-            if bounds[number] >= best:
-                break
-            pair = int(pairs[number])
-            distance = placed.distance(pair)
-            if distance < best:
-                best, found = distance, pair
-        return placed.contact(found)
+        return self.at(x).nearest()
 
     def gap(self, x: FloatArray, one: str, *others: str) -> float:
         """Return the distance [m] of a part from the nearest of others that it may meet, at ``x``.
@@ -327,8 +314,24 @@ class PlacedWorld:
             positions = positions.copy()
             positions[body] = (T[world.mover_of[body]] @ world.T_mover_body[body])[:3, 3]
         movers, R_mover_body = world.frames
-        rotations = (T[movers, :3, :3] @ R_mover_body).reshape(-1, 9)
-        return Placement(world.geometries, positions, rotations[world.frame_of])
+        rotations = (T.take(movers, axis=0)[:, :3, :3] @ R_mover_body).reshape(-1, 9)
+        return Placement(world.geometries, positions, rotations.take(world.frame_of, axis=0))
+
+    def nearest(self) -> Contact | None:
+        """Return the contact of the nearest pair of bodies, as ``CollisionWorld.nearest``."""
+        if not len(self._world.first):
+            return None
+        nearest = self.likely_nearest()
+        best = self.distance(nearest)
+        pairs, bounds = self.nearer_than(best)
+        for number in np.argsort(bounds).tolist():
+            if bounds[number] >= best:
+                break
+            pair = int(pairs[number])
+            distance = self.distance(pair)
+            if distance < best:
+                best, nearest = distance, pair
+        return self.contact(nearest)
 
     def distance(self, pair: int) -> float:
         """Return the distance between the bodies of a pair [m]; a negative value is their depth."""

@@ -128,7 +128,7 @@ class SweptClearance:
             middle = 0.5 * (low + high)
             x = at(middle)
             placed = self.world.at(x)
-            here = self.world.nearest(x)
+            here = placed.nearest()
             if here is None:
                 return None
             if best is None or here.distance < best.contact.distance:
