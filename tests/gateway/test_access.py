@@ -153,6 +153,7 @@ def test_access_commands_give_list_and_revoke(
         main([*give_anna[:4], "--for", "forever", *options])
 
 
+@pytest.mark.long
 def test_public_server_without_links_is_well() -> None:
     command = (sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0", "--port", "{port}")
     with AppServer((*command, "--insecure")) as server:

@@ -88,11 +88,12 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         (FATAL, "The arm's process ended with status 1"),
-        pytest.param(MUTE, "no longer reaches the page's server", marks=pytest.mark.long),
+        (MUTE, "no longer reaches the page's server"),
     ],
     ids=["its loop has ended", "its states reach no page"],
 )

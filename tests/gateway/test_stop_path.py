@@ -260,6 +260,7 @@ def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
         assert (status, answer["stop"]) == (200, "confirmed")
 
 
+@pytest.mark.long
 def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> None:
     path = tmp_path / "access.json"
     links = AccessFile.create(path)

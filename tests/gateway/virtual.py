@@ -418,7 +418,8 @@ class VirtualServer:
         real, thread = time.sleep, threading.current_thread()
 
         def sleep(seconds: float) -> None:
-            if threading.current_thread() is thread:
+            # A thread of the server, in whose place this one works, waits in fact.
+            if threading.current_thread() is thread and not self.loop.is_running():
                 self.sleep(seconds)
             else:
                 real(seconds)
