@@ -11,11 +11,14 @@ import os
 import sys
 from collections import OrderedDict
 from contextlib import suppress
-from pathlib import PurePath
+from functools import cache
+from pathlib import Path, PurePath
 from typing import Any
 
 import pytest
 from xdist.scheduler.loadscope import LoadScopeScheduling
+
+ROOT = Path(__file__).resolve().parents[1]
 
 BROWSER = "browser"
 SERVERS = ("servers, first half", "servers, second half")
@@ -68,16 +71,26 @@ GATEWAY = PurePath("tests/gateway")
 SECOND_HALF = "test_m"
 """Name from which on the files of this folder belong to the second half."""
 
+IN_PROCESS = "tests/gateway, in one process"
+"""Kind of the tests of this folder that start no server. Together they make one robot."""
+
 
 def kind_of(nodeid: str) -> str:
     """Return the kind of a test: browser, servers, or the file of a test that only computes."""
     path = PurePath(nodeid.partition("::")[0])
     if path.parent == GATEWAY:
-        return SERVERS[path.name >= SECOND_HALF]
+        return SERVERS[path.name >= SECOND_HALF] if starts_servers(path) else IN_PROCESS
     for each in (path, *path.parents):
         if each.as_posix() in KINDS:
             return KINDS[each.as_posix()]
     return path.as_posix()
+
+
+@cache
+def starts_servers(path: PurePath) -> bool:
+    """Return whether the file of tests at ``path`` uses a server in other processes."""
+    text = (ROOT / path).read_text(encoding="utf-8")
+    return any(word in text for word in ("AppServer", "Site", "aconnect"))
 
 
 class Queue(OrderedDict[str, Any]):

@@ -1,11 +1,9 @@
-"""Test a mechanism outside the family on a real server: its joints move, and it has no tool."""
+"""Test a mechanism outside the family: its joints move, and it has no tool."""
 
 from __future__ import annotations
 
-import asyncio
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +11,15 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.robot.joint_labels import joint_labels
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.cli.main import main
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program
-from tests.browser.server import APP, AppServer
+from katana450.settings import Settings
 from tests.exchange.trees import tree
-from tests.gateway.client import ask, opened
-
-pytestmark = pytest.mark.long
+from tests.gateway.virtual import VirtualServer
 
 SEED = 5
 
@@ -37,14 +32,17 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def robot(path: Path) -> Robot:
-    return load(path)
+def described(path: Path) -> DescribedRobot:
+    return find_robot(Settings(), path, None)
 
 
 @pytest.fixture(scope="module")
-def server(path: Path) -> Iterator[AppServer]:
-    with AppServer((*APP, "--urdf", str(path))) as server:
-        yield server
+def robot(described: DescribedRobot) -> Robot:
+    joints = described.robot.joint_group
+    assert any(joints.slides)
+    assert not all(joints.slides)
+    assert len(described.robot.joints) > joints.n
+    return described.robot
 
 
 def somewhere(robot: Robot, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -52,34 +50,26 @@ def somewhere(robot: Robot, seed: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.random.default_rng(seed).uniform(0.9 * joints.lower, 0.9 * joints.upper)
 
 
-def test_mechanism_has_sliding_and_driven_joints(robot: Robot) -> None:
-    joints = robot.joint_group
-    assert any(joints.slides)
-    assert not all(joints.slides)
-    assert len(robot.joints) > joints.n
-    assert any(len(robot.children(link)) > 1 for link in robot.links)
-
-
 def test_every_link_is_where_another_program_has_it(
-    live_program: Client, robot: Robot, path: Path
+    program: Client, robot: Robot, path: Path
 ) -> None:
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
     for seed in range(3):
         q = somewhere(robot, seed)
-        there = live_program.joints(q)
+        there = program.joints(q)
         np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
         # It gets the driven joints alone, and computes the following joints itself.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
-        poses = {link.name: link.T for link in live_program.query(answers.Links).links}
+        poses = {link.name: link.T for link in program.query(answers.Links).links}
         assert set(poses) == set(urdf.link_map)
         for name, T in poses.items():
             np.testing.assert_allclose(T, urdf.get_transform(name), rtol=0, atol=1e-9)
 
 
 def test_arm_answer_gives_the_reason_for_joints_only(
-    server: AppServer, live_program: Client, robot: Robot
+    local: VirtualServer, described: DescribedRobot, program: Client, robot: Robot
 ) -> None:
-    description = live_program.query(answers.Arm)
+    description = program.query(answers.Arm)
     assert description.joints == list(robot.joint_group.names)
     assert description.slides == list(robot.joint_group.slides)
     assert (
@@ -94,7 +84,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
         None,
     )
     assert "carries a tool. Its joints are j1 (prismatic)" in description.joints_only
-    state = live_program.query(answers.State)
+    state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
     eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
@@ -104,22 +94,22 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     ]  # fmt: skip
     for request in cartesian:
         with pytest.raises(RefusedError, match=r"Only its joints can be driven\. .*carries a tool"):
-            live_program.ask(request)
-    status, _, body = ask(f"{server.url}/api/v1/branches")
+            program.ask(request)
+    status, _, body = local.ask("/api/v1/branches")
     assert status == 409
     assert "Only its joints" in json.loads(body)["why"]
     with pytest.raises(RefusedError, match=f"no axis {robot.joint_group.n + 1}: the robot has"):
-        live_program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
+        program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, but the command has 2"):
-        live_program.ask(requests.Joints(q=[0.0, 0.0]))
-    assert "Joints only." in server.output
+        program.ask(requests.Joints(q=[0.0, 0.0]))
+    assert "Joints only." in described.notes[-1]
 
 
 def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
-    live_program: Client, robot: Robot
+    program: Client, robot: Robot
 ) -> None:
     slide = robot.joint_group.slides.index(True)
-    there = live_program.go(requests.Joint(axis=slide + 1, value=2.0))
+    there = program.go(requests.Joint(axis=slide + 1, value=2.0))
     assert there.q[slide] == robot.joint_group.upper[slide]
     (finding,) = there.findings
     assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
@@ -128,67 +118,44 @@ def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
 
 
 def test_stop_pause_and_lease_are_those_of_an_arm(
-    server: AppServer, live_program: Client, robot: Robot
+    local: VirtualServer, program: Client, robot: Robot
 ) -> None:
-    live_program.ask(requests.Speed(value=0.05))
+    program.ask(requests.Speed(value=0.05))
     far = np.where(np.arange(robot.joint_group.n) == 0, robot.joint_group.lower, 0.0)
-    live_program.ask(requests.Joints(q=far.tolist()))
-    with connect(server.url, "Other") as other, pytest.raises(RefusedError, match="Test holds"):
+    program.ask(requests.Joints(q=far.tolist()))
+    with local.connect("Other") as other, pytest.raises(RefusedError, match="Test holds"):
         other.ask(requests.Home())
-    live_program.ask(requests.Pause())
-    while (now := live_program.query(answers.State)).moving:
+    program.ask(requests.Pause())
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "paused"
     assert now.q[0] != far[0]
-    live_program.ask(requests.Resume())
-    with connect(server.url, "Other") as other:
+    program.ask(requests.Resume())
+    with local.connect("Other") as other:
         other.ask(requests.Stop())
-    while (now := live_program.query(answers.State)).moving:
+    while (now := program.query(answers.State)).moving:
         time.sleep(0.02)
     assert now.status == "stopped"
     assert now.stopped == "Other pressed STOP."
     assert now.q[0] != far[0]
     with pytest.raises(RefusedError, match="clear the stop first"):
-        live_program.joints(far)
+        program.joints(far)
 
 
-def test_its_vrml_world_has_names(live_program: Client, robot: Robot) -> None:
+def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
     slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
     axis = robot.axis(robot.joints[slide])
-    live_program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
-    assert live_program.query(answers.State).q[
-        robot.joint_group.names.index(slide)
-    ] == pytest.approx(0.05)
-    live_program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
-    world = {node.node: node for node in live_program.query(answers.World).nodes}
+    program.go(requests.Set(node=slide, field="translation", value=(0.05 * axis).tolist()))
+    assert program.query(answers.State).q[robot.joint_group.names.index(slide)] == pytest.approx(
+        0.05
+    )
+    program.go(requests.Set(node="link1_paint", field="diffuseColor", value=[1.0, 0.0, 0.0]))
+    world = {node.node: node for node in program.query(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
-    live_program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
+    program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
 
 
-def test_slider_moves_a_joint_in_its_own_unit(server: AppServer, robot: Robot) -> None:
-    async def act() -> None:
-        async with opened(server.url) as (peer, control):
-            name = robot.joint_group.names[robot.joint_group.slides.index(True)]
-            index = robot.joint_group.names.index(name)
-            label = joint_labels(robot)[index]
-            props = peer.controls[label]["props"]
-            assert props["max"] == pytest.approx(1e3 * robot.joint_group.upper[index], abs=0.01)
-            assert "mm" in props["hint"]
-            assert "Go to pose" not in peer.controls
-            await peer.set(label, value=60.0)
-            async with asyncio.timeout(5.0):
-                while True:
-                    _, _, body = ask(f"{server.url}/api/v1/state")
-                    if abs(json.loads(body)["q"][index] - 0.06) < 1e-9:
-                        break
-                    await asyncio.sleep(0.05)
-            await control.say("home")
-            await control.wait(mood="ok")
-            await control.say("release_lease")
-
-    asyncio.run(act())
-
-
+@pytest.mark.long
 def test_undrivable_robot_is_refused_at_start(
     tmp_path: Path, path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,24 +1,20 @@
-"""Robots driven joint by joint on a real server: the table and scene objects are obstacles."""
+"""Robots driven joint by joint: the table and scene objects are obstacles."""
 
 from __future__ import annotations
 
-import asyncio
-import json
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
+from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.cli.main import main
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from tests.browser.server import APP, AppServer
-from tests.gateway.client import ask, opened
+from katana450.settings import Settings
+from tests.gateway.virtual import VirtualServer
 from tests.robot.hands import column
-
-pytestmark = pytest.mark.long
 
 STOP = 0.005
 """[m] Distance that stays to every obstacle."""
@@ -28,23 +24,16 @@ SHORT = 0.03
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AppServer]:
-    folder = tmp_path_factory.mktemp("column")
-    path, box = folder / "column.urdf", folder / "crate.stl"
+def described(tmp_path_factory: pytest.TempPathFactory) -> DescribedRobot:
+    path = tmp_path_factory.mktemp("column") / "column.urdf"
     path.write_text(column(-0.3))
-    # STL files are in millimetres.
-    trimesh.creation.box((60.0, 60.0, 80.0)).export(box)
-    with AppServer((*APP, "--urdf", str(path), "--object", f"{box}@0,200,-300")) as server:
-        yield server
+    return find_robot(Settings(), path, None)
 
 
 @pytest.fixture
-def robot(server: AppServer) -> Iterator[Client]:
-    with connect(server.url) as client:
-        client.clear_stop()
-        client.ask(requests.Home(wait=30))
-        yield client
-        client.clear_stop()
+def robot(program: Client) -> Client:
+    place(program, "crate", (0.0, 0.2), [0.06, 0.06, 0.08])
+    return program
 
 
 def height(client: Client) -> float:
@@ -58,13 +47,21 @@ def end(answer: object) -> answers.MotionEnd:
     return answer.end
 
 
-def place(client: Client, *, y: float = 0.0) -> None:
-    T = ((1, 0, 0, 0.2), (0, 1, 0, y), (0, 0, 1, -0.3), (0, 0, 0, 1))
-    client.ask(requests.Place(name="block", T=T, shape=requests.Shape.BOX, size=[0.05, 0.05, 0.1]))
+def place(
+    client: Client,
+    name: str = "block",
+    at: tuple[float, float] = (0.2, 0.0),
+    size: Sequence[float] = (0.05, 0.05, 0.1),
+) -> None:
+    """Place a box on the table."""
+    T = ((1, 0, 0, at[0]), (0, 1, 0, at[1]), (0, 0, 1, -0.3), (0, 0, 0, 1))
+    client.ask(requests.Place(name=name, T=T, shape=requests.Shape.BOX, size=list(size)))
 
 
-def test_table_is_named_at_the_start_and_stops_a_joint(server: AppServer, robot: Client) -> None:
-    assert "The table is 300 mm below the base, under base." in server.output
+def test_table_is_named_at_the_start_and_stops_a_joint(
+    described: DescribedRobot, robot: Client
+) -> None:
+    assert "The table is 300 mm below the base, under base." in " ".join(described.notes)
     found = end(robot.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
     assert found.how == "contact"
     assert found.why.startswith("Beam and table are ")
@@ -84,9 +81,7 @@ def test_object_stops_a_joint_and_the_goal_is_reached_without_it(robot: Client) 
     assert (found.how, robot.query(answers.State).q[0]) == ("reached", -0.29)
 
 
-def test_object_of_the_command_line_stops_a_swing(robot: Client) -> None:
-    (crate,) = robot.query(answers.Objects).objects
-    assert (crate.name, crate.shape) == ("crate", "mesh")
+def test_object_stops_a_swing(robot: Client) -> None:
     robot.ask(requests.Joint(axis=1, value=-0.29, wait=30))
     found = end(robot.ask(requests.Joint(axis=2, value=2.0, wait=30)))
     assert found.how == "contact"
@@ -100,15 +95,15 @@ def test_object_of_the_command_line_stops_a_swing(robot: Client) -> None:
 
 
 def test_object_is_attached_undone_and_saved_with_the_scene(
-    server: AppServer, robot: Client
+    local: VirtualServer, robot: Client
 ) -> None:
-    place(robot, y=-0.2)
+    place(robot, at=(0.2, -0.2))
     robot.ask(requests.Attach(name="block", to=requests.Attachment.TABLE))
     with pytest.raises(RefusedError, match="Nothing can be fixed to a hand: there is no arm"):
         robot.ask(requests.Attach(name="block", to=requests.Attachment.HAND))
     with pytest.raises(RefusedError, match="no cup"):
         robot.ask(requests.Fill(ml=10.0))
-    status, _, body = ask(f"{server.url}/api/v1/scene")
+    status, _, body = local.ask("/api/v1/scene")
     assert (status, body[:2]) == (200, b"PK")
     robot.ask(requests.Remove(name="block"))
     robot.ask(requests.Undo())
@@ -123,25 +118,7 @@ def test_new_object_stands_on_the_table(robot: Client) -> None:
     assert np.array(ball.T)[2, 3] == pytest.approx(-0.3, abs=1e-6)
 
 
-def test_slider_and_panel_know_objects(server: AppServer) -> None:
-    async def act() -> None:
-        async with opened(server.url) as (peer, control):
-            assert peer.controls["Object"]["props"]["options"] == ["crate"]
-            assert "Handles on objects" in peer.controls
-            await control.say("acquire")
-            await peer.set("1 lift", value=-400.0)
-            async with asyncio.timeout(20.0):
-                while True:
-                    _, _, body = ask(f"{server.url}/api/v1/state")
-                    if json.loads(body)["status"] == "blocked":
-                        break
-                    await asyncio.sleep(0.05)
-            assert "table" in json.loads(body)["why"]
-            await control.say("release_lease")
-
-    asyncio.run(act())
-
-
+@pytest.mark.long
 def test_scene_with_joints_is_refused_at_the_start(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

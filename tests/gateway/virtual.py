@@ -393,14 +393,16 @@ class VirtualServer:
         self.app = SecurityMiddleware(admission, address)
         self.arm = _Pipe(found, self.loop, self.clock, profile)
         pipe = cast(Any, self.arm)
-        worker = PlanningWorker(session, self.arm.state_publisher, pipe)
-        worker.notify = lambda why: self._soon(hub.announce, why)
-        worker.redirected = guarded(hub.runner.redirected)
+        worker = None
+        if robot.arm is not None:
+            worker = PlanningWorker(session, self.arm.state_publisher, pipe)
+            worker.notify = lambda why: self._soon(hub.announce, why)
+            worker.redirected = guarded(hub.runner.redirected)
         nodes = next((part.nodes for part in parts if part.nodes is not None), None)
         values = Nodes(robot) if nodes is None else nodes(robot, session.environment)
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
         self._detours: DetourPlanner | None = None
-        if detours:
+        if detours and worker is not None:
             self._detours = DetourPlanner(session, self.arm.state_publisher, worker)
             self._detours.start()
         self._tasks = [self.loop.create_task(each) for each in (self.arm.run(hub), self._watch())]
