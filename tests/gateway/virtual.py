@@ -17,9 +17,10 @@ from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Self, TypeVar, cast
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote, urlencode, urlsplit
 
 import pytest
 from starlette.applications import Starlette
@@ -30,6 +31,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
@@ -139,13 +141,21 @@ class _Pipe:
     age = 0.0
 
     def __init__(
-        self, found: DescribedRobot, loop: _Loop, clock: VirtualClock, profile: SilenceProfile
+        self,
+        found: DescribedRobot,
+        loop: _Loop,
+        clock: VirtualClock,
+        profile: SilenceProfile,
+        scene: InitialScene | None,
     ) -> None:
         robot, session, _ = found
         self._loop = loop
         arm = robot.joint_group if robot.arm is None else robot.arm
         self._mailbox = Mailbox(session.check)
-        driver = SimulatedDriver(arm, session.ready, 0.0)
+        if scene is not None:
+            self._mailbox.put(scene.command)
+        begin = session.ready if scene is None or scene.joints is None else scene.joints
+        driver = SimulatedDriver(arm, begin, 0.0)
         rate = 1.0 / PERIOD
         self._control = ControlLoop(session, driver, self._mailbox, clock, rate, profile=profile)
         self._clock, self.profile = clock, profile
@@ -269,6 +279,15 @@ class VirtualClient(Client):
         self.ask(requests.Load(scene=scene.key))
         return scene
 
+    def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
+        """See ``AsyncClient.upload``."""
+        query = {"name": file.name} | ({} if unit is None else {"unit": unit})
+        mesh = answers.decoded(
+            self._fetched(f"mesh?{urlencode(query)}", file.read_bytes()).decode()
+        )
+        assert isinstance(mesh, answers.Mesh)
+        return mesh
+
     def _fetched(self, what: str, data: bytes | None) -> bytes:
         token = {"Authorization": f"Bearer {self._client._site.token}"}
         status, _, body = self._server.ask(f"/api/v1/{what}", data=data, **token)
@@ -391,7 +410,11 @@ class VirtualServer:
         acceptor = cast(Any, SimpleNamespace(kept=lambda _client: nullcontext()))
         admission = Admission(app, hub, self.authenticator, acceptor)
         self.app = SecurityMiddleware(admission, address)
-        self.arm = _Pipe(found, self.loop, self.clock, profile)
+        makers = (part.initial_scene for part in parts if part.initial_scene is not None)
+        scenes = (make(options, lambda: session) for make in makers)
+        scene = next((each for each in scenes if each is not None), None)
+        hub.meshes.put(() if scene is None else scene.meshes, ())
+        self.arm = _Pipe(found, self.loop, self.clock, profile, scene)
         pipe = cast(Any, self.arm)
         worker = None
         if robot.arm is not None:
