@@ -29,6 +29,9 @@ LEARNT = 30.0
 QUIET = 0.4
 """Time [s] in which the server has sent all answers to a message."""
 
+PAUSE = 0.1
+"""Time [s] without a message after which a scene may be complete; its end shows that it is."""
+
 FAREWELL = 0.5
 """Timeout for the server's close frame [s]."""
 
@@ -201,7 +204,7 @@ class Peer:
         async with asyncio.timeout(LEARNT):
             # On a busy machine the scene arrives with pauses.
             while not any(message["type"] == "ReplayDoneMessage" for message in messages):
-                messages += await self.listen()
+                messages += await self.listen(PAUSE)
         for message in messages:
             label = message.get("props", {}).get("label")
             if message["type"].startswith("Gui") and label:

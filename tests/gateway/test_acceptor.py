@@ -17,7 +17,7 @@ from katana450.server.web import acceptor as acceptors
 from katana450.server.web.acceptor import Acceptor, _Connection
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 
-WAITING = 8
+WAITING = 4
 
 
 @asynccontextmanager

@@ -23,10 +23,12 @@ DELIVERIES = {
 
 def uses(name: str) -> set[tuple[str, str]]:
     """Return each file that uses the attribute ``name``, with the object that has it."""
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
     return {
         (path.relative_to(PACKAGE).as_posix(), ast.unparse(node.value))
-        for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for path, text in texts.items()
+        if name in text
+        for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Attribute) and node.attr == name
     }
 
