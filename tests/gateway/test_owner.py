@@ -10,7 +10,6 @@ import pytest
 
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Request
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.gateway.virtual import VirtualServer
 
@@ -65,19 +64,6 @@ def stays(arm: Client, seconds: float = 1.0) -> None:
     assert not after.moving
 
 
-@pytest.mark.parametrize("by", ["pause", "steer"])
-def test_pause_during_planning_lasts_until_resume(arm: Client, by: str) -> None:
-    planning(arm)
-    request = requests.Pause() if by == "pause" else Steer(order=ProgramOrder.PAUSE)
-    arm.ask(request)
-    start = wait(arm, lambda state: status(state) != "planning")
-    stays(arm)
-    state = arm.query(answers.State)
-    assert (status(state), state.status, state.q) == ("paused", "paused", start.q)
-    arm.ask(requests.Resume())
-    wait(arm, lambda state: status(state) == "running" and state.moving, 5.0)
-
-
 def test_pause_during_planning_over_http(local: VirtualServer, arm: Client) -> None:
     for at in range(0, len(LONG), 300):
         code, _ = local.post(do="program", text=LONG[at : at + 300], more=at + 300 < len(LONG))
@@ -102,48 +88,6 @@ def test_pause_during_planning_over_http(local: VirtualServer, arm: Client) -> N
     code, _ = local.post("another-that-posts", do="stop")
     assert code == 200
     wait(arm, lambda state: state.stopped is not None and status(state) == "stopped", 5.0)
-
-
-@pytest.mark.parametrize(
-    "request_",
-    [
-        requests.Stop(),
-        requests.Hold(),
-        requests.Home(),
-    ],
-)
-def test_hold_stop_and_motions_during_planning_keep_it_from_running(
-    arm: Client, request_: Request
-) -> None:
-    planning(arm)
-    arm.ask(request_)
-    if isinstance(request_, requests.Stop):
-        arm.clear_stop()
-    wait(arm, lambda state: status(state) != "planning")
-    stays(arm)
-    state = arm.query(answers.State)
-    assert state.program is not None
-    assert status(state) == "ready"
-    assert state.program.why.startswith("Not run")
-
-
-def test_planning_is_cancelled_at_once_and_the_planner_is_free(
-    local: VirtualServer, arm: Client
-) -> None:
-    planning(arm)
-    state = wait(arm, lambda state: state.program is not None and state.program.steps > 0)
-    assert state.program is not None
-    assert (state.program.name, state.program.steps) == ("Long", 20)
-    with local.connect("Other") as other:
-        with pytest.raises(RefusedError, match="being planned"):
-            send(other, "steps: [home]\n")
-        arm.ask(Steer(order=ProgramOrder.END))
-        assert status(arm.query(answers.State)) == "cancelled"
-        send(other, "name: Short\nsteps:\n  - joints: [20, -64, 85, 8, 0]\n")
-        state = wait(other, lambda state: status(state) == "ready")
-        assert state.program is not None
-        assert state.program.name == "Short"
-    stays(arm)
 
 
 def test_moved_arm_needs_a_new_plan(arm: Client) -> None:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
-import selectors
 import threading
 import time
 from collections.abc import Coroutine, Iterator
@@ -62,77 +61,15 @@ from katana450.server.web.http_api import Api
 from katana450.server.web.security import SecurityMiddleware
 from katana450.settings import Settings
 from tests.gateway.client import Control, page_name
+from tests.gateway.virtual_clock import PERIOD, VirtualClock, VirtualLoop
 
 T = TypeVar("T")
 
 HOST = "127.0.0.1:9"
 """Address of the server, at which nothing listens."""
 
-PERIOD = 0.01
-"""[s] Period of the control loop while the arm moves."""
-
 TRIP = 0.002
 """[s] Time that a call of a program takes, so that time passes for one that only asks."""
-
-PLANNERS = ("planning", "planner", "detours")
-"""Names of threads that plan. They take real time."""
-
-
-class VirtualClock:
-    """A clock that is set."""
-
-    def __init__(self) -> None:
-        self.t = 1000.0
-
-    def now(self) -> float:
-        """Return the time [s]."""
-        return self.t
-
-    def sleep_until(self, t: float, wake: threading.Event | None = None) -> None:
-        """Not used: the ticks are called at their times."""
-        raise NotImplementedError
-
-
-class _Selector(selectors.DefaultSelector):
-    """Selector that sets the clock to the next moment instead of waiting for it."""
-
-    def __init__(self, clock: VirtualClock) -> None:
-        super().__init__()
-        self._clock = clock
-
-    def select(self, timeout: float | None = None) -> Any:
-        """Return what is ready, or let the time pass."""
-        ready = super().select(0)
-        if ready or (timeout is not None and timeout <= 0.0):
-            return ready
-        if any(thread.name in PLANNERS for thread in threading.enumerate()):
-            # The time passes, but no faster than such a thread needs.
-            self._clock.t += min(timeout or PERIOD, PERIOD)
-            return super().select(0.002)
-        if timeout is None:
-            raise RuntimeError("Nothing can happen any more.")
-        self._clock.t += timeout
-        return ready
-
-
-class _Loop(asyncio.SelectorEventLoop):
-    def __init__(self, clock: VirtualClock) -> None:
-        self._virtual = clock
-        super().__init__(_Selector(clock))
-
-    def time(self) -> float:
-        return self._virtual.t
-
-    def run_in_executor(  # type: ignore[override]
-        self, _executor: Any, work: Any, *arguments: Any
-    ) -> Any:
-        """Call ``work`` at once."""
-        future = self.create_future()
-        try:
-            future.set_result(work(*arguments))
-        except Exception as error:
-            future.set_exception(error)
-        return future
 
 
 class _Pipe:
@@ -143,7 +80,7 @@ class _Pipe:
     def __init__(
         self,
         found: DescribedRobot,
-        loop: _Loop,
+        loop: VirtualLoop,
         clock: VirtualClock,
         profile: SilenceProfile,
         scene: InitialScene | None,
@@ -379,7 +316,7 @@ class VirtualServer:
         ``detours``: whether detours are planned, for which the time passes more slowly.
         """
         self.clock = VirtualClock()
-        self.loop = _Loop(self.clock)
+        self.loop = VirtualLoop(self.clock)
         options, settings, now = _options(words), Settings(), self.clock.now
         robot, session, _ = found
         self.hub = hub = Hub(now, settings.silence, clear_by=ClearBy(options.clear_by))
