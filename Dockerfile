@@ -1,5 +1,5 @@
 # docker build -t katana450 .
-# With extras of docs/installation.md: docker build --build-arg EXTRAS=pictures,films -t katana450 .
+# With packages of extras in docs/installation.md: docker build --build-arg EXTRAS='embreex imageio-ffmpeg' -t katana450 .
 # Here alone:       docker run --rm -p 127.0.0.1:8080:8080 -p 127.0.0.1:8081:8081 katana450 serve --host 0.0.0.0 --insecure
 # Other machines:   docker run --rm -p 8080:8080 -p 8081:8081 --user $(id -u) -v ./access.json:/access.json katana450
 # Any image with Python 3.11 or newer and its venv module will do.
@@ -14,7 +14,8 @@ COPY pyproject.toml README.md LICENSE ./
 COPY app app
 COPY robot_description robot_description
 COPY static static
-RUN /opt/katana450/bin/pip install --no-cache-dir --no-build-isolation ".${EXTRAS:+[$EXTRAS]}"
+RUN /opt/katana450/bin/pip install --no-cache-dir --no-deps --no-build-isolation . \
+ && if [ -n "$EXTRAS" ]; then /opt/katana450/bin/pip install --no-cache-dir $EXTRAS; fi
 
 FROM ${BASE}
 COPY --from=build /opt/katana450 /opt/katana450

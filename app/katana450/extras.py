@@ -10,6 +10,19 @@ from typing import Any
 
 from katana450.errors import ConfigurationError
 
+PACKAGES = {
+    "datasets": "pyarrow",
+    "films": "imageio-ffmpeg",
+    "foxglove": "foxglove-sdk",
+    "gallery": "robot-descriptions",
+    "meshes": "dracopy networkx",
+    "pictures": "embreex",
+    "serial": "pyserial",
+}
+"""The packages of each extra, for the command that adds it. With `katana450[NAME]`, pip would also
+install 250 MB that yourdfpy requires and nothing uses.
+"""
+
 
 class MissingExtraError(ConfigurationError):
     """An extra of the package is not installed; the text has the command that installs it."""
@@ -19,7 +32,7 @@ class MissingExtraError(ConfigurationError):
         python = shlex.quote(sys.executable)
         # Environments of uv have no pip.
         command = f"{python} -m pip install" if find_spec("pip") else f"uv pip install -p {python}"
-        super().__init__(f"{purpose} need the extra {extra!r}: {command} 'katana450[{extra}]'.")
+        super().__init__(f"{purpose} need the extra {extra!r}: {command} {PACKAGES[extra]}")
 
 
 def library(module: str, extra: str, purpose: str) -> Any:

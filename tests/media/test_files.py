@@ -115,7 +115,7 @@ def test_ffmpeg_of_the_system_is_used_if_it_has_the_codec(
     assert ffmpeg() == get_ffmpeg_exe()
     ffmpeg.cache_clear()
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'katana450\[films\]'"):
+    with pytest.raises(MissingExtraError, match="pip install imageio-ffmpeg"):
         ffmpeg()
 
 
