@@ -297,7 +297,11 @@ def entities(file: str = "") -> bytes:
 
 @pytest.mark.parametrize(
     "make",
-    [bomb, entities, lambda: entities("file:///etc/passwd")],
+    [
+        bomb,
+        pytest.param(entities, marks=pytest.mark.long),
+        pytest.param(lambda: entities("file:///etc/passwd"), marks=pytest.mark.long),
+    ],
     ids=["bomb", "entities", "other file"],
 )
 @pytest.mark.usefixtures("limited_time")
@@ -309,6 +313,7 @@ def test_hostile_archive_is_refused_in_time(make: Callable[[], bytes]) -> None:
     assert time.perf_counter() - start < SECONDS + 2.0
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("limited_time")
 def test_archive_of_nested_copies_costs_no_more_than_the_limits() -> None:
     """A quick machine reads it within the limit: the library shows each part once."""

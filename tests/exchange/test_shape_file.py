@@ -355,6 +355,7 @@ def test_a_guarded_reading_fails_with_a_message(monkeypatch: pytest.MonkeyPatch)
         read_shape_guarded(b"not a ply", Format.PLY, "hull.ply")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="nothing else limits a process there")
 def test_limit_of_the_reading_time_counts_processor_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
