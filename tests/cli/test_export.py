@@ -50,7 +50,6 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
         (("c", "--trajectory", "m.csv"), "c has no motion"),
         (("urdf", "--pose", "0,0"), "urdf has no pose"),
         (("usd", "--trajectory", "m.csv"), "Use --trajectory with vrml, x3d, glb, html"),
-        (("mjcf", "--license", "MIT"), "mjcf states no licence"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
         (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),

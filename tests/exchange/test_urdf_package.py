@@ -20,7 +20,6 @@ import yourdfpy
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.export.ros2.manifest import Maintainer
 from katana450.extensions.export.urdf_package import package_files
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY
@@ -155,48 +154,11 @@ def test_the_manifest_states_the_licence_and_no_invented_person(folder: Path) ->
     assert "project(katana450_description NONE)" in (folder / "CMakeLists.txt").read_text()
 
 
-@pytest.mark.parametrize(
-    ("words", "licence", "maintainer", "said"),
-    [
-        ((), "TODO: License declaration", ("TODO: Maintainer", "todo@todo.todo"), "--license and"),
-        (
-            ("--license", "BSD & <more>", "--maintainer", 'A "B" C <a@b.org>'),
-            "BSD & <more>",
-            ('A "B" C', "a@b.org"),
-            "",
-        ),
-    ],
-)
-def test_a_package_of_another_robot_states_the_given_licence_and_maintainer(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    words: tuple[str, ...],
-    licence: str,
-    maintainer: tuple[str, str],
-    said: str,
-) -> None:
-    assert main(["export", "urdf", "--urdf", str(GANTRY), "--out", str(tmp_path), *words]) == 0
-    warned = capsys.readouterr().err
-    assert ("package.xml has a TODO" in warned) == bool(said)
-    assert said in warned
-    content = zipfile.ZipFile(tmp_path / "gantry_2_description.zip").read(
-        "gantry_2_description/package.xml"
-    )
-    manifest = ET.fromstring(content)
-    assert manifest.findtext("license") == licence
-    (person,) = manifest.findall("maintainer")
-    assert (person.text, person.get("email")) == maintainer
-
-
-@pytest.mark.parametrize("kind", ["glb", "html"])
-def test_other_formats_state_no_licence(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
-) -> None:
-    assert main(["export", kind, "--out", str(tmp_path / "x.html"), "--license", "MIT"]) == 1
-    assert "states no licence" in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        main(["export", "urdf", "--out", str(tmp_path), "--maintainer", "nobody"])
-    assert "NAME <EMAIL>" in capsys.readouterr().err
+def test_a_package_of_another_robot_leaves_its_licence_to_be_stated() -> None:
+    ((_, content),) = package_files(GANTRY).items()
+    archive = zipfile.ZipFile(io.BytesIO(content))
+    manifest = ET.fromstring(archive.read("gantry_2_description/package.xml"))
+    assert manifest.findtext("license") == "TODO: License declaration"
 
 
 FOREIGN = """<robot name="two">
@@ -228,7 +190,7 @@ def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: P
     trimesh.creation.box(extents=[1.0, 1.0, 1.0]).export(tmp_path / "plain.stl")
     (tmp_path / "plain.stl").rename(tmp_path / "plain.STL")
     (tmp_path / "two.urdf").write_text(FOREIGN)
-    ((_, content),) = package_files(tmp_path / "two.urdf", "BSD", Maintainer("A", "a@b")).items()
+    ((_, content),) = package_files(tmp_path / "two.urdf").items()
     zipfile.ZipFile(io.BytesIO(content)).extractall(tmp_path)
     path = tmp_path / "two_description" / "urdf" / "two.urdf"
     root = ET.parse(path).getroot()

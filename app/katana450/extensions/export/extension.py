@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,18 +46,6 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="vrml and x3d: leave out the cup and the basin of a new server",
     )
-    parser.add_argument(
-        "--license",
-        metavar="NAME",
-        help="urdf: licence of the robot that package.xml states, such as Apache-2.0 (default: MIT "
-        "for the Katana450, unstated for another mechanism)",
-    )
-    parser.add_argument(
-        "--maintainer",
-        type=named_address,
-        metavar="'NAME <EMAIL>'",
-        help="urdf: person that package.xml names as responsible (default: unstated)",
-    )
     motion = parser.add_mutually_exclusive_group()
     motion.add_argument(
         "--trajectory",
@@ -77,11 +64,6 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
 
 def _export(options: argparse.Namespace) -> int:
     row = FORMATS[options.format]
-    if not row.licensed and (options.license or options.maintainer):
-        names = " or ".join(named(lambda each: each.licensed))
-        raise InputError(
-            f"{options.format} states no licence and no maintainer. Use these options with {names}."
-        )
     if not row.scene and (options.plain or not options.objects):
         names = " or ".join(named(lambda each: each.scene))
         raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
@@ -96,14 +78,6 @@ def _export(options: argparse.Namespace) -> int:
 
 def _listed() -> str:
     return "; ".join(f"{name}: {row.help}" for name, row in FORMATS.items())
-
-
-def named_address(text: str) -> tuple[str, str]:
-    """Return name and email of ``NAME <EMAIL>``. Raises ArgumentTypeError."""
-    found = re.fullmatch(r"\s*([^<>]*[^<>\s])\s*<([^<>@\s]+@[^<>@\s]+)>\s*", text)
-    if found is None:
-        raise argparse.ArgumentTypeError(f"expected 'NAME <EMAIL>', not {text!r}")
-    return found[1], found[2]
 
 
 def joint_values(text: str) -> tuple[float, ...]:

@@ -37,7 +37,6 @@ class ExportFormat(NamedTuple):
             a single file.
         posed: whether it is written at a pose.
         animated: whether it can contain a motion.
-        licensed: whether it states a licence and a maintainer.
         scene: whether it has the objects of a new server, and a Switch for each shape.
     """
 
@@ -45,7 +44,6 @@ class ExportFormat(NamedTuple):
     files: Callable[[ExportJob], Mapping[str, bytes]] | None
     posed: bool = False
     animated: bool = False
-    licensed: bool = False
     scene: bool = False
 
 
@@ -82,9 +80,9 @@ def _glb(job: ExportJob) -> Mapping[str, bytes]:
 
 
 def _urdf(job: ExportJob) -> Mapping[str, bytes]:
-    from katana450.extensions.export.licensing import licensed_package
+    from katana450.extensions.export.urdf_package import package_files
 
-    return licensed_package(job.options.urdf, job.options.license, job.options.maintainer)
+    return package_files(job.options.urdf)
 
 
 def _mjcf(job: ExportJob) -> Mapping[str, bytes]:
@@ -123,7 +121,6 @@ FORMATS: Mapping[str, ExportFormat] = {
     "urdf": ExportFormat(
         "a zip of a ROS 2 package: URDF, meshes, launch files, ros2_control, SRDF",
         _urdf,
-        licensed=True,
     ),
     "mjcf": ExportFormat(
         "a zip of a MuJoCo model with actuators, sites, keyframes and its meshes", _mjcf

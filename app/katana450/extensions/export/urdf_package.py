@@ -34,8 +34,9 @@ from katana450.extensions.export.ros2.display import (
     rviz_text,
 )
 from katana450.extensions.export.ros2.groups import groups_of
-from katana450.extensions.export.ros2.manifest import Maintainer, cmake_text, manifest_text
+from katana450.extensions.export.ros2.manifest import cmake_text, manifest_text
 from katana450.extensions.export.ros2.srdf import srdf_text
+from katana450.resources import URDF_PATH
 
 CONVERTED = (".glb", ".gltf")
 """Suffixes of visual meshes that become OBJ; others are copied unchanged."""
@@ -47,10 +48,8 @@ MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Attributes of an inertia."""
 
-UNSTATED_LICENSE = "TODO: License declaration"
-"""Placeholder for an unknown licence, as in ROS's package generator."""
-UNSTATED_MAINTAINER = Maintainer("TODO: Maintainer", "todo@todo.todo")
-"""Placeholder for an unknown maintainer, as in ROS's package generator."""
+OWN_LICENSE, UNSTATED_LICENSE = "MIT", "TODO: License declaration"
+"""Licence of the Katana450's description, and ROS's placeholder for that of another robot."""
 
 
 class _Part(NamedTuple):
@@ -62,11 +61,7 @@ class _Part(NamedTuple):
     material: str | None = None
 
 
-def package_files(
-    path: Path,
-    license_name: str = UNSTATED_LICENSE,
-    maintainer: Maintainer = UNSTATED_MAINTAINER,
-) -> dict[str, bytes]:
+def package_files(path: Path) -> dict[str, bytes]:
     """Return name and content of the zip of the URDF file at ``path``.
 
     Raises RobotDescriptionError if the file is not a URDF, or a mesh is missing or unreadable.
@@ -87,8 +82,9 @@ def package_files(
         **meshes,
         **_launched(model, package, plain),
     }
+    licence = OWN_LICENSE if path.resolve() == URDF_PATH.resolve() else UNSTATED_LICENSE
     files = {
-        "package.xml": manifest_text(package, robot, license_name, maintainer).encode(),
+        "package.xml": manifest_text(package, robot, licence).encode(),
         "CMakeLists.txt": cmake_text(package, files).encode(),
         **files,
     }

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import escape
 
 USED = (
     "controller_manager",
@@ -36,7 +35,7 @@ MANIFEST = """\
   <name>{name}</name>
   <version>0.1.0</version>
   <description>{robot}: URDF, meshes, ros2_control and SRDF</description>
-  <maintainer email={email}>{maintainer}</maintainer>
+  <maintainer email="todo@todo.todo">TODO: Maintainer</maintainer>
   <license>{license}</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
 {used}
@@ -45,24 +44,15 @@ MANIFEST = """\
   </export>
 </package>
 """
-"""Template of package.xml."""
+"""Template of package.xml. Its placeholders are those of ROS's package generator."""
 
 
-class Maintainer(NamedTuple):
-    """The person that `package.xml` names as responsible for the package."""
-
-    name: str
-    email: str
-
-
-def manifest_text(package: str, robot: str, license_name: str, maintainer: Maintainer) -> str:
+def manifest_text(package: str, robot: str, license_name: str) -> str:
     """Return `package.xml` of the ``package`` of a ``robot``."""
     return MANIFEST.format(
         name=package,
         robot=escape(robot),
-        license=escape(license_name),
-        maintainer=escape(maintainer.name),
-        email=quoteattr(maintainer.email),
+        license=license_name,
         used="\n".join(f"  <exec_depend>{name}</exec_depend>" for name in USED),
     )
 
