@@ -8,7 +8,7 @@ import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from katana450.errors import InputError
 from katana450.extensions.importers.companions import is_inside
@@ -47,16 +47,48 @@ class ChoiceError(InputError):
         self.choices = tuple(choices)
 
 
-def check_packing(entry: zipfile.ZipInfo) -> None:
-    """Raise InputError unless ``entry`` of a .zip is stored or deflated.
+def contents(
+    data: bytes, name: str, max_files: int, wanted: Callable[[str], str | None]
+) -> tuple[dict[str, bytes], str]:
+    """Return the contents of files of a .zip by their paths, and its comment.
 
-    zipfile unpacks other methods without a bound: 300 bytes can become gigabytes.
+    Args:
+        data: content of the .zip.
+        name: its name, for messages.
+        max_files: maximum number of files.
+        wanted: returns the path under which a file is returned, by its name; None to leave it.
+
+    Raises InputError for a .zip that cannot be read.
     """
-    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise InputError(
-            f"{entry.filename[:80]} in the .zip is compressed by a method other than Deflate. "
-            "Pack it as a plain .zip."
-        )
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = archive.infolist()
+            if len(entries) > max_files:
+                raise InputError(f"{name} has more than {max_files} files.")
+            chosen = [(path, entry) for entry in entries if (path := wanted(entry.filename))]
+            if len(dict(chosen)) < len(chosen):
+                raise InputError(f"Two files of {name} have the same name.")
+            for _, entry in chosen:
+                # zipfile unpacks other methods without a bound: 300 bytes can become gigabytes.
+                if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise InputError(
+                        f"{entry.filename[:80]} in the .zip is compressed by a method other than "
+                        "Deflate. Pack it as a plain .zip."
+                    )
+            # zipfile never unpacks more than the size that is declared here.
+            if sum(entry.file_size for _, entry in chosen) > MAX_ARCHIVE_BYTES:
+                raise InputError(
+                    f"{name} has more than {MAX_ARCHIVE_BYTES // 1_000_000} MB when unpacked."
+                )
+            files = {path: archive.read(entry) for path, entry in chosen}
+            return files, archive.comment.decode("utf-8", "replace")
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, zlib.error) as error:
+        reason = str(error)[:80].rstrip(".")
+        raise InputError(f"{name} cannot be read as a .zip: {reason}.") from error
+    except (OSError, EOFError, ValueError, struct.error) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name} is corrupt: {str(error)[:80]}.") from error
 
 
 def unpacked(
@@ -76,40 +108,17 @@ def unpacked(
     Raises ChoiceError if there are several, and InputError for a .zip that cannot be read.
     """
     shapes = tuple(f".{each}" for each in suffixes)
-    wanted = (*shapes, *(f".{each}" for each in COMPANION_SUFFIXES))
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            if len(entries) > MAX_FILES:
-                raise InputError(f"{name} has more than {MAX_FILES} files.")
-            if any(entry.filename == SCENE for entry in entries):
-                raise InputError(f"{name} is a scene, not an object: load it as a scene.")
-            chosen = {
-                path: entry
-                for entry in entries
-                if entry.filename
-                and not entry.is_dir()
-                and is_inside(path := posixpath.normpath(entry.filename.replace("\\", "/")))
-                and path.lower().endswith(wanted)
-                and not posixpath.basename(path).startswith(".")
-                and not path.startswith("__MACOSX/")
-            }
-            for entry in chosen.values():
-                check_packing(entry)
-            # zipfile never unpacks more than the size that is declared here.
-            if sum(entry.file_size for entry in chosen.values()) > MAX_ARCHIVE_BYTES:
-                raise InputError(
-                    f"{name} has more than {MAX_ARCHIVE_BYTES // 1_000_000} MB when unpacked."
-                )
-            files = {path: archive.read(entry) for path, entry in chosen.items()}
-            comment = archive.comment.decode("utf-8", "replace")
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError, zlib.error) as error:
-        reason = str(error)[:80].rstrip(".")
-        raise InputError(f"{name} cannot be read as a .zip: {reason}.") from error
-    except (OSError, EOFError, ValueError, struct.error) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{name} is corrupt: {str(error)[:80]}.") from error
+    endings = (*shapes, *(f".{each}" for each in COMPANION_SUFFIXES))
+
+    def wanted(file: str) -> str | None:
+        if file == SCENE:
+            raise InputError(f"{name} is a scene, not an object: load it as a scene.")
+        path = posixpath.normpath(file.replace("\\", "/"))
+        is_read = is_inside(path) and path.lower().endswith(endings) and not file.endswith("/")
+        is_hidden = posixpath.basename(path).startswith(".") or path.startswith("__MACOSX/")
+        return path if is_read and not is_hidden else None
+
+    files, comment = contents(data, name, MAX_FILES, wanted)
     listed = [path for path in files if path.lower().endswith(shapes)]
     return _main(listed, files, name, main or (comment if comment in listed else "")), files
 
@@ -159,7 +168,7 @@ def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
 
 
 def packed(main: str, files: Mapping[str, bytes]) -> bytes:
-    """Return a .zip of ``files`` whose comment is the path of the shape file ``main``."""
+    """Return a .zip of ``files``, whose comment is ``main``: the path of a shape file, or empty."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         archive.comment = main.encode()

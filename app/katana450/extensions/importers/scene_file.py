@@ -6,17 +6,19 @@ All of it is read and checked before it is used. Paths cannot lead outside of th
 from __future__ import annotations
 
 import hashlib
-import io
 import re
-import zipfile
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, check_packing
+from katana450.extensions.importers.archive import (
+    MAX_ARCHIVE_BYTES,
+    SCENE,
+    contents,
+    packed,
+)
 from katana450.extensions.importers.mesh_file import content_of, read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
 from katana450.extensions.programs.attached_files import attached
@@ -28,14 +30,8 @@ from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
 from katana450.extensions.scene.text import written
 from katana450.maths.geometry.arrays import FloatArray
 
-SCENE = "scene.yaml"
-"""Name of the scene's text in a .zip."""
-
 FOLDER = "meshes"
 """Folder of the meshes in a .zip."""
-
-MAX_ZIP_BYTES = 60_000_000
-"""[bytes] Maximum size of a .zip, and of its content."""
 
 MAX_FILES = 64
 """Maximum number of files in a .zip."""
@@ -49,9 +45,6 @@ ENTRY = b"PK\x01\x02"
 
 SEARCHED_BYTES = 1_000_000
 """Bytes that are searched at once: other threads wait meanwhile."""
-
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Time stamp of all files, the earliest of the format: the same scene gives the same bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,44 +61,21 @@ def read_scene_zip(data: bytes, T_palm_tool: FloatArray | None) -> StoredScene:
     ``T_palm_tool``: see ``Hand``; None for an arm without a hand. Raises InputError; for errors in
     the text ScriptError with the lines.
     """
-    if len(data) > MAX_ZIP_BYTES:
-        raise InputError(f"A scene has at most {MAX_ZIP_BYTES // 1_000_000} MB.")
+    if len(data) > MAX_ARCHIVE_BYTES:
+        raise InputError(f"A scene has at most {MAX_ARCHIVE_BYTES // 1_000_000} MB.")
     if _entries(data) > MAX_ENTRIES:
-        raise InputError(f"A scene has at most {MAX_FILES} files.")
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            names = archive.namelist()
-            if len(names) > MAX_FILES:
-                raise InputError(f"A scene has at most {MAX_FILES} files.")
-            if len(set(names)) < len(names):
-                raise InputError("Two files of the scene have the same name.")
-            if SCENE not in names:
-                raise InputError(f"There is no {SCENE} in the .zip.")
-            left = MAX_ZIP_BYTES
+        raise InputError(f"The scene has more than {MAX_FILES} files.")
+    files, _ = contents(
+        data, "The scene", MAX_FILES, lambda path: None if path.endswith("/") else path
+    )
 
-            def opened(path: str, maximum: int) -> bytes:
-                nonlocal left
-                if path not in names:
-                    raise InputError(f"There is no file {path} in the .zip.")
-                check_packing(archive.getinfo(path))
-                # The sizes that a .zip declares can be false.
-                with archive.open(path) as file:
-                    content = file.read(min(maximum, left) + 1)
-                left -= len(content)
-                if left < 0:
-                    raise InputError(
-                        f"Unpacked, the .zip has more than {MAX_ZIP_BYTES // 1_000_000} MB."
-                    )
-                return content
+    def opened(path: str, _maximum: int) -> bytes:
+        if path not in files:
+            raise InputError(f"There is no file {path} in the .zip.")
+        return files[path]
 
-            draft = parsed(_text(opened(SCENE, MAX_BYTES), SCENE))
-            return _stored(draft, opened, T_palm_tool)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, RuntimeError) as error:
-        raise InputError(f"This .zip cannot be read: {error}.") from error
-    except (OSError, EOFError, ValueError, zlib.error) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"The .zip is corrupt: {error}.") from error
+    draft = parsed(_text(opened(SCENE, MAX_BYTES), SCENE))
+    return _stored(draft, opened, T_palm_tool)
 
 
 def _entries(data: bytes) -> int:
@@ -129,7 +99,7 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
 
     try:
         if path.suffix.lower() == ".zip":
-            return read_scene_zip(content_of(path, MAX_ZIP_BYTES), T_palm_tool)
+            return read_scene_zip(content_of(path, MAX_ARCHIVE_BYTES), T_palm_tool)
         text = _text(content_of(path, MAX_BYTES), path.name)
         if not is_script(text):
             return _stored(parsed(text), opened, T_palm_tool)
@@ -148,11 +118,7 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
 
 def scene_zip(stored: StoredScene, T_palm_tool: FloatArray | None) -> bytes:
     """Return the scene as the content of a .zip."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in _files(stored, T_palm_tool).items():
-            archive.writestr(zipfile.ZipInfo(name, EPOCH), content, zipfile.ZIP_DEFLATED)
-    return out.getvalue()
+    return packed("", _files(stored, T_palm_tool))
 
 
 def _files(stored: StoredScene, T_palm_tool: FloatArray | None) -> dict[str, bytes]:

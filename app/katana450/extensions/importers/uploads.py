@@ -16,7 +16,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
 from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import MAX_ZIP_BYTES, read_scene_zip
+from katana450.extensions.importers.scene_file import read_scene_zip
 from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
 from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES, Format
 from katana450.maths.planning.checkpoint import checked_by
@@ -110,7 +110,7 @@ class Uploads:
     async def _load(self, request: Request) -> Response:
         async def keep() -> answers.Answer:
             arm = self._hub.present()
-            data = await body_of(request, MAX_ZIP_BYTES, UPLOAD_TIMEOUT, MIN_RATE)
+            data = await body_of(request, MAX_ARCHIVE_BYTES, UPLOAD_TIMEOUT, MIN_RATE)
             hand = arm.environment.hand
             T_palm_tool = None if hand is None else hand.T_palm_tool
             stored = await self._in_thread(request, lambda: read_scene_zip(data, T_palm_tool))
