@@ -118,9 +118,9 @@ def test_objects_and_water_are_those_of_the_moment(
     found = list(moments(run))
     # The first moment has no water yet, the last one a full cup in the hand.
     (first_t, first), (last_t, last) = found[0], found[-1]
-    assert first.water is None or first.water.cup == 0
+    assert first.water is None or first.water.cup.volume == 0
     assert last.water is not None
-    assert last.water.cup > 0
+    assert last.water.cup.volume > 0
     assert cup_of(last)[2, 3] - cup_of(first)[2, 3] > 0.05
     page = open_page(server.url, nodes=("/arm",))
     opened(page)

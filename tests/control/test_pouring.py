@@ -20,7 +20,7 @@ from katana450.arm.robot.water import water_environment
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.units import ML, counted
 from katana450.settings import Settings
 
@@ -70,7 +70,7 @@ def held_level(session: Session, state: State) -> State:
 
 def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:
     assert full.poured is not None
-    assert full.poured.water.cup == FULL
+    assert full.poured.water.cup.volume == FULL
     assert tick(session, full, times=3).poured is full.poured
 
 
@@ -78,7 +78,8 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     """The film agrees with that of short steps, also when the cup begins to move between two."""
     state = held_level(session, full)
     assert state.poured is not None
-    water = replace(state.poured.water, film=3 * 10**11)
+    cup = replace(state.poured.water.cup, film=3 * 10**11)
+    water = replace(state.poured.water, vessels=(cup,))
     state = replace(state, poured=replace(state.poured, water=water))
     start, seen = state.t, []
     for _ in range(1050):
@@ -93,8 +94,8 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     rest = (0.0, 0.0, 0.0)
     fine = water
     for _ in range(round((moving.t - start) / 0.01)):
-        fine = flow.step(fine, water.T_base_cup, rest, 0.01)
-    assert moving.poured.water.film == pytest.approx(fine.film, rel=5e-3)
+        fine = flow.step(fine, {"cup": VesselMove(water.cup.T, rest)}, 0.01)
+    assert moving.poured.water.cup.film == pytest.approx(fine.cup.film, rel=5e-3)
     assert {each.total for each in seen} == {moving.poured.water.total} == {water.total}
 
 
@@ -103,8 +104,8 @@ def test_moved_cup_keeps_its_water(session: Session, full: State) -> None:
     T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
     moved = tick(session, full, cmd.PlaceObject(replace(cup, T=T)), times=50)
     assert moved.poured is not None
-    assert moved.poured.water.cup == FULL
-    np.testing.assert_array_equal(moved.poured.water.T_base_cup, T)
+    assert moved.poured.water.cup.volume == FULL
+    np.testing.assert_array_equal(moved.poured.water.cup.T, T)
     assert moved.poured.still
 
 
@@ -116,7 +117,7 @@ def test_overturned_cup_loses_all_its_water_and_volume_is_conserved(
     assert state.poured is not None
     water = state.poured.water
     assert water.total == FULL
-    assert water.cup < 2 * 10**12
+    assert water.cup.volume < 2 * 10**12
     assert water.spilled + water.basin > 197 * 10**12
 
 
@@ -125,20 +126,20 @@ def test_stop_during_a_pour_leaves_the_water_that_the_tilt_holds(
 ) -> None:
     state = held_level(session, full)
     state = tick(session, state, cmd.SpeedScale(0.2), cmd.SetJoint(4, 2.6))
-    while state.poured is not None and state.poured.water.cup > 0.8 * FULL:
+    while state.poured is not None and state.poured.water.cup.volume > 0.8 * FULL:
         assert state.moving
         state = tick(session, state)
     state = tick(session, state, cmd.Stop(), times=500)
     assert state.stopped is not None
     assert state.poured is not None
-    assert state.poured.water.cup > 0
+    assert state.poured.water.cup.volume > 0
     assert state.poured.water.total == FULL
     assert not state.poured.water.parcels
     later = tick(session, state, times=100)
     assert later.poured is not None
     # Only a film may still drain into the cup.
-    assert later.poured.water.kept == state.poured.water.kept
-    assert later.poured.water.film <= state.poured.water.film
+    assert later.poured.water.cup.kept == state.poured.water.cup.kept
+    assert later.poured.water.cup.film <= state.poured.water.cup.film
 
 
 def test_volume_above_the_capacity_is_refused(session: Session) -> None:

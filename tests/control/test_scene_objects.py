@@ -173,7 +173,7 @@ def test_scene_is_replaced_in_one_step(session: Session) -> None:
     state = session.step(state, [cmd.ReplaceScene((cup, knot(standing(0.4, 0.3))), 1e-4)], TICK)
     assert [scene_object.name for scene_object in state.objects] == ["cup", "knot"]
     assert state.poured is not None
-    assert state.poured.water.cup == 100 * MILLILITRE
+    assert state.poured.water.cup.volume == 100 * MILLILITRE
     held = replace(cup, held=True, T=np.eye(4))
     kept = session.step(
         replace(state, objects=(held,), grip=0.0), [cmd.ReplaceScene((cup,))], state.t + TICK

@@ -165,7 +165,7 @@ def test_part_is_poured(name: str, left: float, tmp_path: Path) -> None:
     state = found.simulation.states[-1]
     assert state.poured is not None
     water = state.poured.water
-    assert water.kept * FEMTOLITRE / ML == pytest.approx(left, abs=0.6)
+    assert water.cup.kept * FEMTOLITRE / ML == pytest.approx(left, abs=0.6)
     assert water.basin * FEMTOLITRE / ML == pytest.approx(60.0, abs=0.6)
     assert water.spilled == 0
 
@@ -218,7 +218,7 @@ def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path
     found = poured(tmp_path, name, f"{{into: basin, ml: {ml:g}, rate: {rate:g} ml/s}}")
     states = found.simulation.states
     filled = [state for state in states if state.poured is not None]
-    kept = np.array([state.poured.water.kept for state in filled if state.poured is not None])
+    kept = np.array([state.poured.water.cup.kept for state in filled if state.poured is not None])
     kept = kept * FEMTOLITRE / ML
     # The mean flow over half a second, while the middle half of the part flows out.
     flow = (kept[:-50] - kept[50:]) / (50 * TICK)

@@ -207,7 +207,7 @@ def pour(stage: Stage) -> Program:
 
 def cup(state: State) -> int:
     assert state.poured is not None
-    return state.poured.water.cup
+    return state.poured.water.cup.volume
 
 
 def test_stopped_pour_loses_no_drop_and_is_completed(stage: Stage, pour: Program) -> None:

@@ -132,7 +132,9 @@ def test_flow_follows_the_rate(stage: Stage, ml: float, rate: float) -> None:
     program = compiled(parse(text), stage.plan_context, stage.begin())
     run, states = stage.play(program, stage.begin(), most=20_000)
     assert run.phase is Phase.DONE
-    kept = np.array([0 if s.poured is None else s.poured.water.kept for s in states]) / MILLILITRE
+    kept = (
+        np.array([0 if s.poured is None else s.poured.water.cup.kept for s in states]) / MILLILITRE
+    )
     # The mean flow over half a second, while the middle half of the part flows out.
     flow = (kept[:-50] - kept[50:]) / (50 * TICK)
     out = 200.0 - 0.5 * (kept[:-50] + kept[50:])

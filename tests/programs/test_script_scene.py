@@ -54,7 +54,7 @@ def test_scene_of_a_file_begins_with_its_joints_and_water(begun: State) -> None:
     assert [each.name for each in begun.objects] == ["post", "cup"]
     assert np.degrees(begun.setpoint[0]) == pytest.approx(10.0)
     assert begun.poured is not None
-    assert begun.poured.water.cup / MILLILITRE == pytest.approx(50.0)
+    assert begun.poured.water.cup.volume / MILLILITRE == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(

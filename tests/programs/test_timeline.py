@@ -43,7 +43,7 @@ def test_cup_is_carried_and_emptied(
     carried = [moment.t for moment in found if any(each.held for each in moment.state.objects)]
     assert 0.1 * timeline.span < carried[0] < carried[-1] < timeline.span
     levels = [
-        (moment.state.poured.water.cup, moment.state.poured.water.basin)
+        (moment.state.poured.water.cup.volume, moment.state.poured.water.basin)
         for moment in found
         if moment.state.poured is not None
     ]

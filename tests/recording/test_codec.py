@@ -21,7 +21,7 @@ from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.modes import IDLE
-from katana450.arm.control.pouring import MotionWithWater
+from katana450.arm.control.pouring import MotionWithWater, VesselMotion
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
@@ -134,8 +134,24 @@ def test_water_of_older_versions_is_read_and_other_liquids_are_refused(state: St
     with pytest.raises(FormError, match="Fill has no field 'liquid'"):
         Codec().decoded(cmd.Command, {**form, "liquid": honey})
     water = WaterFlow(water_environment(load_props())).begin(1e-4, np.eye(4))
-    full = replace(state, poured=MotionWithWater(water, Course(), (0.0, 0.0, 0.0)))
-    assert b"liquid" in Digester().content(full)
+    poured = MotionWithWater(water, (VesselMotion(Course(), (0.0, 0.0, 0.1)),))
+    assert b"liquid" in Digester().content(replace(state, poured=poured))
+
+
+def test_water_of_versions_with_one_vessel_is_read() -> None:
+    """They wrote the cup's fields beside those of the basin."""
+    water = WaterFlow(water_environment(load_props())).begin(1e-4, np.eye(4))
+    poured = MotionWithWater(water, (VesselMotion(Course(), (0.0, 0.0, 0.1)),), 0.5)
+    form = Codec().encoded(MotionWithWater, poured)
+    ((cup,), (motion,)) = form["water"].pop("vessels"), form.pop("motions")
+    old = form["water"] | {"cup": cup["volume"], "T_base_cup": cup["T"]}
+    old |= {name: cup[name] for name in ("slosh", "film", "wetted")}
+    decoded = Codec().decoded(MotionWithWater, {**form, **motion, "water": old})
+    assert text_of(MotionWithWater, decoded) == text_of(MotionWithWater, poured)
+    forms: tuple[Any, ...] = ({}, {"water": 1}, {"water": {"cup": 1}}, {"course": {}})
+    for wrong in forms:
+        with pytest.raises(FormError):
+            Codec().decoded(MotionWithWater, wrong)
 
 
 def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:

@@ -46,7 +46,7 @@ from katana450.extensions.recording.playback.spans import (
 )
 from katana450.extensions.recording.playback.store import RecordingStore, opened
 from katana450.maths.geometry import se3, so3
-from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.recording.recorded import ADA, described, header, record, run
@@ -77,8 +77,8 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
         assert row is not None
         assert row.q == moment.row.q
         if each.state.poured is not None and moment.water is not None:
-            kept = each.state.poured.water.kept
-            assert moment.water.cup == pytest.approx(kept, abs=1e3)
+            kept = each.state.poured.water.cup.kept
+            assert moment.water.cup.volume == pytest.approx(kept, abs=1e3)
     # Before the start, the first state is shown.
     first = run.at(0.0)
     assert first is not None
@@ -238,7 +238,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
             t = 1000.0 + 0.01 * number
             R = so3.exp((0.0, min(1.6, 0.0133 * number), 0.0))
             T = se3.from_rotation_translation(R, cup.T[:3, 3] + (0.0, 0.0, 0.2))
-            water = flow.step(water, T, (0.0, 0.0, 0.0), 0.01)
+            water = flow.step(water, {"cup": VesselMove(T, (0.0, 0.0, 0.0))}, 0.01)
             objects = tuple(
                 replace(each, T=T) if each.name == "cup" else each for each in state.objects
             )
@@ -257,9 +257,9 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
         assert moment.water is not None
         assert wanted.poured is not None
         found, true = still_flying(moment.water, flow.water_environment), wanted.poured.water
-        assert found.cup == pytest.approx(true.kept, abs=1e4)
+        assert found.cup.volume == pytest.approx(true.cup.kept, abs=1e4)
         assert found.basin == pytest.approx(true.basin, abs=1e4)
-        np.testing.assert_allclose(found.T_base_cup, true.T_base_cup, atol=2e-6)
+        np.testing.assert_allclose(found.cup.T, true.cup.T, atol=2e-6)
         assert len(found.parcels) == pytest.approx(len(true.parcels), abs=1)
         for a, b in zip(found.parcels[::-1], true.parcels[::-1], strict=False):
             np.testing.assert_allclose(a.at(a.age), b.at(b.age), atol=1e-4)

@@ -253,7 +253,7 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
         assert nodes(server)["/path/objects/0"].position == pytest.approx(T[:3, 3])
         assert seen.poured is not None
         water = seen.poured.water
-        assert filled() == (water.cup >= WORTH_SHOWING, water.basin >= WORTH_SHOWING)
+        assert filled() == (water.cup.volume >= WORTH_SHOWING, water.basin >= WORTH_SHOWING)
     assert filled() == (False, True)
     look(carried)
     assert filled() == (True, False)

@@ -12,7 +12,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.flow import VesselMove, Water, WaterFlow
 from katana450.maths.water.units import GRAVITY
 
 Step = tuple[FloatArray, FloatArray]
@@ -63,7 +63,7 @@ def poured(
     """
     for k in range(1, round(duration / dt) + 1):
         pose = over_basin(flow.water_environment, tilt(k * dt))
-        water = flow.step(water, pose, NO_ACCELERATION, dt)
+        water = flow.step(water, {"cup": VesselMove(pose)}, dt)
         yield water
 
 

@@ -14,14 +14,13 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import Basin, WaterEnvironment
-from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.flow import VesselMove, Water, WaterFlow
 from katana450.maths.water.lip import DROP_VOLUME
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, counted
 from katana450.maths.water.vectors import Vector
 from tests.geometry.strategies import points, repeatable, rotation_vectors
 from tests.water.motions import (
-    NO_ACCELERATION,
     carried,
     over_basin,
     placed,
@@ -33,7 +32,7 @@ from tests.water.motions import (
 FULL = 2e-4
 """A filling [m^3]."""
 
-Move = tuple[FloatArray, Vector, FloatArray, float]
+Motion = tuple[FloatArray, Vector, FloatArray, float]
 """A rotation vector, a place, an acceleration and a time."""
 
 moves = st.lists(
@@ -50,21 +49,23 @@ moves = st.lists(
 
 def checked(before: Water, after: Water, flow: WaterFlow) -> None:
     assert after.total == before.total
-    assert min(after.cup, after.basin) >= 0
+    assert min(after.cup.volume, after.basin) >= 0
     assert all(parcel.volume > 0 for parcel in after.parcels)
     assert all(puddle.volume > 0 for puddle in after.puddles)
-    assert after.cup <= counted(flow.water_environment.cup.inside.capacity)
+    assert after.cup.volume <= counted(flow.water_environment.cup.inside.capacity)
     assert after.basin <= counted(flow.water_environment.basin.capacity)
 
 
 @repeatable
 @given(st.floats(0.0, 2.4e-4), moves)
-def test_no_motion_makes_or_loses_water(flow: WaterFlow, volume: float, moves: list[Move]) -> None:
+def test_no_motion_makes_or_loses_water(
+    flow: WaterFlow, volume: float, moves: list[Motion]
+) -> None:
     water = flow.begin(volume, placed(0.3, 0.0, 0.2))
     assert abs(water.total * FEMTOLITRE - volume) <= FEMTOLITRE + 1e-9 * volume
     for turn, place, acceleration, dt in moves:
         T = se3.from_rotation_translation(so3.exp(turn), place)
-        after = flow.step(water, T, acceleration, dt)
+        after = flow.step(water, {"cup": VesselMove(T, acceleration)}, dt)
         checked(water, after, flow)
         water = after
 
@@ -77,23 +78,23 @@ def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     for after in poured(flow, water, turned_to(final, rate), final / rate + 2.5, dt):
         checked(water, after, flow)
-        assert after.kept <= water.kept
+        assert after.cup.kept <= water.cup.kept
         water = after
-    over = water.cup - counted(flow.water_environment.cup.inside.holds(final))
+    over = water.cup.volume - counted(flow.water_environment.cup.inside.holds(final))
     # A film stays on the wall, and less than a drop hangs at the lip.
     assert over < DROP_VOLUME
-    assert over >= 0 or water.kept == counted(FULL) or water.film > -over
-    assert water.film < MILLILITRE
+    assert over >= 0 or water.cup.kept == counted(FULL) or water.cup.film > -over
+    assert water.cup.film < MILLILITRE
     assert water.spilled == 0
 
 
 def test_inverted_cup_is_emptied_into_the_basin(flow: WaterFlow) -> None:
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
-    assert (water.basin + water.kept, water.spilled, water.air) == (water.total, 0, 0)
+    assert (water.basin + water.cup.kept, water.spilled, water.air) == (water.total, 0, 0)
     # A part of a millilitre of water stays on the wall, and less than a drop at the lip.
-    assert 0 <= water.cup < DROP_VOLUME
-    assert 0.1 * MILLILITRE < water.film < 0.6 * MILLILITRE
+    assert 0 <= water.cup.volume < DROP_VOLUME
+    assert 0.1 * MILLILITRE < water.cup.film < 0.6 * MILLILITRE
 
 
 def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
@@ -103,16 +104,16 @@ def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
     at_stop = round(tilt / 0.01)
     held = counted(flow.water_environment.cup.inside.holds(tilt))
     # The flow continues while the arm rests, ever more slowly, and ends within two seconds.
-    flowing = [a.cup - b.cup for a, b in pairwise(runs[at_stop:])]
+    flowing = [a.cup.volume - b.cup.volume for a, b in pairwise(runs[at_stop:])]
     assert flowing[0] > 0
     assert all(a >= b for a, b in pairwise(flowing[:100]))
     after = runs[at_stop + 200]
-    assert 0 <= after.cup - held < DROP_VOLUME
+    assert 0 <= after.cup.volume - held < DROP_VOLUME
     assert after.parcels == ()
-    assert flow.margin_to_rim(after) == pytest.approx(0.0, abs=2e-5)
+    assert flow.margin_to_rim(after.cup) == pytest.approx(0.0, abs=2e-5)
     last = runs[-1]
-    assert 0 <= last.cup - held < DROP_VOLUME
-    assert (last.basin, last.spilled) == (last.total - last.kept, 0)
+    assert 0 <= last.cup.volume - held < DROP_VOLUME
+    assert (last.basin, last.spilled) == (last.total - last.cup.kept, 0)
 
 
 def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
@@ -120,24 +121,24 @@ def test_the_size_of_the_steps_hardly_matters(flow: WaterFlow) -> None:
     for dt in (0.0025, 0.01, 0.05):
         water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
         *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, dt)
-        left.append(water.cup / MILLILITRE)
+        left.append(water.cup.volume / MILLILITRE)
     assert left == pytest.approx([left[0]] * 3, abs=6.0)
 
 
 def carry(flow: WaterFlow, distance: float, duration: float) -> tuple[Water, float]:
     water, least = flow.begin(FULL, placed(0.2, -0.3, 0.15)), math.inf
     for T, acceleration in carried(0.2, distance, duration, 0.01):
-        water = flow.step(water, T, acceleration, 0.01)
-        least = min(least, flow.margin_to_rim(water))
+        water = flow.step(water, {"cup": VesselMove(T, acceleration)}, 0.01)
+        least = min(least, flow.margin_to_rim(water.cup))
     for _ in range(200):
-        water = flow.step(water, water.T_base_cup, NO_ACCELERATION, 0.01)
-        least = min(least, flow.margin_to_rim(water))
+        water = flow.step(water, {"cup": VesselMove(water.cup.T)}, 0.01)
+        least = min(least, flow.margin_to_rim(water.cup))
     return water, least
 
 
 def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: WaterFlow) -> None:
     water, least = carry(flow, 0.4, 2.0)
-    assert (water.cup, water.spilled) == (water.total, 0)
+    assert (water.cup.volume, water.spilled) == (water.total, 0)
     at_rest = flow.water_environment.cup.inside.depth - FULL / (
         math.pi * flow.water_environment.cup.inside.radius**2
     )
@@ -145,7 +146,7 @@ def test_a_smooth_carry_spills_nothing_and_a_hasty_one_does(flow: WaterFlow) -> 
     water, least = carry(flow, 0.4, 0.45)
     assert least < 0.0
     assert water.spilled > MILLILITRE
-    assert water.kept + water.spilled == water.total
+    assert water.cup.kept + water.spilled == water.total
 
 
 def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> None:
@@ -156,20 +157,20 @@ def test_the_steady_acceleration_is_where_spilling_begins(flow: WaterFlow) -> No
         # The acceleration rises slowly, over many swings.
         for k in range(3000):
             pull = fraction * limit * min(k / 2500.0, 1.0)
-            water = flow.step(water, T, (0.0, pull, 0.0), 0.01)
+            water = flow.step(water, {"cup": VesselMove(T, (0.0, pull, 0.0))}, 0.01)
         assert (water.spilled > 0) is spills
 
 
 def test_the_surface_leans_against_the_acceleration(flow: WaterFlow) -> None:
     water = flow.begin(1e-4, placed(0.2, -0.3, 0.15))
-    upright = flow.surface(water)
+    upright = flow.surface(water.cup)
     assert upright.tilt == 0.0
     assert upright.level == pytest.approx(
         1e-4 / (math.pi * flow.water_environment.cup.inside.radius**2)
     )
     for _ in range(3000):
-        water = flow.step(water, water.T_base_cup, (1.0, 0.0, 0.0), 0.01)
-    surface = flow.surface(water)
+        water = flow.step(water, {"cup": VesselMove(water.cup.T, (1.0, 0.0, 0.0))}, 0.01)
+    surface = flow.surface(water.cup)
     # In a cup that is pulled to +x, the water rises on the other side.
     assert surface.downhill == pytest.approx((-1.0, 0.0, 0.0), abs=1e-6)
     assert surface.tilt == pytest.approx(math.atan2(1.0, 9.81), abs=1e-6)
@@ -180,14 +181,14 @@ def test_water_leaves_with_the_velocity_of_the_lip(flow: WaterFlow) -> None:
     water = flow.begin(1.5e-4, T)
     moved = T.copy()
     moved[0, 3] += 0.005
-    water = flow.step(water, moved, NO_ACCELERATION, 0.01)
+    water = flow.step(water, {"cup": VesselMove(moved)}, 0.01)
     (parcel,) = water.parcels
     lip = moved[:3, :3] @ (0.0, -0.03, 0.09) + moved[:3, 3]
     assert parcel.start == pytest.approx(tuple(lip))
     assert parcel.velocity[0] == pytest.approx(0.5)
     assert parcel.velocity[1] < 0.0
     assert parcel.velocity[2] == pytest.approx(0.0, abs=1e-9)
-    again = flow.step(water, moved, NO_ACCELERATION, 0.01)
+    again = flow.step(water, {"cup": VesselMove(moved)}, 0.01)
     assert again.parcels[0] == parcel._replace(age=0.01)
 
 
@@ -196,21 +197,19 @@ def test_the_cup_catches_what_falls_into_its_mouth(flow: WaterFlow) -> None:
     drop = Parcel(MILLILITRE, (0.21, -0.3, 0.192), (0.0, 0.0, -1.0), 0.0, 0.01)
     for offset, caught in ((0.0, True), (0.03, False)):
         start = (0.21 + offset, -0.3, 0.192)
-        flying = Water(
-            water.cup, 0, (drop._replace(start=start),), (), water.slosh, water.T_base_cup
-        )
-        after = flow.step(flying, water.T_base_cup, NO_ACCELERATION, 0.01)
-        assert (after.cup == water.cup + MILLILITRE) is caught
+        flying = Water(water.vessels, parcels=(drop._replace(start=start),))
+        after = flow.step(flying, {"cup": VesselMove(water.cup.T)}, 0.01)
+        assert (after.cup.volume == water.cup.volume + MILLILITRE) is caught
         checked(flying, after, flow)
 
 
 def test_a_full_basin_spills_onto_the_table(environment: WaterEnvironment) -> None:
     small = Basin(environment.basin.at, 0.004, 0.04, 0.05, 0.01, 0.06)
-    flow = WaterFlow(WaterEnvironment(environment.cup, small, environment.table))
+    flow = WaterFlow(WaterEnvironment(environment.vessels, small, environment.table))
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
     assert water.basin == counted(small.capacity)
-    assert water.basin + water.spilled + water.kept == water.total
+    assert water.basin + water.spilled + water.cup.kept == water.total
     x, y, _ = small.at
     for puddle in water.puddles:
         assert math.hypot(puddle.at[0] - x, puddle.at[1] - y) < 0.08
@@ -220,30 +219,34 @@ def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
     T = placed(0.2, -0.3, 0.3)
     water = flow.begin(FULL, T)
     for _ in range(400):
-        water = flow.step(water, T, (0.0, 0.0, -9.81), 0.01)
-    assert water.cup == water.total
+        water = flow.step(water, {"cup": VesselMove(T, (0.0, 0.0, -9.81))}, 0.01)
+    assert water.cup.volume == water.total
     *_, water = poured(flow, water, lambda _: math.pi, 3.0, 0.01)
-    assert water.kept < MILLILITRE
+    assert water.cup.kept < MILLILITRE
 
 
 def test_water_at_rest_stays_at_rest(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
-    after = flow.step(water, water.T_base_cup, NO_ACCELERATION, 0.01)
-    assert (after.cup, after.parcels, after.slosh) == (water.cup, (), water.slosh)
+    after = flow.step(water, {"cup": VesselMove(water.cup.T)}, 0.01)
+    assert (after.cup.volume, after.parcels, after.cup.slosh) == (
+        water.cup.volume,
+        (),
+        water.cup.slosh,
+    )
 
 
 def test_step_of_zero_time_only_moves_the_cup(flow: WaterFlow) -> None:
     water = flow.begin(FULL, placed(0.2, -0.3, 0.15))
-    after = flow.step(water, placed(0.3, -0.3, 0.15, 2.0), NO_ACCELERATION, 0.0)
-    assert after.cup == water.cup
-    assert after.T_base_cup[0, 3] == 0.3
+    after = flow.step(water, {"cup": VesselMove(placed(0.3, -0.3, 0.15, 2.0))}, 0.0)
+    assert after.cup.volume == water.cup.volume
+    assert after.cup.T[0, 3] == 0.3
 
 
 def test_the_puddles_stay_few(flow: WaterFlow) -> None:
     water = flow.begin(2.4e-4, placed(-0.2, -0.5, 0.2, 0.3))
     for k in range(600):
         T = placed(-0.2 + k * 1.5e-3, -0.5, 0.2, 0.3 + k * 3e-3)
-        after = flow.step(water, T, NO_ACCELERATION, 0.01)
+        after = flow.step(water, {"cup": VesselMove(T)}, 0.01)
         checked(water, after, flow)
         water = after
     assert 4 <= len(water.puddles) <= 8
@@ -258,10 +261,10 @@ def test_overfull_cup_is_refused(flow: WaterFlow) -> None:
 def test_bad_numbers_are_refused(flow: WaterFlow) -> None:
     water = flow.begin(FULL, np.eye(4))
     with pytest.raises(InputError, match="pose of the cup"):
-        flow.step(water, np.ones((4, 4)), NO_ACCELERATION, 0.01)
+        flow.step(water, {"cup": VesselMove(np.ones((4, 4)))}, 0.01)
     with pytest.raises(InputError, match="acceleration"):
-        flow.step(water, np.eye(4), (0.0, math.nan, 0.0), 0.01)
+        flow.step(water, {"cup": VesselMove(np.eye(4), (0.0, math.nan, 0.0))}, 0.01)
     with pytest.raises(InputError, match="time step"):
-        flow.step(water, np.eye(4), NO_ACCELERATION, -0.01)
+        flow.step(water, {"cup": VesselMove(np.eye(4))}, -0.01)
     with pytest.raises(InputError, match="time step"):
-        flow.step(water, np.eye(4), NO_ACCELERATION, math.inf)
+        flow.step(water, {"cup": VesselMove(np.eye(4))}, math.inf)

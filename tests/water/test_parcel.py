@@ -12,11 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.parcel import SPREAD, Ground, Parcel, landing, overlap
 from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
-from tests.water.motions import NO_ACCELERATION
 
 speeds = st.floats(-2.0, 2.0)
 velocities = st.tuples(speeds, speeds, speeds)
@@ -132,7 +131,7 @@ def test_divided_stream_keeps_its_volume(flow: WaterFlow) -> None:
     edge = Parcel(10**11 + 1, (x + basin.rim_radius, y, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01)
     water = replace(flow.begin(0.0, np.eye(4)), parcels=(edge,))
     for _ in range(40):
-        water = flow.step(water, np.eye(4), NO_ACCELERATION, 0.01)
+        water = flow.step(water, {"cup": VesselMove(np.eye(4))}, 0.01)
     assert water.total == edge.volume
     assert 0.3 * edge.volume < water.basin < 0.5 * edge.volume
     assert water.spilled == edge.volume - water.basin

@@ -8,8 +8,8 @@ import pytest
 
 from katana450.extensions.programs.score import score
 from katana450.maths.water.course import Course
-from katana450.maths.water.flow import WaterFlow
-from tests.water.motions import NO_ACCELERATION, over_basin, poured, turned_to
+from katana450.maths.water.flow import VesselMove, WaterFlow
+from tests.water.motions import over_basin, poured, turned_to
 
 
 def test_pour_into_the_basin_leaves_a_film(flow: WaterFlow) -> None:
@@ -33,7 +33,7 @@ def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
 
 def test_score_without_water_is_nan(flow: WaterFlow) -> None:
     empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
-    empty = flow.step(empty, over_basin(flow.water_environment, 2.0), NO_ACCELERATION, 0.01)
+    empty = flow.step(empty, {"cup": VesselMove(over_basin(flow.water_environment, 2.0))}, 0.01)
     assert math.isnan(score(empty, Course()).emptied_percent)
 
 

@@ -17,12 +17,12 @@ from katana450.arm.robot.props import load_props
 from katana450.arm.robot.water import water_environment
 from katana450.extensions.water.nodes import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
-from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.puddle import THICKNESS, Puddle
 from katana450.maths.water.surface import COLOUR
 from katana450.srgb import to_srgb
 from tests.viser_bridge.internals import nodes, outlet
-from tests.water.motions import NO_ACCELERATION, over_basin, placed, poured, turned_to
+from tests.water.motions import over_basin, placed, poured, turned_to
 
 FLOW = WaterFlow(water_environment(load_props()))
 
@@ -66,7 +66,7 @@ def test_water_at_rest_is_sent_once(recorded: Recorded) -> None:
     recorded.nodes.show(water)
     assert recorded.since()
     for _ in range(20):
-        water = FLOW.step(water, water.T_base_cup, NO_ACCELERATION, 0.01)
+        water = FLOW.step(water, {"cup": VesselMove(water.cup.T)}, 0.01)
         recorded.nodes.show(water)
     assert recorded.since() == []
 
@@ -75,7 +75,7 @@ def test_level_motion_of_the_cup_moves_its_water(recorded: Recorded) -> None:
     water = FLOW.begin(2e-4, placed(0.3, 0.1, 0.2))
     recorded.nodes.show(water)
     recorded.since()
-    recorded.nodes.show(FLOW.step(water, placed(0.3, 0.12, 0.2), NO_ACCELERATION, 0.01))
+    recorded.nodes.show(FLOW.step(water, {"cup": VesselMove(placed(0.3, 0.12, 0.2))}, 0.01))
     assert len(recorded.since()) == 1
     x, y, z = recorded.node("cup").vertices.mean(axis=0)
     level = 2e-4 / (math.pi * FLOW.water_environment.cup.inside.radius**2)
@@ -120,7 +120,9 @@ def test_a_puddle_lies_where_water_fell_and_grows(recorded: Recorded) -> None:
     water = FLOW.begin(2e-4, placed(0.3, -0.2, 0.1))
     areas = []
     for k in range(200):
-        water = FLOW.step(water, placed(0.3, -0.2, 0.1, min(0.02 * k, 2.0)), NO_ACCELERATION, 0.01)
+        water = FLOW.step(
+            water, {"cup": VesselMove(placed(0.3, -0.2, 0.1, min(0.02 * k, 2.0)))}, 0.01
+        )
         recorded.nodes.show(water)
         if water.puddles:
             areas.append(recorded.node("puddle0").scale[0] ** 2 * math.pi * THICKNESS)

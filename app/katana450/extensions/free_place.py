@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -61,6 +61,6 @@ def free_place(
 
 def girth(scene_object: SceneObject) -> float:
     """Return the radius [m] of an upright object about its middle, seen from above."""
-    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+    if scene_object.shape.is_round:
         return scene_object.extent[0]
     return 0.5 * math.hypot(*scene_object.extent[:2])

@@ -8,7 +8,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.pouring import CUP, Pouring
+from katana450.arm.control.pouring import CUP, MAX_VESSELS, Pouring, is_vessel
 from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError
@@ -115,6 +115,8 @@ def _check_objects(pouring: Pouring | None, environment: Environment, command: c
                 _check_hand(environment, scene_object)
                 if is_loose(scene_object):
                     check_carried(environment.table, objects, scene_object)
+            if sum(map(is_vessel, objects)) > MAX_VESSELS:
+                raise InputError(f"A scene must have at most {MAX_VESSELS} vessels with the cup.")
             if volume is not None:
                 has_cup = any(scene_object.name == CUP for scene_object in objects)
                 _check_water(pouring if has_cup else None, volume)

@@ -1,20 +1,24 @@
-"""Motion of the water in the cup while the arm carries it."""
+"""Motion of the water in the cup and in other vessels, one of which the arm carries."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import Environment, SceneObject, named
+from katana450.arm.control.scene_objects import Environment, SceneObject, Shape, named
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.course import Course
-from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.environment import Cup, WaterEnvironment
+from katana450.maths.water.flow import VesselMove, VesselWater, Water, WaterFlow
+from katana450.maths.water.units import counted
 from katana450.maths.water.vectors import Vector, scale, sub, vector
 
 CUP, BASIN = "cup", "basin"
+
+MAX_VESSELS = 8
+"""Maximum number of vessels with the cup; further ones in the order of objects hold no water."""
 
 ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
 """[m] Place of the basin if the scene has none: so far away that it catches no water."""
@@ -22,29 +26,56 @@ ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
 NO_VELOCITY: Vector = (0.0, 0.0, 0.0)
 
 FILM_STEP = 1.0
-"""[s] Time step of a film that drains in a cup at rest, because each step is published. The film
+"""[s] Time step of a film that drains in vessels at rest, because each step is published. The film
 differs by less than 0.5 % from that of short steps, and the sum of the volumes is exact.
 """
 
 
+def is_vessel(scene_object: SceneObject) -> bool:
+    """Return whether an object is the cup or another vessel that holds water in the hand."""
+    return scene_object.name == CUP or scene_object.shape is Shape.VESSEL
+
+
+def vessels_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
+    """Return the vessels that hold water, the cup first; none without the cup."""
+    cup = named(objects, CUP)
+    if cup is None:
+        return []
+    others = [each for each in objects if is_vessel(each) and each is not cup]
+    return [cup, *others][:MAX_VESSELS]
+
+
 @dataclass(frozen=True, eq=False)
-class MotionWithWater:
-    """The water, the motion history of the cup, and position [m], velocity [m/s] of its middle.
+class VesselMotion:
+    """The motion of a vessel so far, and position [m] and velocity [m/s] of its middle."""
 
-    ``waited``: time [s] for which the film has still to drain, in a cup at rest.
-    """
-
-    water: Water
     course: Course
     middle: Vector
     velocity: Vector = NO_VELOCITY
+
+
+@dataclass(frozen=True, eq=False)
+class MotionWithWater:
+    """The water and the motion of each vessel.
+
+    ``waited``: time [s] for which the films have still to drain, in vessels at rest.
+    """
+
+    water: Water
+    motions: tuple[VesselMotion, ...]
     waited: float = 0.0
 
     @property
+    def course(self) -> Course:
+        """The motion history of the cup."""
+        return self.motions[0].course
+
+    @property
     def still(self) -> bool:
-        """True if the water is at rest as long as the cup does not move, except for its film."""
-        slosh = self.water.slosh
-        return not self.water.parcels and slosh.lean == slosh.rate == (0.0, 0.0)
+        """True if the water is at rest as long as no vessel moves, except for the films."""
+        if self.water.parcels or any(each.velocity != NO_VELOCITY for each in self.motions):
+            return False
+        return all(each.slosh.lean == each.slosh.rate == (0.0, 0.0) for each in self.water.vessels)
 
 
 class Pouring:
@@ -53,11 +84,11 @@ class Pouring:
     def __init__(self, water_environment: WaterEnvironment, environment: Environment) -> None:
         """Create the rules for the cup, the basin and the table of ``water_environment``.
 
-        The objects of a scene give the place of the basin.
+        The objects of a scene give the place of the basin, and the other vessels.
         """
         self._water_environment, self._environment = water_environment, environment
-        # Cache for the present place of the basin.
-        self._cache: tuple[SceneObject | None, WaterFlow] | None = None
+        # Cache for the present place of the basin and the present vessels.
+        self._cache: tuple[list[SceneObject | None], WaterFlow] | None = None
 
     def check(self, volume: float) -> None:
         """Raise InputError if ``volume`` [m^3] is negative or more than the cup holds."""
@@ -70,68 +101,126 @@ class Pouring:
 
         x: (k,) joints and finger joint [rad]. Raises InputError for more than the cup holds.
         """
-        T = self._pose(objects, x)
-        if T is None:
+        self.check(volume)
+        return self.settled(Water(()), objects, x, {CUP: counted(volume)})
+
+    def settled(
+        self, water: Water, objects: Sequence[SceneObject], x: FloatArray,
+        volumes: Mapping[str, int],
+    ) -> MotionWithWater | None:  # fmt: skip
+        """Return ``water`` at rest in the vessels where they are now; None without a cup.
+
+        ``volumes``: volumes [fl] by the names of vessels; others keep what they have.
+        """
+        kept = {each.name: each.kept for each in water.vessels} | dict(volumes)
+        vessels = tuple(
+            self._rest(each, objects, x, kept.get(each.name, 0)) for each in vessels_of(objects)
+        )
+        if not vessels:
             return None
-        water = self._flow(objects).begin(volume, T)
-        return MotionWithWater(water, Course(), self._middle(T))
+        settled = Water(vessels, water.basin, (), water.puddles)
+        return self._with_vessels(MotionWithWater(settled, ()), objects, x)
 
     def step(
         self, poured: MotionWithWater, objects: Sequence[SceneObject], x: FloatArray, dt: float
     ) -> MotionWithWater | None:
         """Return the water after ``dt`` [s], with the arm now at ``x`` (k,) [rad].
 
-        Returns ``poured`` itself while cup and water are at rest; None if there is no cup. The
-        film in a cup at rest drains in steps of FILM_STEP; in between, the water stays the same.
+        Returns ``poured`` itself while vessels and water are at rest; None if there is no cup. The
+        film in vessels at rest drains in steps of FILM_STEP; in between, the water stays the same.
         """
-        cup = named(objects, CUP)
-        if cup is None:
+        vessels = vessels_of(objects)
+        if not vessels:
             return None
-        T = self._environment.pose(cup, x)
-        at_rest = bool((poured.water.T_base_cup == T).all())
-        flow, middle = self._flow(objects), self._middle(T)
-        still = at_rest and poured.still and poured.velocity == NO_VELOCITY
-        if dt <= 0.0 or (still and flow.film_rests(poured.water)):
+        if [each.name for each in vessels] != [each.name for each in poured.water.vessels]:
+            poured = self._with_vessels(poured, objects, x)
+        water, flow = poured.water, self._flow(objects)
+        poses = [self._environment.pose(each, x) for each in vessels]
+        rests = [bool((each.T == T).all()) for each, T in zip(water.vessels, poses, strict=True)]
+        still = all(rests) and poured.still
+        if dt <= 0.0 or (still and all(map(flow.film_rests, water.vessels))):
             return poured
-        water = poured.water
-        if still and poured.waited + dt < FILM_STEP and flow.margin_to_rim(water) > 0.0:
+        if (
+            still
+            and poured.waited + dt < FILM_STEP
+            and all(flow.margin_to_rim(each) > 0.0 for each in water.vessels)
+        ):
             return replace(poured, waited=poured.waited + dt)
         if poured.waited:
-            water = flow.step(water, water.T_base_cup, NO_VELOCITY, poured.waited)
-        if not at_rest and not cup.carried:
-            # The cup was moved by a command, which does not accelerate the water.
-            moved = flow.step(water, T, NO_VELOCITY, 0.0)
-            return MotionWithWater(moved, poured.course, middle)
-        velocity = scale(1.0 / dt, sub(middle, poured.middle))
-        # The velocities are those in the middle of this step and of the one before, which is
-        # shorter or longer where a STOP or a late tick came between.
-        between = 0.5 * (dt + (poured.course.step or dt))
-        acceleration = scale(1.0 / between, sub(velocity, poured.velocity))
-        water = flow.step(water, T, acceleration, dt)
-        return MotionWithWater(water, poured.course.after(acceleration, dt), middle, velocity)
+            water = flow.step(water, {}, poured.waited)
+        motions = list(zip(vessels, poured.motions, poses, strict=True))
+        if any(not rest and not each.carried for rest, each in zip(rests, vessels, strict=True)):
+            # A vessel was moved by a command, which does not accelerate the water.
+            moves = {each.name: VesselMove(T) for each, _, T in motions}
+            placed = tuple(
+                VesselMotion(motion.course, self._middle(each, T, objects))
+                for each, motion, T in motions
+            )
+            return MotionWithWater(flow.step(water, moves, 0.0), placed)
+        moves, after = {}, []
+        for each, motion, T in motions:
+            middle = self._middle(each, T, objects)
+            velocity = scale(1.0 / dt, sub(middle, motion.middle))
+            # The velocities are those in the middle of this step and of the one before, which is
+            # shorter or longer where a STOP or a late tick came between.
+            between = 0.5 * (dt + (motion.course.step or dt))
+            acceleration = scale(1.0 / between, sub(velocity, motion.velocity))
+            moves[each.name] = VesselMove(T, acceleration)
+            after.append(VesselMotion(motion.course.after(acceleration, dt), middle, velocity))
+        return MotionWithWater(flow.step(water, moves, dt), tuple(after))
 
     def margin_to_rim(self, poured: MotionWithWater, objects: Sequence[SceneObject]) -> float:
-        """Return the height [m] of the lip over the surface; negative while water flows over it."""
-        return self._flow(objects).margin_to_rim(poured.water)
+        """Return the height [m] of the lip over the surface; negative while water flows over it.
+
+        It is that of the vessel in the hand, or of the cup.
+        """
+        held = next((each.name for each in objects if each.held), CUP)
+        return self._flow(objects).margin_to_rim(poured.water.vessel(held) or poured.water.cup)
 
     def water_environment(self, objects: Sequence[SceneObject]) -> WaterEnvironment:
-        """Return the environment of the water with the basin where it stands."""
+        """Return the environment of the water with the vessels, and the basin where it stands."""
         return self._flow(objects).water_environment
 
+    def _with_vessels(
+        self, poured: MotionWithWater, objects: Sequence[SceneObject], x: FloatArray
+    ) -> MotionWithWater:
+        """Return ``poured`` with the present vessels; the water of one that is gone is gone."""
+        known = dict(
+            zip([each.name for each in poured.water.vessels], poured.motions, strict=False)
+        )
+        waters, motions = [], []
+        for each in vessels_of(objects):
+            vessel = poured.water.vessel(each.name) or self._rest(each, objects, x, 0)
+            waters.append(vessel)
+            still = VesselMotion(Course(), self._middle(each, vessel.T, objects))
+            motions.append(known.get(each.name) or still)
+        water = replace(poured.water, vessels=tuple(waters))
+        return replace(poured, water=water, motions=tuple(motions))
+
+    def _rest(
+        self, vessel: SceneObject, objects: Sequence[SceneObject], x: FloatArray, volume: int
+    ) -> VesselWater:
+        T = self._environment.pose(vessel, x)
+        return self._flow(objects).rest(vessel.name, volume, T)
+
+    def _shape(self, vessel: SceneObject) -> Cup:
+        cup = self._water_environment.cup
+        return cup.sized(*vessel.extent) if vessel.shape is Shape.VESSEL else cup
+
     def _flow(self, objects: Sequence[SceneObject]) -> WaterFlow:
-        basin = named(objects, BASIN)
-        if self._cache is None or self._cache[0] is not basin:
+        basin, vessels = named(objects, BASIN), vessels_of(objects)
+        key = [basin, *vessels]
+        if self._cache is None or self._cache[0] != key:
             at = ABSENT_BASIN_AT if basin is None else vector(basin.T[:3, 3])
+            shapes = {each.name: self._shape(each) for each in vessels}
             water_environment = replace(
-                self._water_environment, basin=replace(self._water_environment.basin, at=at)
+                self._water_environment,
+                vessels=shapes or self._water_environment.vessels,
+                basin=replace(self._water_environment.basin, at=at),
             )
-            self._cache = (basin, WaterFlow(water_environment))
+            self._cache = (key, WaterFlow(water_environment))
         return self._cache[1]
 
-    def _pose(self, objects: Sequence[SceneObject], x: FloatArray) -> FloatArray | None:
-        cup = named(objects, CUP)
-        return None if cup is None else self._environment.pose(cup, x)
-
-    def _middle(self, T: FloatArray) -> Vector:
-        cup = self._water_environment.cup
-        return vector(T[:3, 3] + (cup.floor + 0.5 * cup.inside.depth) * T[:3, 2])
+    def _middle(self, vessel: SceneObject, T: FloatArray, objects: Sequence[SceneObject]) -> Vector:
+        shape = self.water_environment(objects).vessels[vessel.name]
+        return vector(T[:3, 3] + (shape.floor + 0.5 * shape.inside.depth) * T[:3, 2])

@@ -45,15 +45,24 @@ class Shape(Enum):
     """size: along x, y, z."""
     CYLINDER = "cylinder"
     """size: radius, height."""
+    VESSEL = "vessel"
+    """size: radius, height. An open vessel of the form of the cup, which can hold water."""
     SPHERE = "sphere"
     """size: radius."""
     MESH = "mesh"
     """size: along x, y, z, of its solid."""
 
     @property
+    def is_round(self) -> bool:
+        """True if it looks the same from all sides."""
+        return self in (Shape.CYLINDER, Shape.VESSEL, Shape.SPHERE)
+
+    @property
     def numbers(self) -> int:
         """Number of values in a size."""
-        return {Shape.BOX: 3, Shape.CYLINDER: 2, Shape.SPHERE: 1, Shape.MESH: 3}[self]
+        if self in (Shape.CYLINDER, Shape.VESSEL):
+            return 2
+        return 1 if self is Shape.SPHERE else 3
 
 
 class Attachment(Enum):
@@ -155,7 +164,7 @@ class SceneObject:
         match self.shape:
             case Shape.BOX:
                 return box(self.extent)
-            case Shape.CYLINDER:
+            case Shape.CYLINDER | Shape.VESSEL:
                 return cylinder(*self.extent)
             case Shape.SPHERE:
                 return sphere(self.extent[0])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.pouring import BASIN, is_vessel
 from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject, Shape
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
@@ -21,12 +21,12 @@ MIN_UPRIGHT = 0.999
 
 
 def is_loose(scene_object: SceneObject) -> bool:
-    """Return whether ``scene_object`` needs a support: the cup, the basin, and holdable objects.
+    """Return whether ``scene_object`` needs a support: vessels, the basin, and holdable objects.
 
     All other objects are parts of the work cell and may hang in the air.
     """
     return not scene_object.carried and (
-        scene_object.can_be_held or scene_object.name in (CUP, BASIN)
+        scene_object.can_be_held or is_vessel(scene_object) or scene_object.name == BASIN
     )
 
 
@@ -91,7 +91,7 @@ def _lowest(scene_object: SceneObject) -> float:
     match scene_object.shape:
         case Shape.SPHERE:
             reach = scene_object.extent[0]
-        case Shape.CYLINDER:
+        case Shape.CYLINDER | Shape.VESSEL:
             radius, height = scene_object.extent
             reach = radius * float(np.hypot(down[0], down[1])) + 0.5 * height * down[2]
         case _:
@@ -106,6 +106,6 @@ def is_over(scene_object: SceneObject, other: SceneObject) -> bool:
     if other.T[2, 2] < MIN_UPRIGHT:
         return False
     x, y, _ = se3.inverse(other.T)[:3] @ np.append(scene_object.T_collision_shape[:3, 3], 1.0)
-    if other.shape is Shape.CYLINDER:
+    if other.shape.is_round:
         return bool(np.hypot(x, y) <= other.extent[0])
     return bool(abs(x) <= 0.5 * other.extent[0] and abs(y) <= 0.5 * other.extent[1])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.errors import RobotDescriptionError
 from katana450.resources import PROPS_PATH
 
@@ -40,6 +41,11 @@ class Vessel:
     floor: float
     floor_radius: float
 
+    def scale_to(self, radius: float, height: float) -> tuple[float, float, float]:
+        """Return the scale along x, y, z that gives it another outer radius and height [m]."""
+        wide = radius / self.outer_radius
+        return wide, wide, height / self.height
+
 
 @dataclass(frozen=True)
 class TableProp:
@@ -58,6 +64,13 @@ class Props:
     cup: Vessel
     basin: Vessel
     table: TableProp
+
+    def file_of(self, scene_object: SceneObject) -> tuple[Path, tuple[float, float, float]] | None:
+        """Return the GLB file of a cup, basin or vessel and its scale; None for other objects."""
+        if scene_object.shape is Shape.VESSEL:
+            return self.cup.mesh, self.cup.scale_to(*scene_object.extent)
+        prop = {"cup": self.cup, "basin": self.basin}.get(scene_object.name)
+        return None if prop is None else (prop.mesh, (scene_object.scale,) * 3)
 
 
 def load_props(path: Path = PROPS_PATH) -> Props:

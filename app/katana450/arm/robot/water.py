@@ -14,7 +14,7 @@ def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironm
     """
     cup, basin, table = props.cup, props.basin, props.table
     return WaterEnvironment(
-        Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor),
+        {"cup": Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor, cup.outer_radius)},
         Basin(
             basin_at,
             basin.floor,

@@ -81,8 +81,8 @@ def _row(poured: MotionWithWater | None) -> tuple[float, ...]:
     if poured is None:
         return (math.nan,) * 6
     water = poured.water
-    volumes = (water.cup, water.film, water.basin, water.air, water.spilled)
+    volumes = (water.cup.volume, water.cup.film, water.basin, water.air, water.spilled)
     return (
         *(each / MILLILITRE for each in volumes),
-        math.acos(min(max(float(water.T_base_cup[2, 2]), -1.0), 1.0)),
+        math.acos(min(max(float(water.cup.T[2, 2]), -1.0), 1.0)),
     )

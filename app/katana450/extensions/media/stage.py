@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ class RenderStage:
         self._session = session
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
-        self._known = {"cup": _in_file(props.cup.mesh), "basin": _in_file(props.basin.mesh)}
+        self._props = props
         self._stretches = [_BendableStretch(stretch) for stretch in stretches_of(robot)]
 
     def items(self, state: State) -> list[Item]:
@@ -74,9 +75,13 @@ class RenderStage:
             if scene_object.appearance.hidden:
                 continue
             T = self._session.environment.pose(scene_object, x)
-            shapes = self._known.get(scene_object.name) or (_plain(scene_object),)
+            shapes = self._shapes(scene_object)
             found += [Item(scene_object.name, shape, T) for shape in shapes]
         return found
+
+    def _shapes(self, scene_object: SceneObject) -> Sequence[VisualMesh]:
+        prop = self._props.file_of(scene_object)
+        return (_plain(scene_object),) if prop is None else _in_file(*prop)
 
     def water(self, state: State) -> list[Translucent]:
         """Return the items of the water; none without water."""
@@ -126,8 +131,11 @@ HOSE = Material("rubber", (0.035, 0.035, 0.04))
 """Material of the conduit."""
 
 
-def _in_file(path: Path) -> Sequence[VisualMesh]:
-    return tuple(shapes_of(Visual(frozen(np.eye(4)), frozen(np.ones(3)), path)))
+@lru_cache
+def _in_file(
+    path: Path, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+) -> Sequence[VisualMesh]:
+    return tuple(shapes_of(Visual(frozen(np.eye(4)), frozen(np.array(scale)), path)))
 
 
 def _plain(scene_object: SceneObject) -> VisualMesh:

@@ -35,8 +35,7 @@ from katana450.maths.water.surface import (
 )
 from katana450.maths.water.units import FEMTOLITRE
 
-CUP, STREAM, BASIN, PUDDLE = (
-    "water in cup",
+STREAM, BASIN, PUDDLE = (
     "water in air",
     "water in basin",
     "water on table",
@@ -52,13 +51,13 @@ def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[T
     """Return all visible parts of the water."""
     found: list[Translucent] = []
     basin, level = water_environment.basin, water_environment.basin.level(water.basin * FEMTOLITRE)
-    if water.cup >= WORTH_SHOWING:
-        up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, water_environment.cup.floor))
-        corners = (
-            body(water_environment.cup.inside, WaterFlow(water_environment).surface(water)) * INSET
-        )
-        shape = _shape(corners, BODY_FACES)
-        found.append(Translucent(Item(CUP, shape, water.T_base_cup @ up), IN_VESSEL))
+    flow = WaterFlow(water_environment)
+    for each in water.vessels:
+        vessel = water_environment.vessels.get(each.name)
+        if vessel is not None and each.volume >= WORTH_SHOWING:
+            up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, vessel.floor))
+            shape = _shape(body(vessel.inside, flow.surface(each)) * INSET, BODY_FACES)
+            found.append(Translucent(Item(f"water in {each.name}", shape, each.T @ up), IN_VESSEL))
     if water.parcels:
         end = landing(water.parcels[0], water_environment, level).age
         corners = stream(water.parcels, water_environment.cup.inside.radius, end)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.pouring import BASIN, CUP, MAX_VESSELS, is_vessel
 from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, named
 from katana450.arm.control.solid import PLAIN, ObjectAppearance
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
@@ -54,6 +54,9 @@ class ObjectRequests(RequestHandler):
         if known is None and len(arm.state.objects) >= MAX_OBJECTS:
             raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
         scene_object = self._shaped(request, known)
+        others = [each for each in arm.state.objects if each.name != request.name]
+        if is_vessel(scene_object) and sum(map(is_vessel, others)) >= MAX_VESSELS:
+            raise InputError(f"There are {MAX_VESSELS} vessels already: remove one first.")
         if request.T is None:
             if known is not None:
                 return scene_object

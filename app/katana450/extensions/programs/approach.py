@@ -42,10 +42,7 @@ class Approach(NamedTuple):
 
 def symmetry(held: SceneObject) -> float:
     """Return the angle [rad] by which the object may turn and look the same; 0 for any."""
-    match held.shape:
-        case Shape.CYLINDER | Shape.SPHERE:
-            return 0.0
-        case Shape.BOX:
-            along_x, along_y, _ = held.extent
-            return 0.5 * math.pi if math.isclose(along_x, along_y) else math.pi
-    return math.tau
+    if held.shape is Shape.BOX:
+        along_x, along_y, _ = held.extent
+        return 0.5 * math.pi if math.isclose(along_x, along_y) else math.pi
+    return 0.0 if held.shape.is_round else math.tau

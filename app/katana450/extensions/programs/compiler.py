@@ -328,7 +328,10 @@ class Compiler:
         for each in line:
             self._report(PlanningStage(TIMING, each.number + 1, self._steps))
             if isinstance(each, _UntimedStep):
-                actions = self._timed_actions(each.compiled)
+                try:
+                    actions = self._timed_actions(each.compiled)
+                except InputError as error:
+                    raise _at(each.located, error) from error
                 found.append(PlannedStep(each.number, each.located, actions))
             else:
                 then, otherwise = self._timed(each.then), self._timed(each.otherwise)

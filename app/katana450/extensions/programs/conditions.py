@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol, Self, TypeVar
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.pouring import BASIN, CUP, is_vessel
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
 from katana450.errors import InputError
@@ -144,7 +144,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Volume:
-    """The water in the cup or in the basin is within ``bounds`` [ml]."""
+    """The water in the basin or in a vessel is within ``bounds`` [ml]."""
 
     of: str
     bounds: ValueBounds
@@ -153,7 +153,7 @@ class Volume:
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
         """Read {of, at_least, at_most}. Raises ScriptError."""
         fields = Fields(value, "a volume")
-        of = fields.need("of", read.choice(CUP, BASIN), CUP)
+        of = fields.need("of", read.text, CUP)
         found = cls(of, ValueBounds.read(fields, read.number(0.0, 10_000.0, "ml")))
         fields.done()
         return found
@@ -164,7 +164,9 @@ class Volume:
         return f"the water in the {self.of}"
 
     def checked(self, builder: PlanBuilder) -> Self:
-        """Return itself. Raises InputError without water."""
+        """Return itself. Raises InputError without water, and for another object."""
+        if self.of not in (CUP, BASIN) and not is_vessel(builder.scene_object(self.of)):
+            raise InputError(f"{self.of} holds no water: only cup, basin and vessels do.")
         if builder.state.poured is None:
             raise InputError(
                 "There is no water: there is no cup in the scene, or nothing is filled."
@@ -175,8 +177,10 @@ class Volume:
         """Return whether the volume is within the bounds."""
         if state.poured is None:
             return False
-        water = state.poured.water
-        return self.bounds.hold((water.cup if self.of == CUP else water.basin) / MILLILITRE)
+        water, vessel = state.poured.water, state.poured.water.vessel(self.of)
+        if vessel is None and self.of != BASIN:
+            return False
+        return self.bounds.hold((water.basin if vessel is None else vessel.volume) / MILLILITRE)
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,11 @@ class Drain:
     """Wait until a tilted cup has poured enough.
 
     Attributes:
-        rest: volume that stays in the cup with its film [fl]; None to wait until the flow ends.
+        vessel: name of the vessel.
+        rest: volume that stays in it with its film [fl]; None to wait until the flow ends.
     """
 
+    vessel: str
     rest: int | None = None
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
@@ -35,9 +37,11 @@ class Drain:
         """Return whether enough has flowed. Raises InputError if that takes too long."""
         if state.poured is None:
             raise InputError("There is no cup to pour.")
-        water = state.poured.water
+        water = state.poured.water.vessel(self.vessel)
+        if water is None:
+            raise InputError(f"There is no {self.vessel} to pour.")
         if self.rest is None:
-            return outflow(water) < END_FLOW or waited > MAX_DRAIN
+            return outflow(state.poured.water) < END_FLOW or waited > MAX_DRAIN
         if waited > MAX_DRAIN:
             left = (water.kept - self.rest) * FEMTOLITRE / ML
             raise InputError(f"After {MAX_DRAIN:g} s, {left:.1f} ml have still to be poured.")

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.pouring import is_vessel
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, Approach
 from katana450.maths.geometry.arrays import FloatArray
@@ -38,13 +38,13 @@ def widths(
     """Return all approaches at ``pitches`` [rad], whether the object fits or not.
 
     The object stands at ``at`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. The
-    fingers close on two opposite sides of a box or mesh. The cup is only grasped from the front.
+    fingers close on two opposite sides of a box or mesh. A vessel is only grasped from the front.
     """
-    if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+    if scene_object.shape.is_round:
         width = 2.0 * scene_object.extent[0]
         front = [(Approach(p, 0.0, aside), width) for aside in ASIDE for p in pitches]
         above = [(Approach(DOWN, roll), width) for roll in ROUND_ROLLS]
-        return {FRONT: front} if scene_object.name == CUP else {FRONT: front, ABOVE: above}
+        return {FRONT: front} if is_vessel(scene_object) else {FRONT: front, ABOVE: above}
     sizes = scene_object.extent[1], scene_object.extent[0]
     skew = math.atan2(at[1], at[0]) - math.atan2(side[1], side[0])
     rolls = [(wrapped(skew + k * DOWN), sizes[k % 2]) for k in range(4)]

@@ -9,8 +9,8 @@ from typing import ClassVar, Final, cast
 
 import numpy as np
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.pouring import is_vessel
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.approach import (
     ABOVE,
@@ -75,14 +75,14 @@ class FiveAxisHand:
     ) -> Mapping[str, Sequence[Approach]]:
         """Return the approaches; the fingers close on two opposite sides of a box or mesh.
 
-        The cup is only grasped from the front: from above the wrist could not pour it.
+        A vessel is only grasped from the front: from above the wrist could not pour it.
         """
-        if scene_object.name == CUP:
+        if is_vessel(scene_object):
             return {FRONT: tuple(map(Approach, PITCHES))}
         # Only steep fingertips come near what a low object stands on.
         low = scene_object.height < LOW
         front = tuple(map(Approach, STEEP_PITCHES[::-1] if low else (*PITCHES, *STEEP_PITCHES)))
-        if scene_object.shape in (Shape.CYLINDER, Shape.SPHERE):
+        if scene_object.shape.is_round:
             return {FRONT: front, ABOVE: (Approach(DOWN),)}
         x, y, _ = at
         skew = math.atan2(y, x) - math.atan2(side[1], side[0])

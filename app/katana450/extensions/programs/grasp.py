@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 
 from katana450.arm.control.messages import part
-from katana450.arm.control.pouring import CUP
+from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
@@ -332,8 +332,8 @@ def _too_near(nearest: Contact, minimum: float) -> str:
 
 def _no_approach(scene_object: SceneObject, side: str) -> str:
     """Return why no approach from ``side`` suits the object."""
-    if scene_object.name == CUP:
-        return "the cup is grasped from the front, because from above the wrist could not pour it."
+    if is_vessel(scene_object):
+        return "a vessel is grasped from the front, because from above the wrist could not pour it."
     return (
         "its sides are turned too far, seen from the arm, so the fingers cannot hold it from the "
         f"{side}. Grasp it from above, or turn it."

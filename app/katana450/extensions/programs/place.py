@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from katana450.arm.control.pouring import BASIN, CUP
+from katana450.arm.control.pouring import BASIN, is_vessel
 from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.arm.control.support import check_carried, is_over, surface_below
 from katana450.errors import InputError
@@ -215,7 +215,7 @@ def _check_support(builder: PlanBuilder, standing: SceneObject) -> None:
     """Raise InputError if nothing carries the object ``standing``, or an open vessel would."""
     objects = _objects_around(builder)
     for each in objects:
-        if each.name in (CUP, BASIN) and is_over(standing, each):
+        if (is_vessel(each) or each.name == BASIN) and is_over(standing, each):
             raise InputError(
                 f"{each.name} is open at its top and cannot carry {standing.name}. Choose a place "
                 "beside it."
@@ -278,8 +278,8 @@ def _bring(builder: PlanBuilder, held: SceneObject, low: DragTarget) -> None:
     try:
         builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=True))
     except InputError:
-        # A way round obstacles may tilt the object, and the cup would spill.
-        if held.name == CUP:
+        # A way round obstacles may tilt the object, and a vessel would spill.
+        if is_vessel(held):
             raise
         builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=False))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -35,7 +35,6 @@ from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.path import Path, joint_derivatives
 from katana450.maths.planning.plan import JOIN_TOLERANCE, check_clear
-from katana450.maths.water.units import FEMTOLITRE
 
 W = TypeVar("W")
 L = TypeVar("L")
@@ -133,7 +132,8 @@ class PacedPath(UntimedPath):
         fastest = segment.scaling
         if fastest.span > self.duration:
             raise InputError(
-                f"It takes at least {fastest.span:.2g} s, so {self.duration:.2g} s are too short."
+                f"It takes at least {fastest.span:.2g} s, so {self.duration:.2g} s are too short: "
+                "give a lower rate or a larger part."
             )
         even = replace(fastest, coefficients=np.full_like(fastest.coefficients, self.duration))
         nearest = plan.nearest
@@ -353,18 +353,16 @@ class PlanBuilder:
         self.state = self._with_still_water(missed)
         self.taken, self.given_up = None, ()
 
-    def predict_water(self, volume: float) -> None:
-        """Continue with ``volume`` [m^3] of water in the cup."""
-        self.state = self._with_still_water(self.state, volume)
+    def predict_water(self, volumes: Mapping[str, int]) -> None:
+        """Continue with these volumes of water [fl] in vessels."""
+        self.state = self._with_still_water(self.state, volumes)
 
-    def _with_still_water(self, state: State, volume: float | None = None) -> State:
-        """Return ``state`` with the water at rest in the cup, where the cup is now."""
+    def _with_still_water(self, state: State, volumes: Mapping[str, int] | None = None) -> State:
+        """Return ``state`` with the water at rest in the vessels, where they are now."""
         pouring = self.plan_context.session.pouring
         if pouring is None or state.poured is None:
             return state
-        water = state.poured.water
-        volume = water.kept * FEMTOLITRE if volume is None else volume
-        still = pouring.fill(volume, state.objects, state.x_setpoint)
+        still = pouring.settled(state.poured.water, state.objects, state.x_setpoint, volumes or {})
         return replace(state, poured=still)
 
     def joints_at(self, place: StepTarget) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The step ``pour``: empty the cup, or a part of it, into an object, planned from its place."""
+"""The step ``pour``: empty a vessel, or a part of it, into an object, planned from its place."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
-from katana450.arm.control.pouring import CUP
+from katana450.arm.control.pouring import CUP, is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import SetSpeed, Wait
 from katana450.extensions.programs.carry import carry
-from katana450.extensions.programs.curve import ToolLine
 from katana450.extensions.programs.drain import Drain
 from katana450.extensions.programs.expression import PLAIN
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pour_rate import RatedTilt, RatePlan
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
+from katana450.extensions.programs.rolling import Rolling, lip_of, over_vessel
 from katana450.extensions.programs.schema_parts import (
     OBJECT,
     Schema,
@@ -34,13 +34,12 @@ from katana450.extensions.programs.schema_parts import (
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.tilting import EMPTY_TILT, Tilting, about_the_lip
-from katana450.extensions.programs.tool_curves import ToolTurn
+from katana450.extensions.programs.tilting import AIM, EMPTY_TILT, Tilting, about_the_lip
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.water.flow import Water
-from katana450.maths.water.units import FEMTOLITRE, ML, counted
+from katana450.maths.water.flow import VesselWater
+from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
 
 POUR_TURN = math.radians(165.0)
 """[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
@@ -90,14 +89,15 @@ POURING = "pour"
 
 @dataclass(frozen=True)
 class Pour:
-    """Carry the cup over an object, turn it over, shake it, and turn it back.
+    """Carry a vessel over an object, turn it over, shake it, and turn it back.
 
-    The cup stays upright until then. An arm of the five-axis family keeps the pitch of the grasp,
-    and turns the cup by the roll of its wrist. Other arms tilt it about its lip; those with four
-    axes do so in their plane.
+    It stays upright until then. An arm of the five-axis family keeps the pitch of the grasp, and
+    turns it by the roll of its wrist; over another vessel the lip stays in its place. Other arms
+    tilt it about its lip; those with four axes do so in their plane.
 
     Attributes:
         into: name of the object.
+        source: name of the vessel in the hand; None for any.
         shake: number of shakes.
         volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
             when the rest is left, kept so until then, and turned back.
@@ -106,13 +106,14 @@ class Pour:
     """
 
     schema: ClassVar[Schema] = any_of(
-        "Carry the cup over an object, turn it over, shake it, and turn it back",
+        "Carry a held vessel over an object, turn it over, shake it, and turn it back",
         OBJECT,
         mapping(
             "An object, and how much to pour",
             "into",
             {
                 "into": OBJECT,
+                "from": {**OBJECT, "description": "The vessel in the hand, for a check"},
                 "ml": number_or_text(1.0, 1000.0, "How much to pour, ml; all unless given"),
                 "rate": number_or_text(
                     1.0, 50.0, "Flow while pouring, ml/s, or a text such as 10 ml/s"
@@ -128,98 +129,132 @@ class Pour:
     shake: int
     volume: float | None = None
     rate: float | None = None
+    source: str | None = None
 
     @classmethod
     def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {into, shake, ml, rate}. Raises ScriptError."""
+        """Read the name of an object, or {into, from, shake, ml, rate}. Raises ScriptError."""
         if value.kind == "text":
             return cls(read.text(value), SHAKES)
         fields = Fields(value, "a pour")
         into = fields.need("into", read.text, "")
+        source = fields.take("from", read.text, None)
         ml = fields.take("ml", read.number(1.0, 1000.0, "ml"), None)
         shake = fields.take("shake", read.whole(0, 20), SHAKES if ml is None else 0)
         rate = fields.take("rate", _rate, None)
         fields.done()
         if ml is not None and shake:
             raise value.wrong("A shaken cup does not keep the rest: leave out `shake` or `ml`.")
-        return cls(into, shake, None if ml is None else ML * ml, rate)
+        return cls(into, shake, None if ml is None else ML * ml, rate, source)
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the pour, turning either way. Raises InputError if it is not possible."""
-        cup, basin = builder.scene_object(CUP), builder.scene_object(self.into)
-        if not cup.held:
-            raise InputError("The cup is not in the hand: `grasp: cup` first.")
-        if builder.state.poured is None:
-            raise InputError("There is no water in the cup: `fill` it first.")
-        rest = self._rest(builder.state.poured.water)
+        vessel, below = self._vessel(builder), builder.scene_object(self.into)
+        if below.carried:
+            raise InputError(f"{self.into} is in the hand: name what stands below it.")
+        poured = builder.state.poured
+        water = None if poured is None else poured.water.vessel(vessel.name)
+        if poured is None or water is None:
+            raise InputError(f"There is no water in the {vessel.name}: `fill` it first.")
+        rest = self._rest(vessel, water)
+        volumes = {vessel.name: counted(rest)}
+        pouring = builder.plan_context.session.pouring
+        other = poured.water.vessel(self.into)
+        if pouring is not None and other is not None:
+            part = water.kept - counted(rest)
+            inside = pouring.water_environment(builder.state.objects).vessels[self.into].inside
+            room = counted(inside.capacity) - other.kept
+            if part > room:
+                raise InputError(
+                    f"{self.into} has room for {room / MILLILITRE:.1f} ml, which is less than the "
+                    f"{part / MILLILITRE:.1f} ml to pour; give a smaller `ml`."
+                )
+            volumes[self.into] = other.kept + part
         level = builder.target
         if isinstance(level, ToolTarget) and level.pitch > MAX_POUR_PITCH:
             raise InputError(
-                "The cup is held from above, where the wrist cannot tilt it: pick it with "
-                "`side: front`."
+                f"The {vessel.name} is held from above, where the wrist cannot tilt it: pick it "
+                "with `side: front`."
             )
         try:
             if isinstance(level, ToolTarget):
-                turn, rated = self._turn(builder, level, rest), self._rated(builder, rest)
+                turn = self._turn(builder, vessel, level, rest)
+                rated = self._rated(builder, vessel, rest)
                 builder.first(
-                    (turn, -turn), lambda turn: self._pour(builder, basin, level, turn, rated, rest)
+                    (turn, -turn),
+                    lambda turn: self._pour(builder, vessel, below, level, turn, rated, rest),
                 )
             else:
-                self._pour_about_the_lip(builder, cup, basin, rest)
+                self._pour_about_the_lip(builder, vessel, below, rest)
         except InputError as error:
-            raise error.after(f"The cup cannot be emptied into {self.into}") from error
-        builder.predict_water(rest)
+            message = f"The {vessel.name} cannot be emptied into {self.into}"
+            raise error.after(message) from error
+        builder.predict_water(volumes)
 
-    def _rest(self, water: Water) -> float:
-        """Return the volume [m^3] that stays in the cup. Raises InputError for too little water."""
+    def _vessel(self, builder: PlanBuilder) -> SceneObject:
+        """Return the vessel in the hand. Raises InputError without it."""
+        held = next((each for each in builder.state.objects if each.held), None)
+        name = self.source or (held.name if held is not None and is_vessel(held) else CUP)
+        if held is None or held.name != name:
+            raise InputError(f"The {name} is not in the hand: `grasp: {name}` first.")
+        if not is_vessel(held):
+            raise InputError(f"{name} holds no water: only the cup and vessels are poured.")
+        return held
+
+    def _rest(self, vessel: SceneObject, water: VesselWater) -> float:
+        """Return the volume [m^3] that stays in it. Raises InputError for too little water."""
         if self.volume is None:
             return 0.0
         held = water.kept * FEMTOLITRE
         # The water is counted in whole femtolitres.
         if counted(self.volume) > water.kept:
             raise InputError(
-                f"The cup holds {held / ML:.1f} ml at this step, which is less than "
+                f"The {vessel.name} holds {held / ML:.1f} ml at this step, which is less than "
                 f"{self.volume / ML:g} ml."
             )
         return max(held - self.volume, 0.0)
 
-    def _turn(self, builder: PlanBuilder, level: ToolTarget, rest: float) -> float:
+    def _turn(
+        self, builder: PlanBuilder, vessel: SceneObject, level: ToolTarget, rest: float
+    ) -> float:
         """Return the roll [rad] of the tilted cup; ``rest`` [m^3] is what stays in it."""
         if self.volume is None or builder.plan_context.session.pouring is None:
             return POUR_TURN
-        roll = float(_roll_of(self._tilt(builder, rest), level.pitch))
+        roll = float(_roll_of(self._tilt(builder, vessel, rest), level.pitch))
         if roll >= POUR_TURN:
             raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
         return roll
 
-    def _tilt(self, builder: PlanBuilder, rest: float) -> float:
+    def _tilt(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> float:
         """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup."""
-        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
-        if self.volume is None or pouring is None or poured is None:
+        pouring = builder.plan_context.session.pouring
+        if self.volume is None or pouring is None:
             return EMPTY_TILT
-        inside = pouring.water_environment(builder.state.objects).cup.inside
+        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
         film = film_after(self.volume, rest, PART_TIME, inside)
         return float(tilt_for(PART_FLOW, rest - film, inside))
 
     def _pour_about_the_lip(
-        self, builder: PlanBuilder, cup: SceneObject, basin: SceneObject, rest: float
+        self, builder: PlanBuilder, vessel: SceneObject, below: SceneObject, rest: float
     ) -> None:
         """Plan the pour of an arm outside the five-axis family. Raises InputError if it cannot."""
-        tilt, rated = self._tilt(builder, rest), self._rated(builder, rest)
+        tilt, rated = self._tilt(builder, vessel, rest), self._rated(builder, vessel, rest)
         if rated is None and tilt > MAX_TILT:
             raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
         if rated is not None and rated.tilts.max() > MAX_TILT:
             raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
         environment = builder.plan_context.session.environment
-        T = environment.pose(cup, builder.state.x_setpoint)
-        rim = builder.point(T[:3, 3] + cup.height * T[:3, 2], in_base=True)
-        over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height), in_base=True)
-        ways = about_the_lip(builder, rim, (cup.size[0], cup.height), over)
-        builder.first(ways, lambda way: self._tilted(builder, way, tilt, rated, rest))
+        T = environment.pose(vessel, builder.state.x_setpoint)
+        rim = builder.point(T[:3, 3] + vessel.height * T[:3, 2], in_base=True)
+        over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height), in_base=True)
+        size, aim = (vessel.extent[0], vessel.height), AIM if is_vessel(below) else 0.0
+        ways = about_the_lip(builder, rim, size, over, aim)
+        builder.first(ways, lambda way: self._tilted(builder, vessel, way, tilt, rated, rest))
 
     def _tilted(
         self,
         builder: PlanBuilder,
+        vessel: SceneObject,
         way: Tilting,
         tilt: float,
         rated: RatedTilt | None,
@@ -241,16 +276,17 @@ class Pour:
             up = tilt - SHAKE_ANGLE
             shake = way.arc(-SHAKE_ANGLE, tilt, up), way.arc(SHAKE_ANGLE, up, tilt)
             builder.lead([*shake] * self.shake, "shake")
-        self._drain(builder, rest)
+        self._drain(builder, vessel, rest)
         builder.lead([way.arc(-tilt, tilt, 0.0)], "turn back")
 
-    def _drain(self, builder: PlanBuilder, rest: float) -> None:
+    def _drain(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> None:
         """Append the wait until the last water, or the part, has run out."""
         if self.volume is None:
             builder.note("drain", Wait(DRAIN_TIME), builder.state)
-            builder.note("drain", Drain(), builder.state)
+            builder.note("drain", Drain(vessel.name), builder.state)
         else:
-            builder.note("drain", Drain(counted(rest + PART_FLOW * REACTION_TIME)), builder.state)
+            left = counted(rest + PART_FLOW * REACTION_TIME)
+            builder.note("drain", Drain(vessel.name, left), builder.state)
         builder.note("full speed", SetSpeed(1.0), builder.state)
 
     def _pour_at_rate(
@@ -264,22 +300,24 @@ class Pour:
             builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
             builder.lead([end], "pour the last")
 
-    def _rated(self, builder: PlanBuilder, rest: float) -> RatedTilt | None:
+    def _rated(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> RatedTilt | None:
         """Return the tilt over time for the rate; None if none is given."""
         if self.rate is None:
             return None
         pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        water = None if poured is None else poured.water.vessel(vessel.name)
         assert pouring is not None
-        assert poured is not None
-        inside = pouring.water_environment(builder.state.objects).cup.inside
-        held = poured.water.kept * FEMTOLITRE
+        assert water is not None
+        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
+        held = water.kept * FEMTOLITRE
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
         return RatePlan.of(out, self.rate).tilts(held, inside)
 
     def _pour(
         self,
         builder: PlanBuilder,
-        basin: SceneObject,
+        vessel: SceneObject,
+        below: SceneObject,
         level: ToolTarget,
         turn: float,
         rated: RatedTilt | None,
@@ -289,7 +327,41 @@ class Pour:
         # The turn is limited to the range of the wrist.
         room = 0.995 * (chain.upper[4] if turn > 0.0 else -chain.lower[4])
         turn = math.copysign(min(abs(turn), room - abs(level.roll)), turn)
-        over = builder.point(basin.T[:3, 3] + (0.0, 0.0, basin.height + ABOVE_RIM), in_base=True)
+        way = self._over(builder, vessel, below, level, turn)
+        at = way.at
+        carry(builder, at, f"over {self.into}")
+        pace = POUR_PACE if self.volume is None else PART_PACE
+        builder.note("slowly", SetSpeed(pace), builder.state)
+        down = at.roll + turn
+        if rated is None:
+            builder.lead([way.line(at.roll, down)], POURING)
+        else:
+            rolls = _roll_of(rated.tilts, at.pitch)
+            if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
+                raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
+            fitted = rated.fitted(at.roll + math.copysign(1.0, turn) * rolls)
+            first, last = (float(polyval(end, fitted)) for end in (-1, 1))
+            start, end = way.line(at.roll, first), way.line(last, down)
+            self._pour_at_rate(builder, rated.duration, start, way.by(fitted), end)
+            down = down if self.volume is None else last
+        if self.shake:
+            back = at.roll + turn - math.copysign(SHAKE_ANGLE, turn)
+            builder.lead([way.line(down, back), way.line(back, down)] * self.shake, "shake")
+        self._drain(builder, vessel, rest)
+        builder.lead([way.line(down, at.roll)], "turn back")
+
+    def _over(
+        self,
+        builder: PlanBuilder,
+        vessel: SceneObject,
+        below: SceneObject,
+        level: ToolTarget,
+        turn: float,
+    ) -> Rolling:
+        """Return the roll over the middle of the object ``below``."""
+        if is_vessel(below):
+            return over_vessel(builder, vessel, below, level, turn)
+        over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height + ABOVE_RIM), in_base=True)
         position = over
         for _ in range(3):
             # Iterate until the lip is over the basin's middle when the cup lies on its side, or
@@ -297,28 +369,8 @@ class Pour:
             at = replace(level, position=position)
             tilted = 0.5 * turn if self.volume is None else turn
             side = builder.joints_of(replace(at, roll=level.roll + tilted))
-            position = position + (over - _lip(builder, side)) * (1.0, 1.0, 0.0)
-        at = replace(level, position=position)
-        carry(builder, at, f"over {self.into}")
-        pace = POUR_PACE if self.volume is None else PART_PACE
-        builder.note("slowly", SetSpeed(pace), builder.state)
-        down = replace(at, roll=level.roll + turn)
-        if rated is None:
-            builder.lead([ToolLine(at, down)], POURING)
-        else:
-            rolls = _roll_of(rated.tilts, at.pitch)
-            if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
-                raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
-            fitted = rated.fitted(at.roll + math.copysign(1.0, turn) * rolls)
-            first, last = (replace(at, roll=float(polyval(end, fitted))) for end in (-1, 1))
-            start, end = ToolLine(at, first), ToolLine(last, down)
-            self._pour_at_rate(builder, rated.duration, start, ToolTurn(at, fitted), end)
-            down = down if self.volume is None else last
-        back = replace(at, roll=level.roll + turn - math.copysign(SHAKE_ANGLE, turn))
-        if self.shake:
-            builder.lead([ToolLine(down, back), ToolLine(back, down)] * self.shake, "shake")
-        self._drain(builder, rest)
-        builder.lead([ToolLine(down, at)], "turn back")
+            position = position + (over - lip_of(builder, vessel, side)[0]) * (1.0, 1.0, 0.0)
+        return Rolling(replace(level, position=position), turn)
 
 
 def _rate(value: YamlValue) -> float:
@@ -338,17 +390,6 @@ def _roll_of(tilt: npt.ArrayLike, pitch: float) -> FloatArray:
     """
     steep = math.sin(pitch) ** 2
     return np.arccos(np.clip((np.cos(tilt) - steep) / (1.0 - steep), -1.0, 1.0))
-
-
-def _lip(builder: PlanBuilder, q: FloatArray) -> FloatArray:
-    """Return the lowest point (3,) [m] in {S} of the cup's rim, for the joints ``q`` (5,) [rad]."""
-    session, cup = builder.plan_context.session, builder.scene_object(CUP)
-    T = session.environment.pose(cup, np.append(q, builder.state.gripper_setpoint))
-    up = T[:3, 2]
-    downhill = -(np.array((0.0, 0.0, 1.0)) - up[2] * up)
-    downhill /= np.linalg.norm(downhill)
-    rim = T[:3, 3] + cup.height * up + cup.size[0] * downhill
-    return builder.point(rim, in_base=True)
 
 
 STEPS: dict[str, type[Step]] = {"pour": Pour}

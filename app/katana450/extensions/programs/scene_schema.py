@@ -38,7 +38,7 @@ OBJECT = mapping(
         "shape": {"enum": [each.value for each in Shape], "description": "Its shape"},
         "size": {
             **list_of(SIZE, 1, 3),
-            "description": "mm. box: x, y, z; cylinder: radius, height; sphere: radius",
+            "description": "mm. box: x, y, z; cylinder, vessel: radius, height; sphere: radius",
         },
         "mesh": MESH,
         "pose": {

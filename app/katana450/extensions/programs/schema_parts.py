@@ -89,9 +89,9 @@ CONDITION_FIELDS: dict[str, Schema] = {
         },
     ),
     "volume": mapping(
-        "Water in the cup or the basin, ml",
+        "Water in the cup, the basin or another vessel, ml",
         "of",
-        {"of": {"enum": ["cup", "basin"]}, **BOUNDS_OF},
+        {"of": OBJECT, **BOUNDS_OF},
     ),
     "joint": mapping(
         "Angle of a joint, deg",

@@ -36,7 +36,7 @@ def score(water: Water, course: Course) -> Score:
     total = water.total
     return Score(
         emptied_percent=100.0 * water.basin / total if total else math.nan,
-        in_cup_ml=water.kept / MILLILITRE,
+        in_cup_ml=water.cup.kept / MILLILITRE,
         in_basin_ml=water.basin / MILLILITRE,
         in_air_ml=water.air / MILLILITRE,
         spilled_ml=water.spilled / MILLILITRE,

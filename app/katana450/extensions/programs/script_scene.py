@@ -102,7 +102,7 @@ class ScriptScene:
             if name not in expected:
                 return f"there is also {name}"
         wanted, poured = (self.draft.water or 0.0) / ML, state.poured
-        cup = 0.0 if poured is None else poured.water.kept / MILLILITRE
+        cup = 0.0 if poured is None else poured.water.cup.kept / MILLILITRE
         if abs(wanted - cup) > SAME_VOLUME:
             return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
         return ""

@@ -24,14 +24,14 @@ class Situation:
         fingers: the finger joint, and the angle at which it grips, None with an empty hand [rad].
         tool: the tool frame.
         scene: the scene objects.
-        water: volume in the cup [fl]; None without a cup.
+        water: volume in each vessel [fl]; None without a cup.
     """
 
     posture: FloatArray
     fingers: tuple[float, float | None]
     tool: str
     scene: Scene
-    water: int | None
+    water: tuple[int, ...] | None
 
     @staticmethod
     def of(state: State) -> Situation:
@@ -42,7 +42,7 @@ class Situation:
             (state.gripper_setpoint, state.grip),
             state.tool,
             tuple(map(_shape, state.objects)),
-            None if water is None else water.kept,
+            None if water is None else tuple(each.kept for each in water.vessels),
         )
 
     @property

@@ -1,4 +1,4 @@
-"""The turn of a held cup about its lip, over a basin."""
+"""The turn of a held vessel about its lip, over a basin or another vessel."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ EMPTY_TILT: Final = math.radians(120.0)
 """[rad] Tilt of a cup that is emptied: past its side."""
 
 UNDERSIDES: Final = (0.02, 0.05, 0.09)
-"""[m] Heights of the upright cup over the basin's rim, tried in this order."""
+"""[m] Heights of the upright cup over the rim below it, tried in this order."""
+
+AIM: Final = 0.015
+"""[m] Distance of the lip before the middle of another vessel: as far as the water flies while it
+falls, with the flows of a pour.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +82,7 @@ def about_the_lip(
     cup: FloatArray,
     size: tuple[float, float],
     over: FloatArray,
+    aim: float = 0.0,
 ) -> Iterator[Tilting]:
     """Yield the ways to tilt an upright cup about its lip, the best first.
 
@@ -84,7 +90,8 @@ def about_the_lip(
         builder: the arm, outside the five-axis family, which holds the cup.
         cup: (3,) the middle of the cup's rim [m] in {S}, at the present posture.
         size: radius of the rim, and height of the cup [m].
-        over: (3,) the middle of the basin's rim [m] in {S}.
+        over: (3,) the middle of the rim below [m] in {S}.
+        aim: distance of the lip before that middle [m].
     """
     level, hand = builder.target, builder.hand
     assert isinstance(hand, PoseHand)
@@ -92,9 +99,10 @@ def about_the_lip(
     for height in UNDERSIDES:
         point = over + (tall + height) * UP
         for turn, toward, in_pose in hand.tilt_directions(builder.q, cup, point):
-            lip = Lip(frozen(point), *(frozen(np.cross(UP, d)) for d in (toward, in_pose)))
+            place = point - aim * toward
+            lip = Lip(frozen(place), *(frozen(np.cross(UP, d)) for d in (toward, in_pose)))
             # The cup turns with the arm on the way to the basin.
             moved = so3.rotation_z(turn) @ (level.position - cup)
-            at = hand.turned(level, point - radius * toward + moved, turn)
+            at = hand.turned(level, place - radius * toward + moved, turn)
             assert isinstance(at, ToolPose)
             yield Tilting(at, lip, builder.planning)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -178,19 +179,26 @@ class ToolScrew:
 
 @dataclass(frozen=True, eq=False)
 class ToolTurn:
-    """A turn of the tool about its own axis by a polynomial, at one point and with one pitch.
+    """A turn of the tool about its own axis by a polynomial, with one pitch.
 
     Attributes:
         target: point and pitch; its roll is not used.
         rolls: coefficients (n,) of the roll [rad], of the powers of 2 sigma - 1.
+        offsets: coefficients (m, 3) of the way of the tool point from ``target`` [m]; None if it
+            stays there.
     """
 
     target: ToolTarget
     rolls: FloatArray
+    offsets: FloatArray | None = None
 
     def __post_init__(self) -> None:
         rolls = finite_array(self.rolls, (np.size(self.rolls),), "The coefficients of a roll")
         object.__setattr__(self, "rolls", frozen(rolls))
+        if self.offsets is not None:
+            shape = (max(len(self.offsets), 1), 3)
+            offsets = finite_array(self.offsets, shape, "The coefficients of a way")
+            object.__setattr__(self, "offsets", frozen(offsets))
 
     @property
     def joins(self) -> tuple[float, ...]:
@@ -199,9 +207,20 @@ class ToolTurn:
 
     def at(self, sigma: Jet) -> ToolCoordinates:
         """Return the tool at `sigma`, one place or many."""
-        x, y, z = (place + 0.0 * sigma for place in self.target.position.tolist())
-        *lower, highest = self.rolls.tolist()
-        s, roll = 2.0 * sigma - 1.0, highest + 0.0 * sigma
-        for coefficient in reversed(lower):
-            roll = roll * s + coefficient
+        position = self.target.position.tolist()
+        if self.offsets is None:
+            x, y, z = (place + 0.0 * sigma for place in position)
+        else:
+            ways = zip(position, self.offsets.T.tolist(), strict=True)
+            x, y, z = (place + _polynomial(each, sigma) for place, each in ways)
+        roll = _polynomial(self.rolls.tolist(), sigma)
         return ToolCoordinates(x, y, z, self.target.pitch + 0.0 * sigma, roll)
+
+
+def _polynomial(coefficients: Sequence[float], sigma: Jet) -> Jet:
+    """Return the polynomial of 2 sigma - 1."""
+    *lower, highest = coefficients
+    s, value = 2.0 * sigma - 1.0, highest + 0.0 * sigma
+    for coefficient in reversed(lower):
+        value = value * s + coefficient
+    return value

@@ -44,7 +44,7 @@ from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Nearest, Plan, Segment
 from katana450.maths.planning.scaling import Scaling
 from katana450.maths.water.course import Course
-from katana450.maths.water.flow import Water
+from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.parcel import Parcel
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
@@ -81,7 +81,7 @@ CLASSES: Final[tuple[type, ...]] = (
     *(JointMotion, Stream, Projection, Branch),
     # Objects and water.
     *(scene_objects.SceneObject, solid.Solid, solid.ObjectAppearance),
-    *(pouring.MotionWithWater, Water, Slosh, Course),
+    *(pouring.MotionWithWater, pouring.VesselMotion, Water, VesselWater, Slosh, Course),
     # Plans.
     *(Plan, Segment, Scaling, Nearest, Contact, Fingerprint, Chain, JointPath, ToolPath),
     *(TrajectoryPath, PosePath, TurnedCurve, PoseTurn, PoseLines),

@@ -17,11 +17,10 @@ import numpy as np
 
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import Leaving, Mode, Positioning
-from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.extensions.recording.form_error import FormError
-from katana450.extensions.recording.record_forms import FORMER
+from katana450.extensions.recording.former_forms import poured_content
 
 DIGEST_DIGITS = 10
 """Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits
@@ -65,7 +64,7 @@ class Digester:
             self._objects = state.objects
             self._of_objects = hashlib.blake2b(self._encoder.encode(state.objects)).digest()
         values = [getattr(state, name) for name in PLAIN]
-        values[POURED] = _poured(state.poured)
+        values[POURED] = poured_content(state.poured)
         return self._encoder.encode((values, self._of_objects, _mode(state.mode)))
 
     def digest(self, state: State, content: bytes | None = None) -> str:
@@ -73,13 +72,6 @@ class Digester:
         content = self.content(state) if content is None else content
         found = hashlib.blake2b(self._encoder.encode(state.t) + content, digest_size=8).digest()
         return f"{int.from_bytes(found) % 10**DIGEST_DIGITS:0{DIGEST_DIGITS}d}"
-
-
-def _poured(poured: MotionWithWater | None) -> dict[str, Any] | None:
-    """Return the content of the water as older versions wrote it, so that their files verify."""
-    if poured is None:
-        return None
-    return {**vars(poured), "water": {**vars(poured.water), **FORMER}}
 
 
 def _mode(mode: Mode) -> tuple[Any, ...]:

@@ -9,15 +9,11 @@ from typing import Any
 import numpy as np
 
 from katana450.extensions.recording.form_error import FormError, shown
+from katana450.extensions.recording.former_forms import FORMER, upgraded
 from katana450.extensions.recording.simple_forms import MAX_ITEMS, Coder
 
 TAG = "is"
 """Name of the item with the name of the class; no field of a class can have it."""
-
-FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
-"""Fields that older versions wrote, each with the only form that is still read. They could fill the
-cup with other liquids than water.
-"""
 
 ROUNDING = 1e-9
 """[1] Largest change of a number by a constructor that counts as rounding."""
@@ -130,7 +126,7 @@ class ClassCoder:
         if not isinstance(form, dict):
             raise FormError(f"{shown(form)} is not an object of {self.kind.__name__}")
         given: dict[str, Any] = {}
-        for name, each in form.items():
+        for name, each in upgraded(self.kind, form).items():
             coder = self.fields.get(name)
             if coder is None:
                 if name == TAG or FORMER.get(name) == each:

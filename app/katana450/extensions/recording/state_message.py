@@ -22,7 +22,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.water.flow import Water
+from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
 
@@ -104,7 +104,7 @@ class StateMessages:
         if state.poured is not None:
             water = state.poured.water
             volumes = {
-                "cup": water.kept,
+                "cup": water.cup.kept,
                 "basin": water.basin,
                 "air": water.air,
                 "spilled": water.spilled,
@@ -187,18 +187,28 @@ class StateMessages:
 
 
 def _motion_of(water: Water) -> dict[str, Any]:
-    """Return the lean of the surface in the cup, and the water that left it in this tick, if any.
+    """Return the surface in the vessels, and the water that left them in this tick, if any.
 
     Parcels fly freely, so each is described once.
     """
-    found: dict[str, Any] = {}
-    if water.slosh != Slosh():
-        found["lean"] = [round(each, RATE_DIGITS) + 0.0 for each in water.slosh.up]
+    found = _lean(water.cup)
+    if water.others:
+        found["vessels"] = [
+            {"name": each.name, "volume": each.kept / MILLILITRE, **_lean(each)}
+            for each in water.others
+        ]
     if water.parcels and water.parcels[-1].age == 0.0:
         new = water.parcels[-1]
         places = [[round(x, DIGITS) + 0.0 for x in each] for each in (new.start, new.velocity)]
         found["left"] = [new.volume / MILLILITRE, *places, round(new.span, DIGITS)]
     return found
+
+
+def _lean(water: VesselWater) -> dict[str, Any]:
+    """Return the lean of the surface in a vessel, unless it is level."""
+    if water.slosh == Slosh():
+        return {}
+    return {"lean": [round(each, RATE_DIGITS) + 0.0 for each in water.slosh.up]}
 
 
 def _target(state: State) -> dict[str, Any]:

@@ -135,7 +135,17 @@ TOPICS: Final = (
                 "volumes [ml]",
                 **{name: _number(name) for name in ("cup", "basin", "air", "spilled")},
                 lean=_numbers("(3,) normal of the surface in the cup, unless it is upright"),
-                left=_array({}, "what left the cup in this tick: ml, place, velocity, time [s]"),
+                vessels=_array(
+                    _object(
+                        "other vessel",
+                        ("name", "volume"),
+                        name=_text("name"),
+                        volume=_number("volume [ml]"),
+                        lean=_numbers("(3,) as of the cup"),
+                    ),
+                    "other vessels",
+                ),
+                left=_array({}, "what left a vessel in this tick: ml, place, velocity, time [s]"),
             ),
         ),
     ),

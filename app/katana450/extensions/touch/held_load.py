@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.pouring import CUP
+from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.control.support import surface_below
@@ -23,6 +23,9 @@ DENSITY = 500.0
 """[kg/m^3] Density of an object of unknown mass: light wood, or a printed part that is not solid.
 Assumed."""
 
+VESSEL_DENSITY = 212.0
+"""[kg/m^3] Mass of an empty vessel over the volume in its outline: that of the cup."""
+
 SLIDING_RESISTANCE = 20.0
 """[N s/m] Growth of the friction with the speed of an object that slides. Assumed: the friction of
 rubber grows with speed, and the cup, held by almost no force, slides at 30 mm/s."""
@@ -35,17 +38,17 @@ STEP = 1e-3
 
 
 def mass(scene_object: SceneObject, state: State, masses: Mapping[str, float]) -> float:
-    """Return the mass of ``scene_object`` [kg], for the cup with what is in it.
+    """Return the mass of ``scene_object`` [kg], for a vessel with what is in it.
 
     ``masses``: known masses [kg] by name; another object has DENSITY.
     """
     found = masses.get(scene_object.name)
     if found is None:
-        return DENSITY * body_of(scene_object).volume
-    if scene_object.name == CUP and state.poured is not None:
-        water = state.poured.water
-        return found + WATER_DENSITY * FEMTOLITRE * water.kept
-    return found
+        density = VESSEL_DENSITY if is_vessel(scene_object) else DENSITY
+        found = density * body_of(scene_object).volume
+    poured = state.poured
+    water = None if poured is None else poured.water.vessel(scene_object.name)
+    return found + WATER_DENSITY * FEMTOLITRE * water.kept if water else found
 
 
 def acceleration(

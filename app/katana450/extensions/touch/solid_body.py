@@ -59,7 +59,7 @@ def body_of(scene_object: SceneObject) -> SolidBody:
             x, y, z = size
             normals = np.concatenate((np.eye(3), -np.eye(3)))
             return SolidBody(frozen(normals), frozen(0.5 * np.array((*size, *size))), x * y * z)
-        case Shape.CYLINDER:
+        case Shape.CYLINDER | Shape.VESSEL:
             radius, height = size
             normals = np.array(((0.0, 0.0, 1.0), (0.0, 0.0, -1.0)))
             volume = np.pi * radius**2 * height

@@ -12,7 +12,7 @@ from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Water, WaterFlow
+from katana450.maths.water.flow import VesselWater, Water, WaterFlow
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import (
     BODY_FACES,
@@ -90,12 +90,10 @@ class WaterNodes:
         self._water_environment = water_environment
         self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
-        self._body: FloatArray | None = None
+        # The water in each vessel by its name, with the corners that were sent.
+        self._bodies: dict[str, tuple[viser.MeshHandle, FloatArray]] = {}
         self._level = 0.0
-        inside = water_environment.cup.inside
         self._root = server.scene.add_frame(path, show_axes=False, visible=False)
-        surface = self._flow.surface(self._flow.begin(inside.capacity / 2.0, np.eye(4)))
-        self._cup = self._add("cup", body(inside, surface), BODY_FACES, IN_VESSEL)
         corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
         self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
         self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
@@ -113,8 +111,7 @@ class WaterNodes:
         """Draw ``water``."""
         last, self._shown = self._shown, water
         if water is not last:
-            if last is None or not _same_in_cup(water, last):
-                self._show_cup(water)
+            self._show_vessels(water, last)
             self._show_stream(water)
             self._show_basin(water)
             self._show_puddles(water)
@@ -124,17 +121,35 @@ class WaterNodes:
         """Hide all water."""
         _reveal(self._root, False)
 
-    def _show_cup(self, water: Water) -> None:
-        cup, T = self._water_environment.cup, water.T_base_cup
-        _reveal(self._cup, water.cup >= WORTH_SHOWING)
-        if not self._cup.visible:
+    def _show_vessels(self, water: Water, last: Water | None) -> None:
+        for each in water.vessels:
+            before = None if last is None else last.vessel(each.name)
+            if before is None or not _same(each, before):
+                self._show_vessel(each)
+        for name, (node, _) in self._bodies.items():
+            if water.vessel(name) is None:
+                _reveal(node, False)
+
+    def _show_vessel(self, water: VesselWater) -> None:
+        vessel, T = self._water_environment.vessels.get(water.name), water.T
+        shown = vessel is not None and water.volume >= WORTH_SHOWING
+        node, sent = self._bodies.get(water.name, (None, None))
+        if node is not None:
+            _reveal(node, shown)
+        if vessel is None or not shown:
             return
-        # Corners in the base frame: a moving cup then needs one message, not two more for its pose.
-        local = body(cup.inside, self._flow.surface(water)) * INSET
-        corners = local @ T[:3, :3].T + (T[:3, 3] + cup.floor * T[:3, 2])
-        if self._body is None or np.abs(corners - self._body).max() > WORTH_SENDING:
-            self._body = corners
-            self._cup.vertices = corners.astype(np.float32)
+        # Corners in the base frame: a moving vessel then needs one message, not two for its pose.
+        local = body(vessel.inside, self._flow.surface(water)) * INSET
+        corners = local @ T[:3, :3].T + (T[:3, 3] + vessel.floor * T[:3, 2])
+        if node is None:
+            # A name of a person is no name of a node.
+            name = f"vessel{len(self._bodies)}" if self._bodies else "cup"
+            node = self._add(name, corners.astype(np.float32), BODY_FACES, IN_VESSEL)
+        elif sent is not None and np.abs(corners - sent).max() <= WORTH_SENDING:
+            return
+        else:
+            node.vertices = corners.astype(np.float32)
+        self._bodies[water.name] = node, corners
 
     def _show_stream(self, water: Water) -> None:
         _reveal(self._stream, bool(water.parcels))
@@ -191,9 +206,9 @@ class WaterNodes:
         )
 
 
-def _same_in_cup(a: Water, b: Water) -> bool:
-    same = a.cup == b.cup and a.slosh == b.slosh
-    return same and bool((a.T_base_cup == b.T_base_cup).all())
+def _same(a: VesselWater, b: VesselWater) -> bool:
+    same = a.volume == b.volume and a.slosh == b.slosh
+    return same and bool((a.T == b.T).all())
 
 
 def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from katana450.errors import InputError
@@ -12,10 +13,33 @@ from katana450.maths.water.vectors import Vector
 
 @dataclass(frozen=True)
 class Cup:
-    """A straight cup: its inside, and the height of its inner floor over the cup's z = 0 [m]."""
+    """A straight cup, which stands on z = 0 of its own frame.
+
+    Attributes:
+        inside: its inside.
+        floor: height of its inner floor [m].
+        outer_radius: radius of its outside [m].
+    """
 
     inside: Cylinder
     floor: float
+    outer_radius: float
+
+    @property
+    def mouth(self) -> float:
+        """The height [m] of its rim."""
+        return self.floor + self.inside.depth
+
+    @property
+    def wall(self) -> float:
+        """The area [m^2] of its inner wall and floor."""
+        return math.pi * self.inside.radius * (2.0 * self.inside.depth + self.inside.radius)
+
+    def sized(self, outer_radius: float, height: float) -> Cup:
+        """Return a cup of the same shape with another radius and height [m]."""
+        wide, tall = outer_radius / self.outer_radius, height / self.mouth
+        inside = Cylinder(wide * self.inside.radius, tall * self.inside.depth)
+        return Cup(inside, tall * self.floor, outer_radius)
 
 
 @dataclass(frozen=True)
@@ -88,8 +112,19 @@ class TableTop:
 
 @dataclass(frozen=True)
 class WaterEnvironment:
-    """The cup, the basin and the table, which hold or catch water."""
+    """The vessels and surfaces that hold or catch water.
 
-    cup: Cup
+    Attributes:
+        vessels: the cup and other straight vessels by their names, the cup first.
+        basin: the basin.
+        table: the table.
+    """
+
+    vessels: Mapping[str, Cup]
     basin: Basin
     table: TableTop
+
+    @property
+    def cup(self) -> Cup:
+        """The cup."""
+        return next(iter(self.vessels.values()))

@@ -1,7 +1,7 @@
 """The flow of the water: where it is, and where it is one time step later.
 
-Water that a tilted cup cannot hold leaves over the lip, flies in parcels and lands in the basin, in
-the cup again, on the table or on the floor. A film stays on the wall where the surface has fallen,
+Water that a tilted vessel cannot hold leaves over the lip, flies in parcels and lands in the basin,
+in a vessel, on the table or on the floor. A film stays on the wall where the surface has fallen,
 and drains into the rest. Volumes are whole femtolitres that are only moved, so their sum is
 constant.
 """
@@ -9,7 +9,9 @@ constant.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +19,8 @@ import numpy.typing as npt
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
-from katana450.maths.water.environment import WaterEnvironment
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.film import drained_film, withdrawn_thickness
 from katana450.maths.water.lip import DROP_VOLUME, left_over, lip_speed, viscous_flow, weir_flow
 from katana450.maths.water.parcel import Ground, Parcel, landing
@@ -32,8 +35,37 @@ MAX_FILM = 0.25
 LEVEL_SINE = 1e-9
 """Sine of a tilt below which no side of the rim is the lower one."""
 
+REST = Slosh()
+"""A level surface at rest."""
+
 MIN_GRAVITY = 1e-3
 """Apparent weight [g] below which water stays where it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class VesselWater:
+    """The water in one straight vessel. Volumes in femtolitres.
+
+    Attributes:
+        name: name of the vessel.
+        volume: volume without the film.
+        T: pose (4, 4) of the vessel in the base frame [m].
+        slosh: lean of the surface.
+        film: volume on the wall.
+        wetted: area [m^2] of wall and floor below the surface.
+    """
+
+    name: str
+    volume: int
+    T: FloatArray
+    slosh: Slosh = REST
+    film: int = 0
+    wetted: float = 0.0
+
+    @property
+    def kept(self) -> int:
+        """The volume with the film."""
+        return self.volume + self.film
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,28 +73,26 @@ class Water:
     """The state of all water. Volumes in femtolitres.
 
     Attributes:
-        cup, basin: volume in cup and basin, without the film.
+        vessels: the water in each straight vessel, that in the cup first.
+        basin: volume in the basin.
         parcels: water in the air, the oldest first.
         puddles: spilled water.
-        slosh: lean of the surface in the cup.
-        T_base_cup: pose (4, 4) of the cup [m].
-        film: volume on the wall of the cup.
-        wetted: area [m^2] of wall and floor below the surface in the cup.
     """
 
-    cup: int
-    basin: int
-    parcels: tuple[Parcel, ...]
-    puddles: tuple[Puddle, ...]
-    slosh: Slosh
-    T_base_cup: FloatArray
-    film: int = 0
-    wetted: float = 0.0
+    vessels: tuple[VesselWater, ...]
+    basin: int = 0
+    parcels: tuple[Parcel, ...] = ()
+    puddles: tuple[Puddle, ...] = ()
 
     @property
-    def kept(self) -> int:
-        """The volume in the cup with its film."""
-        return self.cup + self.film
+    def cup(self) -> VesselWater:
+        """The water in the cup."""
+        return self.vessels[0]
+
+    @property
+    def others(self) -> tuple[VesselWater, ...]:
+        """The water in the vessels that are not the cup."""
+        return self.vessels[1:]
 
     @property
     def air(self) -> int:
@@ -77,18 +107,34 @@ class Water:
     @property
     def total(self) -> int:
         """The volume of all water; a step never changes it."""
-        return self.kept + self.basin + self.air + self.spilled
+        return sum(each.kept for each in self.vessels) + self.basin + self.air + self.spilled
+
+    def vessel(self, name: str) -> VesselWater | None:
+        """Return the water in the vessel ``name``; None without such a vessel."""
+        return next((each for each in self.vessels if each.name == name), None)
+
+
+class VesselMove(NamedTuple):
+    """The motion of a vessel in a time step.
+
+    Attributes:
+        T: pose (4, 4) in the base frame at the end [m].
+        acceleration: (3,) of the middle of the vessel in the base frame [m/s^2].
+    """
+
+    T: npt.ArrayLike
+    acceleration: npt.ArrayLike = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class WaterSurface:
-    """The surface in the cup, as a plane of `Cylinder`.
+    """The surface in a vessel, as a plane of `Cylinder`.
 
     Attributes:
         tilt: tilt [rad].
         level: level [m].
-        downhill: unit vector to the lowest side of the rim, in the cup's frame and perpendicular to
-            its axis.
+        downhill: unit vector to the lowest side of the rim, in the vessel's frame and
+            perpendicular to its axis.
     """
 
     tilt: float
@@ -101,10 +147,7 @@ class WaterFlow:
 
     def __init__(self, water_environment: WaterEnvironment) -> None:
         self.water_environment = water_environment
-        self._cup_holds = counted(water_environment.cup.inside.capacity)
         self._basin_holds = counted(water_environment.basin.capacity)
-        inside = water_environment.cup.inside
-        self._wall = math.pi * inside.radius * (2.0 * inside.depth + inside.radius)
 
     def begin(self, volume: float, T_base_cup: npt.ArrayLike) -> Water:
         """Return ``volume`` [m^3] at rest in the cup, and none elsewhere.
@@ -116,125 +159,156 @@ class WaterFlow:
             raise InputError(
                 f"The cup cannot hold {volume * 1e6:g} ml; give 0 to {maximum:.1f} ml."
             )
-        T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
-        water = Water(counted(volume), 0, (), (), Slosh(), T)
+        return Water((self.rest("cup", counted(volume), T_base_cup),))
+
+    def rest(self, name: str, volume: int, T_base_vessel: npt.ArrayLike) -> VesselWater:
+        """Return ``volume`` [fl] at rest in a vessel. Raises InputError for an invalid pose."""
+        T = frozen(se3.validated(T_base_vessel, f"The pose of the {name}"))
+        water = VesselWater(name, volume, T)
         return replace(water, wetted=self._wetted(water))
 
-    def step(
-        self, water: Water, T_base_cup: npt.ArrayLike, acceleration: npt.ArrayLike, dt: float
-    ) -> Water:
-        """Return the water after ``dt`` [s], with the cup moved to ``T_base_cup`` (4, 4) meanwhile.
+    def step(self, water: Water, moves: Mapping[str, VesselMove], dt: float) -> Water:
+        """Return the water after ``dt`` [s], with the vessels moved meanwhile.
 
-        ``acceleration`` (3,) [m/s^2] is that of the middle of the cup, in the base frame. Raises
-        InputError for an invalid pose and for numbers that are not finite.
+        ``moves``: the motions by the names of the vessels; others rest. Raises InputError for an
+        invalid pose and for numbers that are not finite.
         """
-        T = frozen(se3.validated(T_base_cup, "The pose of the cup"))
-        pull = vector(finite_array(acceleration, (3,), "The acceleration of the cup"))
+        poses, pulls = [], []
+        for each in water.vessels:
+            T, acceleration = moves.get(each.name) or VesselMove(each.T)
+            poses.append(frozen(se3.validated(T, f"The pose of the {each.name}")))
+            what = f"The acceleration of the {each.name}"
+            pulls.append(vector(finite_array(acceleration, (3,), what)))
         if not 0.0 <= dt < math.inf:
             raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
         if dt == 0.0:
-            return replace(water, T_base_cup=T)
-        inside = self.water_environment.cup.inside
-        omega = frequency(inside, water.cup * FEMTOLITRE)
-        slosh = water.slosh.after(pull, omega, damping(inside), dt)
-        flown = self._fly(replace(water, slosh=slosh), T, dt)
-        return self._drain(self._pour(flown, T, dt), _along_wall(T, pull), dt)
+            moved = [replace(each, T=T) for each, T in zip(water.vessels, poses, strict=True)]
+            return replace(water, vessels=tuple(moved))
+        swung = [
+            self._swing(each, pull, dt) for each, pull in zip(water.vessels, pulls, strict=True)
+        ]
+        water = self._fly(replace(water, vessels=tuple(swung)), poses, dt)
+        vessels, parcels = [], list(water.parcels)
+        for each, T, pull in zip(water.vessels, poses, pulls, strict=True):
+            left, parcel = self._pour(each, T, dt)
+            vessels.append(self._drain(left, _along_wall(T, pull), dt))
+            if parcel is not None:
+                parcels.append(parcel)
+        return replace(water, vessels=tuple(vessels), parcels=tuple(parcels))
 
-    def film_rests(self, water: Water) -> bool:
-        """Return True if no film drains while the cup rests."""
-        width, length = self._film_size(water.wetted)
+    def film_rests(self, water: VesselWater) -> bool:
+        """Return True if no film drains while the vessel rests."""
+        width, length = self._film_size(water, water.wetted)
         film = water.film * FEMTOLITRE
-        g = _along_wall(water.T_base_cup, (0.0, 0.0, 0.0))
+        g = _along_wall(water.T, (0.0, 0.0, 0.0))
         return drained_film(film, width, length, g, 1.0) == film
 
-    def surface(self, water: Water) -> WaterSurface:
-        """Return the surface in the cup."""
-        tilt, downhill = _lean(water.slosh, water.T_base_cup)
-        level = self.water_environment.cup.inside.level(tilt, water.cup * FEMTOLITRE)
+    def surface(self, water: VesselWater) -> WaterSurface:
+        """Return the surface in a vessel."""
+        tilt, downhill = _lean(water.slosh, water.T)
+        level = self._inside(water).level(tilt, water.volume * FEMTOLITRE)
         return WaterSurface(tilt, level, downhill)
 
-    def margin_to_rim(self, water: Water) -> float:
+    def margin_to_rim(self, water: VesselWater) -> float:
         """Return the height [m] of the lip above the surface; negative while it overflows."""
         surface = self.surface(water)
-        return self.water_environment.cup.inside.margin(surface.tilt, surface.level)
+        return self._inside(water).margin(surface.tilt, surface.level)
 
-    def _pour(self, water: Water, T: FloatArray, dt: float) -> Water:
-        """Let the water that the cup cannot hold flow over the lip."""
-        cup = self.water_environment.cup.inside
+    def _inside(self, water: VesselWater) -> Cylinder:
+        return self.water_environment.vessels[water.name].inside
+
+    def _swing(self, water: VesselWater, pull: Vector, dt: float) -> VesselWater:
+        """Let the surface swing in a vessel with the acceleration ``pull`` [m/s^2]."""
+        inside = self._inside(water)
+        omega = frequency(inside, water.volume * FEMTOLITRE)
+        return replace(water, slosh=water.slosh.after(pull, omega, damping(inside), dt))
+
+    def _pour(
+        self, water: VesselWater, T: FloatArray, dt: float
+    ) -> tuple[VesselWater, Parcel | None]:
+        """Move a vessel to ``T``, and let the water that it cannot hold flow over the lip."""
+        inside = self._inside(water)
         tilt, downhill = _lean(water.slosh, T)
         weight = norm(water.slosh.up)
-        over = water.cup - counted(cup.holds(tilt))
+        over = water.volume - counted(inside.holds(tilt))
         if over < DROP_VOLUME or weight < MIN_GRAVITY:
-            return replace(water, T_base_cup=T)
-        head = max(-cup.margin(tilt, cup.level(tilt, water.cup * FEMTOLITRE)), 0.0)
+            return replace(water, T=T), None
+        head = max(-inside.margin(tilt, inside.level(tilt, water.volume * FEMTOLITRE)), 0.0)
         g = GRAVITY * weight
-        weir = weir_flow(cup.radius, tilt, head, g)
-        viscous = viscous_flow(cup.radius, tilt, head, g)
+        weir = weir_flow(inside.radius, tilt, head, g)
+        viscous = viscous_flow(inside.radius, tilt, head, g)
         gone = over - left_over(over, weir, viscous, dt)
         if gone == 0:
-            return replace(water, T_base_cup=T)
-        point = (
-            cup.radius * downhill[0],
-            cup.radius * downhill[1],
-            self.water_environment.cup.floor + cup.depth,
-        )
+            return replace(water, T=T), None
+        mouth = self.water_environment.vessels[water.name].mouth
+        point = (inside.radius * downhill[0], inside.radius * downhill[1], mouth)
         lip = _moved(T, point)
-        carried = scale(1.0 / dt, sub(lip, _moved(water.T_base_cup, point)))
-        speed = lip_speed(head, g)
-        velocity = add(carried, scale(speed, _outwards(T, tilt, downhill)))
-        return replace(
-            water,
-            cup=water.cup - gone,
-            parcels=(*water.parcels, Parcel(gone, lip, velocity, 0.0, dt)),
-            T_base_cup=T,
-        )
+        carried = scale(1.0 / dt, sub(lip, _moved(water.T, point)))
+        velocity = add(carried, scale(lip_speed(head, g), _outwards(T, tilt, downhill)))
+        left = replace(water, volume=water.volume - gone, T=T)
+        return left, Parcel(gone, lip, velocity, 0.0, dt)
 
-    def _drain(self, water: Water, g: float, dt: float) -> Water:
+    def _drain(self, water: VesselWater, g: float, dt: float) -> VesselWater:
         """Leave a film where the surface fell, cover it where it rose, and let it drain.
 
-        ``g`` [m/s^2] is gravity along the wall. The film drains into the water of the cup.
+        ``g`` [m/s^2] is gravity along the wall. The film drains into the water of the vessel.
         """
         wetted = self._wetted(water)
         fallen = water.wetted - wetted
         if (water.film == 0 and fallen <= 0.0) or g < MIN_GRAVITY:
             return replace(water, wetted=wetted)
-        inside, film = self.water_environment.cup.inside, water.film
+        inside, film = self._inside(water), water.film
         if fallen > 0.0:
             speed = fallen / (math.tau * inside.radius * dt)
             thickness = withdrawn_thickness(speed, g)
-            film += min(counted(fallen * min(thickness, MAX_FILM * inside.radius)), water.cup)
+            film += min(counted(fallen * min(thickness, MAX_FILM * inside.radius)), water.volume)
         else:
-            dry = self._wall - water.wetted
+            dry = self.water_environment.vessels[water.name].wall - water.wetted
             film -= min(int(film * -fallen / dry), film) if dry > 0.0 else film
-        width, length = self._film_size(wetted)
+        width, length = self._film_size(water, wetted)
         volume = film * FEMTOLITRE
         left = drained_film(volume, width, length, g, dt)
         film = film if left == volume else min(counted(left), film)
-        return replace(water, cup=water.kept - film, film=film, wetted=wetted)
+        return replace(water, volume=water.kept - film, film=film, wetted=wetted)
 
-    def _film_size(self, wetted: float) -> tuple[float, float]:
+    def _film_size(self, water: VesselWater, wetted: float) -> tuple[float, float]:
         """Return width and length [m] of the wall outside the ``wetted`` area [m^2]."""
-        width = math.tau * self.water_environment.cup.inside.radius
-        return width, max(self._wall - wetted, 0.0) / width
+        vessel = self.water_environment.vessels[water.name]
+        width = math.tau * vessel.inside.radius
+        return width, max(vessel.wall - wetted, 0.0) / width
 
-    def _wetted(self, water: Water) -> float:
-        """Return the area [m^2] of wall and floor below the surface in the cup."""
+    def _wetted(self, water: VesselWater) -> float:
+        """Return the area [m^2] of wall and floor below the surface in a vessel."""
         surface = self.surface(water)
-        return self.water_environment.cup.inside.wetted(surface.tilt, surface.level)
+        return self._inside(water).wetted(surface.tilt, surface.level)
 
-    def _fly(self, water: Water, T: FloatArray, dt: float) -> Water:
-        """Move the parcels by ``dt`` [s], and let those land that reach a surface."""
+    def _fly(self, water: Water, poses: Sequence[FloatArray], dt: float) -> Water:
+        """Move the parcels by ``dt`` [s], and let those land that reach a surface.
+
+        ``poses``: those of the vessels at the end.
+        """
         if not water.parcels:
             return water
-        cup, basin, puddles = water.cup, water.basin, water.puddles
+        vessels, basin, puddles = list(water.vessels), water.basin, water.puddles
+        mouths = [
+            (self.water_environment.vessels[each.name], each.T.tolist(), T.tolist())
+            for each, T in zip(vessels, poses, strict=True)
+        ]
         level = self.water_environment.basin.level(basin * FEMTOLITRE)
-        before, after = water.T_base_cup.tolist(), T.tolist()
-        catches = after[2][2] > 0.0
         over, flying = max(self.water_environment.basin.rim, 0.0), []
         for parcel in water.parcels:
-            room = self._cup_holds - cup - water.film
-            if catches and parcel.volume <= room and self._caught(parcel, before, after, dt):
-                cup += parcel.volume
+            caught_by = next(
+                (
+                    number
+                    for number, mouth in enumerate(mouths)
+                    if parcel.volume + vessels[number].kept <= counted(mouth[0].inside.capacity)
+                    and _caught(*mouth, parcel, dt)
+                ),
+                None,
+            )
+            if caught_by is not None:
+                vessel = vessels[caught_by]
+                vessels[caught_by] = replace(vessel, volume=vessel.volume + parcel.volume)
                 continue
             aged = parcel._replace(age=parcel.age + dt)
             if aged.at(aged.age)[2] > over:
@@ -252,20 +326,7 @@ class WaterFlow:
                     puddles = spill(puddles, self._beside_basin(end.point), parcel.volume - stays)
             else:
                 puddles = spill(puddles, end.point, parcel.volume)
-        return replace(water, cup=cup, basin=basin, parcels=tuple(flying), puddles=puddles)
-
-    def _caught(self, parcel: Parcel, before: se3.Rows, after: se3.Rows, dt: float) -> bool:
-        """Return True if ``parcel`` enters the cup through its mouth in the next ``dt`` [s]."""
-        mouth = self.water_environment.cup.floor + self.water_environment.cup.inside.depth
-        q = _seen_from(after, parcel.at(parcel.age + dt))
-        if q[2] > mouth:
-            return False
-        p = _seen_from(before, parcel.at(parcel.age))
-        if p[2] <= mouth:
-            return False
-        fraction = (p[2] - mouth) / (p[2] - q[2])
-        x, y, _ = add(p, scale(fraction, sub(q, p)))
-        return math.hypot(x, y) < self.water_environment.cup.inside.radius
+        return Water(tuple(vessels), basin, tuple(flying), puddles)
 
     def _beside_basin(self, point: Vector) -> Vector:
         """Return the place on the table for water that the basin cannot hold."""
@@ -275,8 +336,21 @@ class WaterFlow:
         return x + out * (point[0] - x), y + out * (point[1] - y), z
 
 
+def _caught(vessel: Cup, before: se3.Rows, after: se3.Rows, parcel: Parcel, dt: float) -> bool:
+    """Return True if the middle of ``parcel`` enters the mouth in the next ``dt`` [s]."""
+    q = _seen_from(after, parcel.at(parcel.age + dt))
+    if q[2] > vessel.mouth or after[2][2] <= 0.0:
+        return False
+    p = _seen_from(before, parcel.at(parcel.age))
+    if p[2] <= vessel.mouth:
+        return False
+    fraction = (p[2] - vessel.mouth) / (p[2] - q[2])
+    x, y, _ = add(p, scale(fraction, sub(q, p)))
+    return math.hypot(x, y) < vessel.inside.radius
+
+
 def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
-    """Return the tilt [rad] of the surface in the cup, and `WaterSurface.downhill`."""
+    """Return the tilt [rad] of the surface in a vessel, and `WaterSurface.downhill`."""
     R = T[:3, :3]
     weight = norm(slosh.up)
     if weight < MIN_GRAVITY:
@@ -291,7 +365,7 @@ def _lean(slosh: Slosh, T: FloatArray) -> tuple[float, Vector]:
 def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
     """Return the unit vector in the base frame along which water leaves.
 
-    Water leaves a cup in the horizontal direction, and a cup tilted further out of its mouth.
+    Water leaves a vessel in the horizontal direction, and one tilted further out of its mouth.
     """
     steep = min(tilt, 0.5 * math.pi)
     local = (math.cos(steep) * downhill[0], math.cos(steep) * downhill[1], math.sin(steep))
@@ -299,10 +373,10 @@ def _outwards(T: FloatArray, tilt: float, downhill: Vector) -> Vector:
 
 
 def _along_wall(T: FloatArray, pull: Vector) -> float:
-    """Return the apparent gravity [m/s^2] along the wall of a cup that accelerates by ``pull``.
+    """Return the apparent gravity [m/s^2] along the wall of a vessel that accelerates by ``pull``.
 
-    It is the root mean square round the cup: the component along the axis, and that along the
-    circumference, which is down on the sides of a lying cup.
+    It is the root mean square round the wall: the component along the axis, and that along the
+    circumference, which is down on the sides of a lying vessel.
     """
     apparent = sub((0.0, 0.0, -GRAVITY), pull)
     along = float(T[0, 2] * apparent[0] + T[1, 2] * apparent[1] + T[2, 2] * apparent[2])

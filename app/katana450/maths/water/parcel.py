@@ -87,8 +87,8 @@ class Landing(NamedTuple):
 def landing(parcel: Parcel, water_environment: WaterEnvironment, level: float) -> Landing:
     """Return the landing of ``parcel``; the basin's water stands ``level`` [m] over its floor.
 
-    The basin receives water that falls through the plane of its rim, inside the rim. The cup is
-    ignored.
+    The basin receives water that falls through the plane of its rim, inside the rim. Other vessels
+    are ignored.
     """
     basin = water_environment.basin
     fraction = _into(basin, parcel)

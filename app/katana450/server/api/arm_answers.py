@@ -42,7 +42,9 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
         basin_ml: Volume in the basin [ml].
         air_ml: Volume in free flight [ml].
         spilled_ml: Volume elsewhere [ml].
-        margin_to_rim: Height of the cup's lip above the water [m]; negative while water flows out.
+        vessels_ml: Volume in each other vessel, with its film, by its name [ml].
+        margin_to_rim: Height of the lip of the vessel in the hand, or of the cup, above its water
+            [m]; negative while water flows out.
     """
 
     cup_ml: float
@@ -50,6 +52,7 @@ class Water(msgspec.Struct, frozen=True, kw_only=True):
     basin_ml: float
     air_ml: float
     spilled_ml: float
+    vessels_ml: dict[str, float]
     margin_to_rim: float
 
 

@@ -29,15 +29,15 @@ class Place(Request, frozen=True, kw_only=True):
         name: Name of the object.
         T: (4, 4) Pose in ``frame``; the object's own frame is in the middle of its underside. A new
             object without ``T`` is placed where there is room in front of the arm. An object that
-            can be held, the cup and the basin are refused where nothing carries them: they stand
+            can be held, vessels and the basin are refused where nothing carries them: they stand
             on the table or on another object.
         near: (2,) Point of the table [m] in the base frame. A new object without ``T`` is placed
             there or near it, where there is room beside other objects and the arm in its ready
             posture.
         frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
         shape: Shape that is checked for contacts.
-        size: Size of the shape [m]: box (x, y, z), cylinder (radius, height), sphere (radius). The
-            size of a mesh is that of its file.
+        size: Size of the shape [m]: box (x, y, z), cylinder and vessel (radius, height), sphere
+            (radius). The size of a mesh is that of its file.
         mesh: Key of the mesh, from the answer to its upload.
         can_be_held: Whether the fingers may touch the object; they hold it between both sides.
         scale: Factor on the size.

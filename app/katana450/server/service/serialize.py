@@ -204,11 +204,12 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
         return None
     water = now.poured.water
     return answers.Water(
-        cup_ml=water.cup / MILLILITRE,
-        film_ml=water.film / MILLILITRE,
+        cup_ml=water.cup.volume / MILLILITRE,
+        film_ml=water.cup.film / MILLILITRE,
         basin_ml=water.basin / MILLILITRE,
         air_ml=water.air / MILLILITRE,
         spilled_ml=water.spilled / MILLILITRE,
+        vessels_ml={each.name: each.kept / MILLILITRE for each in water.others},
         margin_to_rim=pouring.margin_to_rim(now.poured, now.objects),
     )
 

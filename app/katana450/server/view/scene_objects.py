@@ -27,6 +27,9 @@ COLOUR = (148, 163, 184)
 COAT_SCALE = 1.005
 """Scale of a contact coat relative to its object, so that the two do not flicker."""
 
+PROPS = ("cup", "basin")
+"""Objects whose nodes have their names."""
+
 FACETS = 48
 """Number of facets of a cylinder."""
 
@@ -50,7 +53,7 @@ class SceneObjectNodes:
             meshes: The meshes of objects.
         """
         self._server = server
-        self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
+        self._props = props
         self._environment = environment
         self._meshes = meshes
         self._frames: dict[str, viser.FrameHandle] = {}
@@ -68,7 +71,7 @@ class SceneObjectNodes:
         for scene_object in state.objects:
             if changed or scene_object.carried:
                 self._pose(scene_object, state.x)
-            if scene_object.name not in self._props:
+            if scene_object.name not in PROPS:
                 self._shapes[scene_object.name].warn(scene_object, near=scene_object.name in near)
 
     def _take_in(self, objects: tuple[SceneObject, ...]) -> None:
@@ -93,12 +96,12 @@ class SceneObjectNodes:
 
     def _add(self, name: str) -> None:
         self._made += 1
-        path = f"/{name}" if name in self._props else f"/objects/{self._made}"
+        path = f"/{name}" if name in PROPS else f"/objects/{self._made}"
         self._frames[name] = self._server.scene.add_frame(path, show_axes=False)
-        self._shapes[name] = ObjectShape(self._server, path, self._meshes, self._props.get(name))
+        self._shapes[name] = ObjectShape(self._server, path, self._meshes, self._props)
 
     def _take_away(self, name: str) -> None:
-        if name in self._props:
+        if name in PROPS:
             # `Tint` has nodes below this frame.
             self._frames[name].visible = False
             return
@@ -109,14 +112,14 @@ class SceneObjectNodes:
 class ObjectShape:
     """The drawn shape of an object: a file in its own colours, or a surface in one colour."""
 
-    def __init__(self, server: Window, path: str, meshes: Meshes, prop: Any = None) -> None:
-        """Prepare the shape below the node ``path``; ``prop``: GLB file of the cup or the basin."""
+    def __init__(self, server: Window, path: str, meshes: Meshes, props: Props) -> None:
+        """Prepare the shape below the node ``path``; ``props``: cup and basin."""
         self._scene = server.scene
         self._path = f"{path}/shape"
         self._coat_path = f"{path}/contact"
         self._coat: viser.MeshHandle | None = None
         self._meshes = meshes
-        self._prop = prop
+        self._props = props
         self._node: Any = None
         self._is: tuple[object, ...] = ()
 
@@ -141,7 +144,7 @@ class ObjectShape:
         if not own:
             _set(self._node, "color", scene_object.appearance.colour or COLOUR)
             _set(self._node, "opacity", _opacity(scene_object))
-        _set(self._node, "scale", scene_object.scale)
+        _set(self._node, "scale", self._scale(scene_object))
 
     def warn(self, scene_object: SceneObject, *, near: bool) -> None:
         """Coat the object with its convex body while the arm is ``near``."""
@@ -165,7 +168,7 @@ class ObjectShape:
         # viser replaces the node of the name.
         if own:
             return self._scene.add_glb(
-                self._path, self._own(scene_object) or b"", scale=scene_object.scale
+                self._path, self._own(scene_object) or b"", scale=self._scale(scene_object)
             )
         surface = self._surface(scene_object)
         return self._scene.add_mesh_simple(
@@ -175,8 +178,13 @@ class ObjectShape:
             color=scene_object.appearance.colour or COLOUR,
             opacity=_opacity(scene_object),
             side="double" if scene_object.shape is Shape.MESH else "front",
-            scale=scene_object.scale,
+            scale=self._scale(scene_object),
         )
+
+    def _scale(self, scene_object: SceneObject) -> float | tuple[float, float, float]:
+        """Return the scale of the drawn file or surface."""
+        prop = self._props.file_of(scene_object)
+        return scene_object.scale if prop is None else prop[1]
 
     def _own(self, scene_object: SceneObject) -> bytes | None:
         """Return a GLB file of the object in its own colours; None without such colours."""
@@ -185,9 +193,10 @@ class ObjectShape:
             if mesh is None or mesh.colours is None:
                 return None
             return glb(mesh.drawn, scene_object.appearance.opacity)
-        if self._prop is None or scene_object.appearance.opacity < 1.0:
+        prop = self._props.file_of(scene_object)
+        if prop is None or scene_object.appearance.opacity < 1.0:
             return None
-        return bytes(self._prop.read_bytes())
+        return prop[0].read_bytes()
 
     def _surface(self, scene_object: SceneObject) -> Drawn:
         if scene_object.solid is not None:
@@ -196,8 +205,9 @@ class ObjectShape:
                 return mesh.drawn
             # The arm's process knows this object from before the start of this process.
             return _of(_hull(scene_object.solid))
-        if self._prop is not None:
-            visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), self._prop)
+        prop = self._props.file_of(scene_object)
+        if prop is not None:
+            visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), prop[0])
             return visual.kept(lambda: _merged(visual), Drawn)
         return _of(_plain(scene_object))
 
@@ -235,7 +245,7 @@ def _plain(scene_object: SceneObject) -> Any:
     match scene_object.shape:
         case Shape.BOX:
             made, height = trimesh.creation.box(scene_object.size), scene_object.size[2]
-        case Shape.CYLINDER:
+        case Shape.CYLINDER | Shape.VESSEL:
             radius, height = scene_object.size
             made = trimesh.creation.cylinder(radius, height, sections=FACETS)
         case _:

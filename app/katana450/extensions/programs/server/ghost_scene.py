@@ -43,8 +43,7 @@ class GhostScene:
         self._root = root
         self._colour = colour
         self._opacity = opacity
-        props = load_props()
-        self._props = {"cup": props.cup.mesh, "basin": props.basin.mesh}
+        self._props = load_props()
         self._shapes: dict[str, tuple[viser.FrameHandle, ObjectShape]] = {}
         self._water: WaterNodes | None = None
 
@@ -94,7 +93,7 @@ class GhostScene:
             path = f"{self._root}/objects/{len(self._shapes)}"
             frame = self._server.scene.add_frame(path, show_axes=False, visible=False)
             # A mesh is shown as the convex body that the collision checks use.
-            shape = ObjectShape(self._server, path, Meshes(), self._props.get(name))
+            shape = ObjectShape(self._server, path, Meshes(), self._props)
             self._shapes[name] = frame, shape
         frame, shape = self._shapes[name]
         look = scene_object.appearance
@@ -117,6 +116,8 @@ class GhostScene:
         self._water.show(water)
 
 
-def _amounts(poured: MotionWithWater | None) -> tuple[int, int]:
-    """Return the water in the cup and in the basin [fl]."""
-    return (0, 0) if poured is None else (poured.water.cup, poured.water.basin)
+def _amounts(poured: MotionWithWater | None) -> tuple[int, ...]:
+    """Return the water in the basin and in the vessels [fl]."""
+    if poured is None:
+        return (0, 0)
+    return poured.water.basin, *(each.volume for each in poured.water.vessels)

@@ -21,7 +21,7 @@ from katana450.extensions.recording.shared_values import SharedText
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import Water
+from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
@@ -44,6 +44,19 @@ class ObjectRow(msgspec.Struct):
         return se3.from_rotation_translation(so3.from_quaternion((w, x, y, z)), self.position)
 
 
+class VesselRow(msgspec.Struct):
+    """Volume [ml] and lean of the water in a vessel."""
+
+    name: str
+    volume: float
+    lean: tuple[float, float, float] = (0.0, 0.0, 1.0)
+
+    def at(self, T: FloatArray) -> VesselWater:
+        """Return the water in the vessel in its pose ``T`` (4, 4)."""
+        slosh = Slosh(self.lean[:2], weight=self.lean[2])
+        return VesselWater(self.name, round(self.volume * MILLILITRE), frozen(T), slosh)
+
+
 class WaterRow(msgspec.Struct):
     """Volumes [ml]."""
 
@@ -52,6 +65,7 @@ class WaterRow(msgspec.Struct):
     air: float = 0.0
     spilled: float = 0.0
     lean: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    vessels: list[VesselRow] = []
     left: tuple[float, Vector, Vector, float] | None = None
 
 
@@ -163,22 +177,18 @@ class Block:
         return RecordedMoment(row, objects, self._water_of(row, poses))
 
     def _water_of(self, row: StateRow, poses: Mapping[str, ObjectRow]) -> Water | None:
-        cup = poses.get(CUP)
-        if row.water is None or self._water is None or cup is None:
+        if row.water is None or self._water is None or CUP not in poses:
             return None
-        return replace(
-            self._water,
-            cup=round(row.water.cup * MILLILITRE),
+        rows = (VesselRow(CUP, row.water.cup, row.water.lean), *row.water.vessels)
+        return Water(
+            tuple(each.at(poses[each.name].T) for each in rows if each.name in poses),
             basin=round(row.water.basin * MILLILITRE),
-            film=0,
             parcels=tuple(
                 each._replace(age=row.t - t)
                 for t, each in sorted(self._parcels)
                 if 0.0 <= row.t - t < MAX_FLIGHT
             ),
             puddles=self._puddles if row.water.spilled > 0.0 else (),
-            slosh=Slosh(row.water.lean[:2], weight=row.water.lean[2]),
-            T_base_cup=frozen(cup.T),
         )
 
 
