@@ -21,6 +21,7 @@ from benchmarks.scrub import write_run
 from katana450.arm.control.commands import ClearStop, Command, Follow, SetJoints, Stop
 from katana450.arm.control.lease import Role
 from katana450.arm.control.plans import plan_to
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.runtime.tick import TickRecord
@@ -46,7 +47,8 @@ from katana450.extensions.recording.playback.spans import (
 )
 from katana450.extensions.recording.playback.store import RecordingStore, opened
 from katana450.maths.geometry import se3, so3
-from katana450.maths.water.flow import VesselMove, WaterFlow
+from katana450.maths.water.flow import VesselMove, Water, WaterFlow
+from katana450.maths.water.units import MILLILITRE
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.recording.recorded import ADA, described, header, record, run
@@ -222,13 +224,16 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
 
 
 def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
-    """The cup is tilted by 1.6 rad in 1.2 s, over the basin and beyond."""
+    """The cup is tilted by 1.6 rad in 1.2 s, over the basin and beyond, beside a glass."""
     session = described().session
     pouring = session.pouring
     assert pouring is not None
+    glass = SceneObject("glass", Shape.VESSEL, (0.03, 0.08), np.eye(4))
     state = session.begin(session.ready, 0.0, 1000.0)
+    state = replace(state, objects=(*state.objects, glass))
     cup = next(each for each in state.objects if each.name == "cup")
-    filled = pouring.fill(1.2e-4, state.objects, state.x)
+    volumes = {"cup": 120 * MILLILITRE, "glass": 30 * MILLILITRE}
+    filled = pouring.settled(Water(()), state.objects, state.x, volumes)
     assert filled is not None
     flow, water, states = WaterFlow(pouring.water_environment(state.objects)), filled.water, []
     path = tmp_path / "pour.mcap"
@@ -260,6 +265,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
         assert found.cup.volume == pytest.approx(true.cup.kept, abs=1e4)
         assert found.basin == pytest.approx(true.basin, abs=1e4)
         np.testing.assert_allclose(found.cup.T, true.cup.T, atol=2e-6)
+        assert [(each.name, each.volume) for each in found.others] == [("glass", volumes["glass"])]
         assert len(found.parcels) == pytest.approx(len(true.parcels), abs=1)
         for a, b in zip(found.parcels[::-1], true.parcels[::-1], strict=False):
             np.testing.assert_allclose(a.at(a.age), b.at(b.age), atol=1e-4)
