@@ -24,6 +24,7 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.recording.live.run_events import RunEvents
+from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -104,13 +105,21 @@ class BrokenDriver(SimulatedDriver):
         return super().send(q, gripper, t, stopped)
 
 
-def test_geometries_are_made_before_the_first_tick(arm: ArmModel) -> None:
+def test_bodies_are_loaded_before_the_first_tick(
+    arm: ArmModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also by the thread of the loop, because each thread has its own memory of them."""
+    threads: list[str] = []
+    monkeypatch.setattr(
+        CollisionWorld, "load", lambda _: threads.append(threading.current_thread().name)
+    )
     session = find_robot(Settings(), URDF_PATH, None).session
-    assert session.world is not None
-    assert "measured" not in vars(session.world)
     driver = SimulatedDriver(arm, session.ready, 0.0)
-    ControlLoop(session, driver, Mailbox(session.check), SteppedClock(), RATE)
-    assert len(vars(session.world)["measured"]) == len(session.world.first) > 0
+    loop = ControlLoop(session, driver, Mailbox(session.check), MonotonicClock(), RATE)
+    assert threads == [threading.current_thread().name]
+    loop.start()
+    loop.stop()
+    assert threads[1:] == ["control"]
 
 
 def test_failing_driver_makes_the_arm_hold_and_report_it(

@@ -71,9 +71,8 @@ class ControlLoop:
         self.profile = profile
         self.paused_at = -math.inf
         """Time of the newest command with which the arm's process itself brakes the arm [s]."""
-        if session.world is not None:
-            # It takes longer than a tick.
-            session.world.load()
+        # It takes longer than a tick.
+        self._load()
         t = clock.now()
         sent = driver.start(t)
         begun = session.begin(sent.q, sent.gripper, t)
@@ -192,8 +191,14 @@ class ControlLoop:
         self.paused_at = self._clock.now()
         self._mailbox.put(command)
 
+    def _load(self) -> None:
+        """Prepare this thread to measure distances."""
+        if self._session.world is not None:
+            self._session.world.load()
+
     def _run(self) -> None:
         prefer_thread()
+        self._load()
         due = self._clock.now()
         while not self._stopping.is_set():
             late = self._clock.now() - due
