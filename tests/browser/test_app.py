@@ -22,14 +22,6 @@ from tests.browser.server import AppServer
 from tests.browser.session import AXES
 
 READY = np.array(Settings().ready)
-FAINTEST = """() => {
-    const canvas = document.querySelector("canvas[data-engine]");
-    const before = canvas.style.opacity;
-    canvas.style.opacity = "0.05";
-    const shown = getComputedStyle(canvas).opacity;
-    canvas.style.opacity = before;
-    return shown;
-}"""
 MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 
 ON_ITS_WAY = 600.0  # ms; more than a loaded machine takes from the mouse to a slider
@@ -136,11 +128,6 @@ def pitch_of(T: FloatArray) -> float:
     return math.asin(-T[2, 0])
 
 
-@pytest.mark.long
-def test_picture_is_opaque_while_viser_would_draw_it_faintly(robot: Robot) -> None:
-    assert robot.page.frame.evaluate(FAINTEST) == "1"
-
-
 def test_arm_follows_the_dragged_arrow(robot: Robot, artefacts: Path) -> None:
     start = robot.drawn()
     robot.page.drag_arrow(MOVE, "z", 0.06)
@@ -150,18 +137,6 @@ def test_arm_follows_the_dragged_arrow(robot: Robot, artefacts: Path) -> None:
     assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
     assert "On target" in robot.text()
     robot.page.keep(artefacts / "app-arrow.png")
-
-
-@pytest.mark.long
-def test_tool_turns_with_the_arm_in_a_sideways_drag(robot: Robot) -> None:
-    start = robot.drawn()
-    robot.page.drag_arrow(MOVE, "y", 0.12)
-    robot.settle()
-    end = robot.drawn()
-    assert end[:3, 3] - start[:3, 3] == pytest.approx([0.0, 0.12, 0.0], abs=PIXEL)
-    yaw = math.atan2(end[1, 0], end[0, 0])
-    assert yaw == pytest.approx(math.atan2(end[1, 3], end[0, 3]), abs=1e-6)
-    assert pitch_of(end) == pytest.approx(pitch_of(start), abs=1e-6)
 
 
 @pytest.mark.long
@@ -186,34 +161,6 @@ def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
     turned = robot.q - before
     assert turned[:4] == pytest.approx(np.zeros(4), abs=1e-6)
     assert turned[4] == pytest.approx(-0.5, abs=0.01)
-
-
-@pytest.mark.long
-def test_a_slider_moves_its_joint_and_the_handle_comes_along(robot: Robot, artefacts: Path) -> None:
-    shown = robot.page.drag_slider("1 base turn", 60.0)
-    assert shown == pytest.approx(60.0, abs=4.0)
-    robot.settle()
-    assert robot.q[0] == pytest.approx(math.radians(shown), abs=1e-9)
-    assert robot.q[1:] == pytest.approx(READY[1:], abs=1e-6)
-    robot.page.keep(artefacts / "app-slider.png")
-
-
-@pytest.mark.long
-def test_a_far_target_is_approached_at_the_joints_speed(robot: Robot) -> None:
-    node, since = robot.path["pan_link"], time.time()
-    robot.page.drag_slider("1 base turn", 120.0)
-    robot.settle()
-    turns = robot.page.messages("SetOrientationMessage", node=node, since=since)
-    # q and -q are the same rotation.
-    halves = [math.atan2(m.body["wxyz"][3], m.body["wxyz"][0]) for m in turns]
-    angles = 2.0 * np.unwrap(halves, period=math.pi)
-    steps, whole = np.abs(np.diff(angles)), abs(angles[-1] - angles[0])
-    speed = load().require_arm().chain.speed[0]
-    took = turns[-1].time - turns[0].time
-    assert len(turns) > 20
-    # Frames jitter. Over all of them the speed is that of the joint, and no step is too large.
-    assert whole / took <= speed * 1.1
-    assert steps.max() < 0.25 * whole
 
 
 @pytest.mark.long

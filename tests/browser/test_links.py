@@ -139,33 +139,6 @@ def test_joint_seen_edge_on_turns_by_the_movement_across(
 
 
 @pytest.mark.long
-def test_drag_stops_at_the_limit_of_the_joint(
-    page: ViserPage, server: AppServer, links: list[str], truth: Truth
-) -> None:
-    with connect(server.url, "Reader") as reader:
-        upper = reader.query(answers.Arm).upper[1]
-    start = spot(page, links, 1).pixel
-    drag(page, start, (150.0, 250.0), steps=20)
-    page.page.mouse.up()
-    assert rest(truth)[1] <= upper + 1e-9
-    assert truth.status()["goal"][1] <= upper + 1e-9
-
-
-@pytest.mark.long
-def test_first_drag_takes_the_free_arm(
-    server: AppServer, open_page: OpenPage, links: list[str], truth: Truth
-) -> None:
-    page = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
-    prepare(page, truth)
-    page.press_in_bar("Release")
-    page.wait_until(lambda: bar(page, "holder") == "Nobody drives", "the release")
-    drag(page, spot(page, links, 2).pixel, (0.0, -40.0))
-    page.page.mouse.up()
-    page.wait_until(lambda: bar(page, "holder") == "You drive", "the lease")
-    assert abs(rest(truth)[2] - READY[2]) > 0.1
-
-
-@pytest.mark.long
 def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
     page: ViserPage, truth: Truth
 ) -> None:

@@ -1,13 +1,13 @@
-"""``katana450 demo`` and ``katana450 run`` as a person starts them, without a server."""
+"""The commands ``demo`` and ``run`` without a server."""
 
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import json
 import math
-import subprocess
-import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -15,36 +15,26 @@ import pytest
 from PIL import Image
 
 from katana450.arm.robot.loader import load
+from katana450.cli.main import main
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.script import parse
 from katana450.maths.kinematics.forward import forward
 
-pytestmark = pytest.mark.long
-
 ROOT = Path(__file__).resolve().parents[2]
-
-
-def katana450(*options: str, seconds: float = 60.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "katana450", *options],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=seconds,
-        check=False,
-    )
 
 
 @pytest.fixture(scope="module")
 def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("matplotlib")
     out = tmp_path_factory.mktemp("demo") / "report"
-    done = katana450("demo", "circle", "--headless", "--report", str(out))
-    assert done.returncode == 0, done.stderr
-    assert "without its gripper" in done.stdout
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        assert main(["demo", "circle", "--headless", "--report", str(out)]) == 0
+    assert "without its gripper" in printed.getvalue()
     return out
 
 
+@pytest.mark.long
 def test_the_circle_is_as_exact_as_in_the_paper(out: Path) -> None:
     found = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert next(iter(found)) == "max_position_error_mm"
@@ -62,6 +52,7 @@ def test_the_circle_is_as_exact_as_in_the_paper(out: Path) -> None:
     assert found["gripper"] == "none"
 
 
+@pytest.mark.long
 def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
     """Compare with the paper's equation, by the arm's own chain at the joints of every tick."""
     with (out / "trace.csv").open(encoding="utf-8") as file:
@@ -79,6 +70,7 @@ def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
     assert float(rows[-1]["t_s"]) == found["duration_s"]
 
 
+@pytest.mark.long
 def test_figures_and_page_are_written(out: Path) -> None:
     for name in ("tracing.png", "path.png", "joints.png", "speeds.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
@@ -89,9 +81,9 @@ def test_figures_and_page_are_written(out: Path) -> None:
     assert "http" not in page.replace("http-equiv", "")
 
 
+@pytest.mark.long
 def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
-    done = katana450("demo", "circle", "--headless", "--report", str(tmp_path))
-    assert done.returncode == 0, done.stderr
+    assert main(["demo", "circle", "--headless", "--report", str(tmp_path)]) == 0
 
     def lines(directory: Path) -> list[str]:
         text = (directory / "report.json").read_text(encoding="utf-8")
@@ -102,10 +94,10 @@ def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
         assert (tmp_path / name).read_bytes() == (out / name).read_bytes(), name
 
 
+@pytest.mark.long
 def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     """Check the phases of figures 9 to 12: initial posture, grasping, approaching, emptying."""
-    done = katana450("demo", "pour", "--headless", "--report", str(tmp_path), seconds=150.0)
-    assert done.returncode == 0, done.stderr
+    assert main(["demo", "pour", "--headless", "--report", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["margin_to_limits_deg"] > 2.0
     shown = []
@@ -127,42 +119,43 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     assert places == sorted(places)
 
 
-def test_missed_bound_is_reported(tmp_path: Path) -> None:
+def test_missed_bound_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     script = tmp_path / "impossible.yaml"
     script.write_text(
         "gripper: none\nsteps:\n  - joints: [0, -60, 80, 8, 0]\n"
         "expect:\n  duration_s: {at_most: 0.1}\n  path_length_mm: {at_least: 1}\n"
     )
-    done = katana450("run", str(script), "--headless")
-    assert done.returncode == 1
-    assert "duration_s is" in done.stderr
-    assert "path_length_mm was not measured" in done.stderr
+    assert main(["run", str(script), "--headless"]) == 1
+    said = capsys.readouterr().err
+    assert "duration_s is" in said
+    assert "path_length_mm was not measured" in said
 
 
-def test_script_errors_are_reported_with_line_and_column(tmp_path: Path) -> None:
+def test_script_errors_are_reported_with_line_and_column(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     script = tmp_path / "wrong.yaml"
     script.write_text("steps:\n  - hme\n  - wait: x\n")
-    done = katana450("run", str(script), "--headless")
-    assert done.returncode == 1
-    assert f"{script}:2:5: There is no step 'hme'; did you mean 'home'?" in done.stderr
-    assert f"{script}:3:11: " in done.stderr
-    assert "Traceback" not in done.stderr
-    assert katana450("run", str(tmp_path / "none.yaml"), "--headless").returncode == 1
+    assert main(["run", str(script), "--headless"]) == 1
+    said = capsys.readouterr().err
+    assert f"{script}:2:5: There is no step 'hme'; did you mean 'home'?" in said
+    assert f"{script}:3:11: " in said
+    assert main(["run", str(tmp_path / "none.yaml"), "--headless"]) == 1
 
 
-def test_a_dry_run_only_plans() -> None:
-    done = katana450("demo", "circle", "--dry-run", "--radius", "50", "--turns", "2")
-    assert done.returncode == 0, done.stderr
-    assert "628 mm" in done.stdout
-    assert "3 steps" in done.stdout
-    assert "_link" not in done.stdout
+def test_a_dry_run_only_plans(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "circle", "--dry-run", "--radius", "50", "--turns", "2"]) == 0
+    printed = capsys.readouterr().out
+    assert "628 mm" in printed
+    assert "3 steps" in printed
+    assert "_link" not in printed
 
 
-def test_a_circle_out_of_reach_is_refused_with_its_line() -> None:
-    done = katana450("demo", "circle", "--dry-run", "--centre", "900,0,0")
-    assert done.returncode == 1
-    assert "demo circle:5:5: " in done.stderr
-    assert "reach" in done.stderr
+def test_a_circle_out_of_reach_is_refused_with_its_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["demo", "circle", "--dry-run", "--centre", "900,0,0"]) == 1
+    said = capsys.readouterr().err
+    assert "demo circle:5:5: " in said
+    assert "reach" in said
 
 
 def test_the_example_script_is_the_demo() -> None:

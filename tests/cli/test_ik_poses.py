@@ -14,7 +14,8 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import project
-from tests.cli.test_lines import ask, random_postures
+from tests.cli.lines import ask
+from tests.cli.test_lines import random_postures
 
 
 def forms(arm: MountedArm, q: FloatArray, decimals: int) -> list[dict[str, Any]]:

@@ -2,44 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
 import math
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.cli.main import main
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from tests.cli.lines import ask
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = json.loads((ROOT / "tests" / "golden" / "fk_reference.json").read_text(encoding="utf-8"))
-
-
-def ask(
-    command: str, lines: Sequence[object], *options: str, status: int = 0
-) -> list[dict[str, Any]]:
-    """Return the answers to ``lines``: strings are sent unchanged, other values as JSON."""
-    text = "".join((x if isinstance(x, str) else json.dumps(x)) + "\n" for x in lines)
-    out, err = io.StringIO(), io.StringIO()
-    with (
-        pytest.MonkeyPatch.context() as patch,
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-    ):
-        patch.setattr(sys, "stdin", io.StringIO(text))
-        assert main([command, *options]) == status
-    assert err.getvalue() == ""
-    return [json.loads(line) for line in out.getvalue().splitlines()]
 
 
 def test_fk_agrees_with_the_manufacturer() -> None:

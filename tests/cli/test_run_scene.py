@@ -59,12 +59,14 @@ def run(*options: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_line_through_an_object_of_the_scene_is_refused(script: Path, post: Path) -> None:
-    assert run(script, "--dry-run").returncode == 0
-    done = run(script, "--dry-run", "--scene", post)
-    assert done.returncode == 1
-    assert f"{script}:5:" in done.stderr
-    assert "post" in done.stderr
+def test_line_through_an_object_of_the_scene_is_refused(
+    script: Path, post: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(script), "--dry-run"]) == 0
+    assert main(["run", str(script), "--dry-run", "--scene", str(post)]) == 1
+    said = capsys.readouterr().err
+    assert f"{script}:5:" in said
+    assert "post" in said
 
 
 @pytest.mark.long
@@ -79,16 +81,17 @@ def test_simulation_begins_at_the_joints_of_the_scene(
     assert ",10.0," in first
 
 
-def test_scene_that_cannot_be_used_is_named(script: Path, post: Path, tmp_path: Path) -> None:
-    missing = tmp_path / "nowhere.yaml"
-    done = run(script, "--dry-run", "--scene", missing)
-    assert done.returncode == 1
-    assert str(missing) in done.stderr
+def test_scene_that_cannot_be_used_is_named(
+    script: Path, post: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    missing = str(tmp_path / "nowhere.yaml")
+    assert main(["run", str(script), "--dry-run", "--scene", missing]) == 1
+    assert missing in capsys.readouterr().err
     post.write_text(POST.replace("box", "bax"), encoding="utf-8")
-    done = run(script, "--dry-run", "--scene", post)
-    assert done.returncode == 1
-    assert "bax" in done.stderr
-    assert f"{post.name}:" in done.stderr
+    assert main(["run", str(script), "--dry-run", "--scene", str(post)]) == 1
+    said = capsys.readouterr().err
+    assert "bax" in said
+    assert f"{post.name}:" in said
 
 
 def test_scene_of_the_script_is_used_unless_another_is_given(

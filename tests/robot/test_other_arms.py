@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +24,7 @@ from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.projection import project
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
+from tests.cli.lines import ask
 
 ROOT = Path(__file__).resolve().parents[2]
 ARMS = Path(__file__).parent / "arms"
@@ -164,30 +162,13 @@ def test_it_is_served(path: Path) -> None:
 
 @ONE_AT_FIRST
 def test_kinematics_are_answered_line_by_line(path: Path, other: MountedArm) -> None:
-    def ask(command: str, request: object, *options: str) -> dict[str, object]:
-        done = subprocess.run(
-            [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
-            input=json.dumps(request) + "\n",
-            capture_output=True,
-            text=True,
-            cwd=ROOT,
-            timeout=60,
-            check=True,
-        )
-        answer: dict[str, object] = json.loads(done.stdout)
-        return answer
-
     q = [0.3, -0.2, 0.5, 0.4, 0.7]
-    answer = ask("fk", {"q": q}, "--tool", "hand")
+    (answer,) = ask("fk", [{"q": q}], "--urdf", str(path), "--tool", "hand")
     hand = load(path, "hand").require_arm()
     np.testing.assert_allclose(np.array(answer["T"]), forward(hand.chain, q), atol=1e-15)
-    answer = ask("ik", {"T": forward(other.chain, q).tolist()})
-    solutions = answer["solutions"]
-    assert isinstance(solutions, list)
-    assert any(np.allclose(s["q"], q) for s in solutions)
-    residual = answer["residual_mm"]
-    assert isinstance(residual, float)
-    assert residual < 1e-9
+    (answer,) = ask("ik", [{"T": forward(other.chain, q).tolist()}], "--urdf", str(path))
+    assert any(np.allclose(s["q"], q) for s in answer["solutions"])
+    assert answer["residual_mm"] < 1e-9
 
 
 def edited(tmp_path: Path, old: str, new: str) -> Path:

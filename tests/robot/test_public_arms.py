@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +15,7 @@ from katana450.arm.control.state import Reason
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
+from katana450.cli.main import main
 from katana450.client.client import connect
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
@@ -26,6 +24,7 @@ from katana450.maths.kinematics.projection import project
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
+from tests.cli.lines import ask
 from tests.robot.public_arms import (
     KATANAS,
     PX100,
@@ -42,8 +41,6 @@ from tests.robot.public_arms import (
     two_sided,
     written,
 )
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("name", KATANAS)
@@ -282,27 +279,15 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
     assert "about 0.001 mm" in note
 
 
-def ask(command: str, path: Path, *options: str, given: str = "") -> str:
-    done = subprocess.run(
-        [sys.executable, "-m", "katana450", command, "--urdf", str(path), *options],
-        input=given,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120,
-        check=True,
-    )
-    return done.stdout
-
-
-def test_the_commands_take_an_so101(tmp_path: Path) -> None:
-    path = written(tmp_path, "so101", SO101)
+def test_the_commands_take_an_so101(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("--urdf", str(written(tmp_path, "so101", SO101)))
     q = [0.3, -0.2, 0.5, 0.4, 0.7]
-    T = json.loads(ask("fk", path, given=json.dumps({"q": q})))["T"]
-    answer = json.loads(ask("ik", path, given=json.dumps({"T": T})))
+    (pose,) = ask("fk", [{"q": q}], *words)
+    (answer,) = ask("ik", [{"T": pose["T"]}], *words)
     assert any(np.allclose(s["q"], q, atol=1e-9) for s in answer["solutions"])
     coarse = ("--voxel", "80", "--pitches", "6", "--rolls", "4")
-    assert "The tool gripper_frame_link reaches" in ask("workspace", path, *coarse)
+    assert main(["workspace", *words, *coarse]) == 0
+    assert "The tool gripper_frame_link reaches" in capsys.readouterr().out
 
 
 @pytest.mark.long

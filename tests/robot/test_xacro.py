@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import shutil
@@ -22,6 +21,7 @@ from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.xacro import xacro_file
 from katana450.extensions.xacro.xacro_expression import UnsafeExpressionError, evaluated
+from tests.cli.lines import ask
 from tests.robot.public_arms import PX150, urdf
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
 
@@ -96,17 +96,9 @@ def test_every_command_takes_xacro(
 ) -> None:
     path = str(package / "urdf" / FILE.name)
     assert katana450.load(path).n == 5
-    request = json.dumps({"q": [0.1, 0.2, 0.3, 0.4, 0.5]})
-    command = [sys.executable, "-m", "katana450", "fk", "--urdf", path]
-    done = subprocess.run(
-        command, input=request, capture_output=True, text=True, check=True, timeout=60
-    )
-    T = json.loads(done.stdout)["T"]
-    command[3] = "ik"
-    done = subprocess.run(
-        command, input=json.dumps({"T": T}), capture_output=True, text=True, check=True, timeout=60
-    )
-    found = [solution["q"] for solution in json.loads(done.stdout)["solutions"]]
+    (pose,) = ask("fk", [{"q": [0.1, 0.2, 0.3, 0.4, 0.5]}], "--urdf", path)
+    (answer,) = ask("ik", [{"T": pose["T"]}], "--urdf", path)
+    found = [solution["q"] for solution in answer["solutions"]]
     assert np.abs(np.array(found) - [0.1, 0.2, 0.3, 0.4, 0.5]).max(axis=1).min() < 1e-9
     assert main(["export", "urdf", "--urdf", path, "--out", str(tmp_path / "out")]) == 0
     (made,) = (tmp_path / "out").glob("*.zip")
@@ -223,8 +215,7 @@ def test_every_fault_is_reported_with_its_cause(
     path = templated(tmp_path, line)
     message = refusal(path)
     assert message.startswith(str(path))
-    with pytest.raises(RobotDescriptionError, match=expected):
-        read_robot(path)
+    assert re.search(expected, message)
 
 
 @pytest.mark.parametrize(
