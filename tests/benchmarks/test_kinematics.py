@@ -93,6 +93,7 @@ def test_wrong_answers_and_doubles_do_not_count() -> None:
     assert quality(chain, task.T, [np.empty((0, 5))]).solved == 0.0
 
 
+@pytest.mark.long
 def test_a_peer_that_cannot_be_installed_is_listed_with_the_reason(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -209,7 +209,6 @@ def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.M
     ("name", "ml", "rate"),
     [
         ("UR5e", 50.0, 10.0),
-        pytest.param("UR5e", 100.0, 5.0, marks=pytest.mark.long),
         pytest.param("Panda", 50.0, 10.0, marks=pytest.mark.long),
         pytest.param("four axes", 50.0, 5.0, marks=pytest.mark.long),
     ],

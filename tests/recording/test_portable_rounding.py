@@ -55,11 +55,7 @@ OTHERS = [
     *(
         pytest.param(each, marks=pytest.mark.long)
         for each in (
-            {"PYTHONHASHSEED": "0"},
-            {"PYTHONHASHSEED": "1"},
-            {"OPENBLAS_CORETYPE": "Haswell"},
             {"OPENBLAS_CORETYPE": "SkylakeX"},
-            {"OPENBLAS_CORETYPE": "Sandybridge"},
             OLD_LIBM,
             {**OLD_LIBM, **NO_SIMD, "OPENBLAS_CORETYPE": "Sandybridge"},
         )
