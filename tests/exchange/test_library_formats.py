@@ -95,13 +95,46 @@ def test_off_may_be_divided_in_any_way(data: bytes) -> None:
     np.testing.assert_array_equal(shape.vertices[shape.faces], plain.vertices[plain.faces])
 
 
-def test_deformed_collada_is_left_out() -> None:
-    skin = b"<controller id='c'><skin source='#g'/></controller>"
-    scenes = b"<library_visual_scenes>"
-    controllers = b"<library_controllers>%s</library_controllers>" % skin
-    data = dae(nodes="").replace(scenes, controllers + scenes)
-    with pytest.raises(InputError, match=r"no triangles\. It has surfaces with bones"):
-        read_shape(data, Format.DAE, "l.dae")
+SKIN = """<library_controllers><controller id="bones">{body}</controller></library_controllers>
+<library_visual_scenes>"""
+
+SKINNED = SKIN.format(
+    body="""<skin source="#g"><bind_shape_matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</bind_shape_matrix>
+<source id="j"><Name_array id="ja" count="1">root</Name_array><technique_common>
+<accessor source="#ja" count="1"><param name="JOINT" type="Name"/></accessor></technique_common>
+</source><source id="m"><float_array id="ma" count="16">1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1
+</float_array><technique_common><accessor source="#ma" count="1" stride="16">
+<param name="TRANSFORM" type="float4x4"/></accessor></technique_common></source>
+<source id="w"><float_array id="wa" count="1">1</float_array><technique_common>
+<accessor source="#wa" count="1"><param name="WEIGHT" type="float"/></accessor></technique_common>
+</source><joints><input semantic="JOINT" source="#j"/>
+<input semantic="INV_BIND_MATRIX" source="#m"/></joints><vertex_weights count="12">
+<input semantic="JOINT" source="#j" offset="0"/><input semantic="WEIGHT" source="#w" offset="1"/>
+<vcount>1 1 1 1 1 1 1 1 1 1 1 1</vcount><v>0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0</v>
+</vertex_weights></skin>"""
+)
+
+MORPHED = SKIN.format(
+    body="""<morph source="#g" method="NORMALIZED"><source id="t"><IDREF_array id="ta" count="1">g
+</IDREF_array><technique_common><accessor source="#ta" count="1">
+<param name="MORPH_TARGET" type="IDREF"/></accessor></technique_common></source>
+<source id="w"><float_array id="wa" count="1">0</float_array><technique_common>
+<accessor source="#wa" count="1"><param name="MORPH_WEIGHT" type="float"/></accessor>
+</technique_common></source><targets><input semantic="MORPH_TARGET" source="#t"/>
+<input semantic="MORPH_WEIGHT" source="#w"/></targets></morph>"""
+)
+
+
+@pytest.mark.parametrize(
+    ("controller", "said"), [(SKINNED, "bones"), (MORPHED, "changes of shape")]
+)
+def test_deformed_collada_keeps_its_surface(controller: str, said: str) -> None:
+    nodes = f"<node>{GEOMETRY}</node>".replace("instance_geometry", "instance_controller")
+    data = dae(nodes=nodes.replace('url="#g"', 'url="#bones"'))
+    data = data.replace(b"<library_visual_scenes>", controller.encode())
+    plain, shape = (read_shape(each, Format.DAE, "l") for each in (dae(), data))
+    np.testing.assert_array_equal(shape.vertices[shape.faces], plain.vertices[plain.faces])
+    assert f"Left out: {said}" in shape.text
 
 
 MODEL = (

@@ -7,11 +7,14 @@ of the scene are taken from pycollada. No entity is expanded and no other file i
 from __future__ import annotations
 
 import io
+from itertools import chain
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser, fromstring
 
 import numpy as np
 from collada import Collada
 from collada.common import DaeError
+from collada.controller import BoundController, BoundSkin
+from collada.geometry import BoundGeometry
 from collada.material import Map
 from collada.polylist import BoundPolylist
 from collada.primitive import BoundPrimitive
@@ -30,8 +33,8 @@ from katana450.extensions.importers.surface import (
 from katana450.maths.geometry.arrays import FloatArray
 
 LEFT_OUT = {
-    "skin": "surfaces with bones",
-    "morph": "surfaces that change their shape",
+    "skin": "bones",
+    "morph": "changes of shape",
     "animation": "motion",
     "image": "pictures on the surface",
     "lines": "lines",
@@ -54,7 +57,8 @@ def read_dae(data: bytes, name: str) -> MeshReading:
         document = Collada(io.BytesIO(data), ignore=[DaeError], aux_file_loader=_no_file)
         if document.scene is None:
             raise InputError(f"{name} shows no scene.")
-        for number, part in enumerate(document.scene.objects("geometry")):
+        controllers = map(_base, document.scene.objects("controller"))
+        for number, part in enumerate(chain(document.scene.objects("geometry"), controllers)):
             if number >= MAX_COPIES:
                 raise InputError(f"{name} shows more than {MAX_COPIES} nodes.")
             for primitive in part.primitives():
@@ -73,6 +77,15 @@ def read_dae(data: bytes, name: str) -> MeshReading:
         tuple(dict.fromkeys(left_out)),
         unit=1.0 if unit is None else float(unit),
         up="z" if up == "Z_UP" else "y",
+    )
+
+
+def _base(controller: BoundController) -> BoundGeometry:
+    """Return the surface that bones or weights deform, as it is before they do."""
+    if isinstance(controller, BoundSkin):
+        return controller.geometry
+    return controller.original.source_geometry.bind(
+        controller.matrix, controller.materialnodebysymbol
     )
 
 
