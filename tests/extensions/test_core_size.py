@@ -19,9 +19,9 @@ ROOMS = (
     *("server/api", "server/service", "server/web", "server/viser_bridge", "server/view"),
     "cli",
 )
-MAX_LINES = 20_600
+MAX_LINES = 20_400
 
-BESIDE = {"maths/water": 760, "assembly": 1_560, "": 720}
+BESIDE = {"maths/water": 800, "assembly": 1_560, "": 730}
 """Further folders of the core with their maximum; "" holds the modules of the package itself."""
 
 GROUPS = ("maths", "arm", "server", "assembly", "cli")

@@ -202,7 +202,7 @@ def test_a_fast_drag_ends_where_the_slow_one_does(
 
 
 def is_exact(tracked: Tracked) -> bool:
-    """Return whether the goal has no error that people are told, nor a gap before it."""
+    """Return whether the goal has no error that people read about, nor a gap before it."""
     best = tracked.best
     errors = best.position_error > POSITION_WORTH_TELLING, best.rotation_error > ANGLE_WORTH_TELLING
     return tracked.beyond_gap is None and not any(errors)
