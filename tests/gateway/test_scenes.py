@@ -70,7 +70,7 @@ def tokens(ring: Path) -> dict[str, str]:
     }
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def local(
     described: DescribedRobot, ring: Path, scene: Path, tokens: dict[str, str]
 ) -> Iterator[VirtualServer]:
@@ -85,6 +85,7 @@ def arm(local: VirtualServer, tokens: dict[str, str]) -> Iterator[Client]:
     with local.connect("Test", tokens["operator"]) as arm:
         arm.ask(requests.Acquire())
         yield arm
+        arm.ask(requests.ReleaseLease())
 
 
 def objects(arm: Client) -> dict[str, answers.SceneObject]:
@@ -152,7 +153,9 @@ def test_mesh_is_placed_fixed_to_the_hand_and_touched(
     assert list(objects(arm)) == ["cup", "gate", "ring"]
 
 
-@pytest.mark.parametrize("kind", ["dae", "3mf", "off"])
+@pytest.mark.parametrize(
+    "kind", [*(pytest.param(kind, marks=pytest.mark.long) for kind in ("dae", "3mf")), "off"]
+)
 def test_file_read_by_a_library_is_uploaded(arm: Client, tmp_path: Path, kind: str) -> None:
     path = tmp_path / f"box.{kind}"
     made = trimesh.creation.box((40.0, 60.0, 80.0)).export(file_type=kind)

@@ -10,16 +10,13 @@ from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state import Finding, Reason
-from katana450.client import connect
 from katana450.errors import LeaseError
-from katana450.server.api import answers
 from katana450.server.service import status
 from katana450.server.service.command_gate import SETTLE_TIME
 from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
 from katana450.settings import Settings
-from tests.browser.server import AppServer
 from tests.gateway.test_hub import PAGES, Table, moves
 
 JOG = cmd.SetJoints(np.zeros(5))
@@ -168,8 +165,3 @@ def test_reloaded_page_keeps_the_arm_that_nobody_took(table: Table, driver: Part
     table.hub.close(Identity("session", None, Role.ADMIN), PAGES[1])
     assert table.hub.lease.driver == driver.person
     assert table.hub.stopped is None
-
-
-def test_profile_of_a_real_arm_can_be_forced(server: AppServer) -> None:
-    with connect(server.url, "Driver") as arm:
-        assert arm.query(answers.State).silence_profile == "real arm"

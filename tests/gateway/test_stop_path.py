@@ -304,6 +304,8 @@ def test_client_stops_on_all_paths_and_clears_when_possible(
     assert program.stop() == "confirmed"
     state, clear_too_early = program.query(answers.State), None
     assert state.stopped == f"{program.welcome.name} pressed STOP."
+    # As the option of the server demands of a simulated arm.
+    assert state.silence_profile == "real arm"
     try:
         program.ask(requests.ClearStop())
     except RefusedError as error:
