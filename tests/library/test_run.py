@@ -117,7 +117,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
         assert re.search("STOP|stopped", str(refused[0]))
         at_rest = next(each for each in onlooker.states() if not each.moving)
         assert at_rest.stopped is None
-        time.sleep(0.5)
+        time.sleep(0.2)
         assert onlooker.query(answers.State).q == at_rest.q
         assert -1.9 < at_rest.q[0] < 1.9
 
@@ -145,6 +145,6 @@ def test_stop_ends_the_run_and_nothing_moves_after_it(
         assert len(refused) == 1
         client.clear_stop()
         at_rest = next(each for each in onlooker.states() if not each.moving)
-        time.sleep(0.5)
+        time.sleep(0.2)
         assert onlooker.query(answers.State).q == at_rest.q
         assert at_rest.q[0] < 1.9

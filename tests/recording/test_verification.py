@@ -183,7 +183,7 @@ def test_loop_on_the_clock_of_the_machine_is_identical(tmp_path: Path) -> None:
     loop.start()
     for goal in (0.2, -0.2, 0.0):
         mailbox.put(cmd.SetJoints(found.session.ready + goal), ADA)
-        time.sleep(0.3)
+        time.sleep(0.15)
     loop.stop()
     taken = [records.get() for _ in range(records.qsize())]
     with RecordingFile.open(write(tmp_path / "real.mcap", taken)) as file:
