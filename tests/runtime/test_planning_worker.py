@@ -5,19 +5,23 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control import plans
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
+from katana450.arm.runtime import planning_worker
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.kinematics.branch import Branch
+from katana450.maths.planning.plan import Plan
 
 
 class Sink:
@@ -63,6 +67,30 @@ def test_bent_elbow_follows_a_plan(session: Session) -> None:
     (follow,) = commands
     assert isinstance(follow, cmd.Follow)
     assert follow.plan.duration > 0.1
+
+
+def test_path_that_is_found_after_a_stop_is_not_followed(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found, stopped = threading.Event(), threading.Event()
+
+    def plan_to(*arguments: Any) -> Plan:
+        plan = plans.plan_to(*arguments)
+        found.set()
+        stopped.wait(30.0)
+        return plan
+
+    monkeypatch.setattr(planning_worker, "plan_to", plan_to)
+    state = session.begin(np.array([0.3, -0.9, 0.4, -0.6, -0.2]), 0.0, 0.0)
+    sink = Sink()
+    worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
+    worker.deliver(cmd.TakeBranch(Branch("front", "down")), None)
+    assert found.wait(30.0)
+    worker.deliver(cmd.Stop(), None)
+    (thread,) = (each for each in threading.enumerate() if each.name == "planning")
+    stopped.set()
+    thread.join(30.0)
+    assert sink.commands == [cmd.Stop()]
 
 
 PERSON = Actor(Person("1", "Ada", Role.OPERATOR), CommandChannel.PAGE)
