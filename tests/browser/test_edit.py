@@ -243,7 +243,6 @@ def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> 
     truth.wait(mood="stopped")
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: "stopped" in bar(page, "toast"), "the refusal")
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: "nothing to undo" in bar(page, "toast"), "the refusal")
@@ -296,5 +295,4 @@ def test_undo_in_a_text_box_is_that_of_the_browser(page: ViserPage, truth: Truth
     assert not np.allclose(truth.status()["goal"], start, atol=1e-3)
     box.press("Escape")
     truth.wait(mood="stopped")
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)

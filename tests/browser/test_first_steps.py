@@ -226,7 +226,6 @@ def test_planning_is_shown_and_a_stop_ends_it(visit: ViserPage, server: AppServe
     Truth(server).wait(mood="stopped")
     visit.wait_until(lambda: "did not pour" in says.inner_text(), "the end")
     assert not done(visit, "Watch it pour")
-    visit.page.wait_for_timeout(1100)
     visit.press_in_bar("Clear stop")
     Truth(server).wait(stopped=None)
 

@@ -189,7 +189,6 @@ def test_gamepad_stops_the_arm_with_the_sheet_closed(page: ViserPage, truth: Tru
     page.page.evaluate("() => { pad.buttons[1].pressed = true }")
     truth.wait(mood="stopped")
     page.page.evaluate("() => { navigator.getGamepads = () => [] }")
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
 
 
@@ -240,7 +239,6 @@ def test_a_spacemouse_moves_while_it_is_pushed(truth: Truth, new_page: ViserPage
     truth.wait(moving=True)
     page.page.evaluate("() => device.press(1)")
     truth.wait(mood="stopped")
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
     rests = np.array(truth.status()["q"])
     page.page.wait_for_timeout(400)

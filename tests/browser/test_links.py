@@ -193,7 +193,6 @@ def test_clicked_link_gets_a_bar_with_steps(
     page.page.keyboard.press("Escape")
     assert not chosen.is_visible()
     truth.wait(mood="stopped")
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
 
 
@@ -221,7 +220,6 @@ def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     page.wait_until(lambda: "stop" in bar(page, "toast").lower(), "the refusal")
     page.page.mouse.up()
     assert np.allclose(rest(truth), stopped, atol=1e-6)
-    page.page.wait_for_timeout(1100)
     clear_stop(page, truth)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,6 @@ def test_steps_of_a_program_are_controlled_in_the_list(
         page.press_in_bar("STOP")
         wait(reader, lambda each: each.status == "stopped")
         truth.wait(moving=False)
-        time.sleep(1.0)
         clear_stop(page, truth)
         page.page.get_by_role("button", name="Continue ").click()
         wait(reader, lambda each: each.status == "paused" and each.step == 3)

@@ -155,7 +155,6 @@ def test_step_and_go_move_to_one_pose_and_never_past_a_stop(sheet: ViserPage, tr
     sheet.wait_until(lambda: "stopped" in says(sheet), "the refusal")
     press(sheet, "Play")
     sheet.wait_until(lambda: "stop" in says(sheet).lower(), "the refusal", seconds=PLAYED)
-    sheet.page.wait_for_timeout(1100)
     clear_stop(sheet, truth)
     sheet.page.wait_for_timeout(500)
     assert at(-25.0)()
@@ -202,7 +201,6 @@ def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> N
     teach(sheet, truth, (20.0, -25.0))
     sheet.page.click("#stop")
     truth.wait(mood="stopped")
-    sheet.page.wait_for_timeout(1100)
     clear_stop(sheet, truth)
     q = truth.status()["q"]
     sheet.page.evaluate(
@@ -282,7 +280,6 @@ def test_sheet_works_with_fingers_on_a_phone(
     # STOP stays free.
     page.page.tap("#stop")
     truth.wait(mood="stopped")
-    page.page.wait_for_timeout(1200)
     page.page.locator("#clear-stop").tap()
     truth.wait(stopped=None)
     assert page.errors == []

@@ -139,7 +139,6 @@ def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
     truth.wait(mood="stopped")
     assert area.input_value() == f"{text} "
     sheet.wait_until(lambda: bar(sheet, "headline") == "Stopped", "the bar")
-    sheet.page.wait_for_timeout(1200)
     clear_stop(sheet, truth)
 
 
@@ -151,7 +150,6 @@ def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth:
         """Press Space, which must stop the arm, and clear the stop."""
         page.keyboard.press("Space")
         truth.wait(mood="stopped")
-        page.wait_for_timeout(1200)
         clear_stop(sheet, truth)
         assert truth.status()["stopped"] is None, what
 
