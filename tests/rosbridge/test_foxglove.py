@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import InvalidStatus
 from websockets.typing import Origin, Subprotocol
 
 from tests.browser.server import APP, AppServer
@@ -61,6 +62,13 @@ def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> Non
                 f"ws://127.0.0.1:{port}",
                 subprotocols=protocols,
                 origin=Origin("https://elsewhere.example"),
+            )
+            old = [Subprotocol("foxglove.websocket.v1")]
+            with pytest.raises(InvalidStatus) as refused:
+                await connect(f"ws://127.0.0.1:{port}", subprotocols=old)
+            assert refused.value.response.status_code == 400
+            assert refused.value.response.body.startswith(
+                b"Missing expected sec-websocket-protocol"
             )
             async with asyncio.timeout(30.0), page as client:
                 topics, services, capabilities = await offers(client)
