@@ -38,8 +38,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="motion: .csv with the columns t,theta1,...,theta5,gripper or .json with lists of "
-        "these names",
+        help="motion: .csv with the columns t,theta1,...,theta5,gripper",
     )
     shown.add_argument(
         "--run",
