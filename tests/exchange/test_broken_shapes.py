@@ -72,8 +72,11 @@ def test_stl_of_unknown_count_is_read_as_a_whole(count: int) -> None:
         (stl(corners=(0, 0, 0, 1, 0, 0, 0, math.inf, 0)), "not finite numbers"),
         (stl(corners=(0,) * 9), "has no triangles"),
         (b"solid a\nendsolid a\n", "has no triangles"),
-        (f"solid\n{FACET.format(1)}\n".encode(), "line 3: the file ends before 'endsolid'"),
-        (f"solid\n\n{FACET.format(1)[:-9]}\nendsolid".encode(), "corrupt at line 3"),
+        (
+            f"solid\n{FACET.format(1)}\n".encode(),
+            "^a.stl is corrupt at line 3: the file ends before 'endsolid'",
+        ),
+        (f"solid\n\n{FACET.format(1)[:-9]}\nendsolid".encode(), "^a.stl is corrupt at line 3"),
         (f"solid\n{FACET.format('x')}\nendsolid".encode(), "not numbers"),
         (f"solid\n{FACET.format('nan')}\nendsolid".encode(), "not finite numbers"),
         (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "not finite numbers"),

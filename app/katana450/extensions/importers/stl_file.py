@@ -52,8 +52,9 @@ def read_stl(data: bytes, name: str) -> MeshReading:
         if rows["extra"].any():
             left_out = ("colours, which the STL standard does not define",)
     elif _SOLID.match(data) and (b"facet" in data.lower() or len(data) < HEADER):
+        corners = _corners(data, name)
         try:
-            points = np.array(_corners(data, name), dtype=object).astype(float).reshape(-1, 3)
+            points = np.array(corners, dtype=object).astype(float).reshape(-1, 3)
         except ValueError as error:
             reason = str(error)[:80]
             raise InputError(f"{name} has coordinates that are not numbers: {reason}.") from error
