@@ -27,26 +27,27 @@ install 250 MB that yourdfpy requires and nothing uses.
 class MissingExtraError(ConfigurationError):
     """An extra of the package is not installed; the text has the command that installs it."""
 
-    def __init__(self, extra: str, purpose: str) -> None:
-        """``purpose``: what needs the ``extra``, in the plural, with a capital letter."""
-        python = shlex.quote(sys.executable)
-        # Environments of uv have no pip.
-        command = f"{python} -m pip install" if find_spec("pip") else f"uv pip install -p {python}"
-        super().__init__(f"{purpose} need the extra {extra!r}: {command} {PACKAGES[extra]}")
-
 
 def library(module: str, extra: str, purpose: str) -> Any:
     """Return the library ``module`` of an ``extra``, which ``purpose`` needs.
 
-    Raises MissingExtraError.
+    ``purpose`` is in the plural, with a capital letter. Raises MissingExtraError.
     """
     try:
         return import_module(module)
     except ImportError as error:
-        raise MissingExtraError(extra, purpose) from error
+        raise _missing(extra, purpose) from error
 
 
 def require(module: str, extra: str, purpose: str) -> None:
     """Raise MissingExtraError as `library`, but do not load ``module``, which may take long."""
     if find_spec(module) is None:
-        raise MissingExtraError(extra, purpose)
+        raise _missing(extra, purpose)
+
+
+def _missing(extra: str, purpose: str) -> MissingExtraError:
+    """Return the error of a missing ``extra``, made of its text alone so that it can be pickled."""
+    python = shlex.quote(sys.executable)
+    # Environments of uv have no pip.
+    command = f"{python} -m pip install" if find_spec("pip") else f"uv pip install -p {python}"
+    return MissingExtraError(f"{purpose} need the extra {extra!r}: {command} {PACKAGES[extra]}")

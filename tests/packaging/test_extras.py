@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from argparse import Namespace
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from katana450 import extras
 from katana450.cli.main import main
 from katana450.extensions.importers.reading import answer
 from katana450.extensions.importers.shape_file import Format
+from katana450.extensions.real_arm.commands.serve_arm import driver_of
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from katana450.extensions.rosbridge.extension import _check_installed
 from katana450.extras import MissingExtraError
@@ -43,9 +45,11 @@ def test_each_missing_extra_is_named_with_its_command(
     def refused(use: Callable[..., object], *arguments: object) -> str:
         with pytest.raises(MissingExtraError) as caught:
             use(*arguments)
-        return str(caught.value)
+        # The processes of a server send it to each other.
+        return str(pickle.loads(pickle.dumps(caught.value)))
 
     foxglove = (Namespace(foxglove=8765), None)
+    arm = (Namespace(arm="serial:///dev/ttyUSB0", arm_log=None), None, (), 0.0)
     picture = str(tmp_path / "a.png")
     uses: list[tuple[str, str, Callable[[], str]]] = [
         ("embreex", "pictures", lambda: answered("render", "--out", picture)),
@@ -53,6 +57,7 @@ def test_each_missing_extra_is_named_with_its_command(
         ("robot_descriptions", "gallery", lambda: answered("serve", "--arm", "ur5e")),
         ("foxglove", "foxglove", lambda: refused(_check_installed, *foxglove)),
         ("serial", "serial", lambda: refused(ArmUrl("/dev/ttyUSB0", None).open)),
+        ("serial", "serial", lambda: refused(driver_of, *arm)),
         ("DracoPy", "meshes", lambda: read(draco_glb(), Format.GLB)),
         ("networkx", "meshes", lambda: read(threemf(), Format.THREEMF)),
     ]
