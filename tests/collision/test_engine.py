@@ -127,6 +127,12 @@ def test_distances_of_the_arm_are_on_their_bounds(
                 assert abs(contact.distance - bound) <= (EXACT if contact.distance > 0 else DEEP)
 
 
+def test_pose_that_is_not_finite_has_no_distance() -> None:
+    bodies = placement((sphere(0.1), at(0.0, 0.0, 0.0)), (sphere(0.1), at(np.nan, 0.0, 0.0)))
+    with pytest.raises(ArithmeticError, match="not finite"):
+        distance(bodies, 0, 1)
+
+
 def test_a_thread_keeps_as_many_geometries_as_it_has_room_for() -> None:
     """Many more bodies than a model has room for, in one world and one after another."""
     balls = [sphere(1e-3 * (1 + k)) for k in range(engine.GEOMETRIES + 5)]

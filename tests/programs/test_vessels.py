@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -151,3 +153,8 @@ def test_scene_has_few_vessels(stage: Stage) -> None:
     stage.session.check(cmd.ReplaceScene((*cup, *some), 1e-4))
     with pytest.raises(InputError, match=f"at most {MAX_VESSELS} vessels with the cup"):
         stage.session.check(cmd.ReplaceScene((*cup, *some, glass(MAX_VESSELS)), 1e-4))
+
+
+def test_basin_is_no_vessel(stage: Stage) -> None:
+    with pytest.raises(InputError, match="give the vessel another name"):
+        stage.session.check(cmd.PlaceObject(replace(glass(1), name="basin")))

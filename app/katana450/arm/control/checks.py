@@ -8,7 +8,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.pouring import CUP, MAX_VESSELS, Pouring, is_vessel
+from katana450.arm.control.pouring import BASIN, CUP, MAX_VESSELS, Pouring, is_vessel
 from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError
@@ -112,7 +112,7 @@ def _check_objects(pouring: Pouring | None, environment: Environment, command: c
             _check_water(pouring, volume)
         case cmd.ReplaceScene(objects=objects, volume=volume):
             for scene_object in objects:
-                _check_hand(environment, scene_object)
+                _check_object(environment, scene_object)
                 if is_loose(scene_object):
                     check_carried(environment.table, objects, scene_object)
             if sum(map(is_vessel, objects)) > MAX_VESSELS:
@@ -121,7 +121,7 @@ def _check_objects(pouring: Pouring | None, environment: Environment, command: c
                 has_cup = any(scene_object.name == CUP for scene_object in objects)
                 _check_water(pouring if has_cup else None, volume)
         case cmd.PlaceObject(scene_object=scene_object):
-            _check_hand(environment, scene_object)
+            _check_object(environment, scene_object)
         case cmd.Attach(to=Attachment.HAND) if environment.hand is None:
             raise InputError(NO_HAND)
 
@@ -132,6 +132,8 @@ def _check_water(pouring: Pouring | None, volume: float) -> None:
     pouring.check(volume)
 
 
-def _check_hand(environment: Environment, scene_object: SceneObject) -> None:
+def _check_object(environment: Environment, scene_object: SceneObject) -> None:
     if scene_object.fixed and environment.hand is None:
         raise InputError(NO_HAND)
+    if scene_object.name == BASIN and is_vessel(scene_object):
+        raise InputError("The basin has a form of its own: give the vessel another name.")

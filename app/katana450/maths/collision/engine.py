@@ -196,6 +196,8 @@ class _Bench:
         gap: float = self._function(*self._addresses, one, other, FAR, self._points)
         if -TOUCHING <= gap <= TOUCHING:
             gap = self._checked(gap, placement, one, other)
+        if gap >= FAR.value:
+            raise ArithmeticError("A distance was asked of a pose that is not finite.")
         return gap
 
     def _checked(self, gap: float, placement: Placement, one: int, other: int) -> float:
