@@ -81,7 +81,8 @@ def test_stop_ends_a_running_program(arm: Client) -> None:
     program = wait(arm, lambda program: program.status != "running", 1.0)
     assert program.status == "stopped"
     assert "STOP" in program.why
-    time.sleep(0.5)
+    # The brake takes about half a second.
+    time.sleep(1.0)
     state = arm.query(answers.State)
     assert not state.moving
     assert np.abs(state.qd).max() == 0.0
