@@ -210,8 +210,8 @@ def notes(folder: Path, server: AppServer) -> Iterator[Path]:
 
 def _attached(folder: Path, text: str) -> bool:
     """Return whether the newest file of ``folder``, which is being written, has ``text``."""
-    copy = folder.parent / "copy.mcap"
-    path = whole_copy(recordings_in(folder)[-1], copy)
+    files = recordings_in(folder)
+    path = whole_copy(files[-1], folder.parent / "copy.mcap") if files else None
     return path is not None and text in scripts_of(path).values()
 
 

@@ -109,8 +109,8 @@ def test_recorder_killed_in_motion_loses_a_second(folder: Path, tmp_path: Path) 
     assert min(gaps) > 0.0
 
 
-def gap_of(path: Path) -> tuple[float, int, str]:
-    """Return length [s], number of ticks and reason of the only gap in ``path``."""
+def gaps_of(path: Path) -> list[tuple[float, int, str]]:
+    """Return length [s], number of ticks and reason of each gap in ``path``."""
     before, gaps = 0.0, []
     with RecordingFile.open(path) as file:
         for message in file.messages(COMMANDS):
@@ -118,8 +118,7 @@ def gap_of(path: Path) -> tuple[float, int, str]:
             if "missing" in found:
                 gaps.append((found["t"] - before, found["ticks"], found["missing"]))
             before = found["t"]
-    ((length, ticks, why),) = gaps
-    return length, ticks, why
+    return gaps
 
 
 @pytest.mark.long
@@ -140,7 +139,7 @@ def test_recorder_that_hangs_delays_no_tick(folder: Path, tmp_path: Path) -> Non
         time.sleep(2.0)
     assert "could not keep up" in server.output
     assert main(["record", "keep", str(folder), "--out", str(kept)]) == 0
-    length, ticks, why = gap_of(kept)
+    ((length, ticks, why),) = gaps_of(kept)
     assert "could not keep up" in why
     assert 0.5 * length < ticks * PERIOD < length + 0.5
     result = katana450.open(kept).verify()
@@ -161,7 +160,9 @@ def mounted(folder: Path, line: tuple[str, ...]) -> tuple[str, ...] | None:
 @pytest.mark.long
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of other processes")
 @pytest.mark.parametrize("disk", ["full", "limited"])
-def test_full_disk_delays_no_tick_and_is_reported(folder: Path, tmp_path: Path, disk: str) -> None:
+def test_full_disk_delays_and_loses_no_tick_and_is_reported(
+    folder: Path, tmp_path: Path, disk: str
+) -> None:
     line = command(folder)
     if disk == "full":
         found = mounted(folder, line)
@@ -197,10 +198,8 @@ def test_full_disk_delays_no_tick_and_is_reported(folder: Path, tmp_path: Path, 
         assert main(["record", "keep", str(there), "--out", str(kept)]) == 0
         reason = {"full": "No space left on device", "limited": "File too large"}[disk]
         assert f"is interrupted: {reason}" in server.output
-    length, ticks, why = gap_of(kept)
-    assert f"The disk took nothing: {reason}" in why
-    # An arm that rests for a moment on a busy machine makes no ticks.
-    assert 0.5 * length < ticks * PERIOD < length + 0.7
+    # The ticks of 30 s wait in memory.
+    assert gaps_of(kept) == []
     assert katana450.open(kept).verify().identical
 
 
