@@ -24,9 +24,9 @@ class VirtualClock:
         """Return the time [s]."""
         return self.t
 
-    def sleep_until(self, t: float, wake: threading.Event | None = None) -> None:
-        """Not used: the ticks are called at their times."""
-        raise NotImplementedError
+    def sleep_until(self, t: float, wake: threading.Event | None = None) -> None:  # noqa: ARG002
+        """Set the clock to ``t`` [s], unless that is past."""
+        self.t = max(self.t, t)
 
 
 class _Selector(selectors.DefaultSelector):

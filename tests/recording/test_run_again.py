@@ -146,7 +146,8 @@ def test_pause_or_stop_in_the_middle_is_left_out(
     found = path_difference(part.setpoint, trace.t, trace.q)
     assert found.joints < TOLERANCE
     assert sum(float(each) for each in re.findall(r"wait: ([\d.]+)", text)) < 0.3
-    # After a stop the second part is straight. After a pause the drag goes on, and then turns.
+    # After a stop the second part is straight in the joints. After a pause the drag continues until
+    # it gets another target, which is a curve.
     assert (text.count("trajectory:"), text.count("- joints:")) == (curved, 3 - curved)
     # The time of the pause is not in the recorded time either.
     assert part.duration + part.waited == pytest.approx(part.t[-1], abs=0.1)

@@ -142,7 +142,7 @@ class WaterNodes:
         local = body(vessel.inside, self._flow.surface(water)) * INSET
         corners = local @ T[:3, :3].T + (T[:3, 3] + vessel.floor * T[:3, 2])
         if node is None:
-            # A name of a person is no name of a node.
+            # People name the objects, and their names may have characters that a node's may not.
             name = f"vessel{len(self._bodies)}" if self._bodies else "cup"
             node = self._add(name, corners.astype(np.float32), BODY_FACES, IN_VESSEL)
         elif sent is not None and np.abs(corners - sent).max() <= WORTH_SENDING:
