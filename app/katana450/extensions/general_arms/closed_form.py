@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-import struct
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,23 +15,16 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.form import Form, form_of
-from katana450.extensions.general_arms.functions import ARRAYS
+from katana450.extensions.general_arms.functions import ARRAYS, FLOATS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
-from katana450.extensions.general_arms.one_pose import one_pose
 from katana450.extensions.general_arms.parallel_axes import LOOSE, six_axes
-from katana450.extensions.general_arms.posture import Postures
+from katana450.extensions.general_arms.posture import Angles, Postures
 from katana450.extensions.general_arms.spherical_wrist import Solve
-from katana450.extensions.general_arms.straight_line import Code
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.turns import nearest_turn
-
-# Looked up once: every call uses these.
-_ARRAY: Final = np.ndarray
-_FLOAT: Final = np.dtype(np.float64)
-_NUMBERS: Final = struct.Struct("16d").unpack
+from katana450.maths.kinematics.turns import another_turn_helps, in_turn, nearest_turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +40,6 @@ class ClosedForm:
     chain: Chain
     form: Form
     is_reversed: bool = False
-    _solve_pose: Code = field(init=False, repr=False)
 
     @staticmethod
     def of(chain: Chain, links: DHLinks) -> ClosedForm | str:
@@ -86,48 +75,66 @@ class ClosedForm:
         """The rounding of the file that describes the chain."""
         return FileRounding(self.chain, self.form.links)
 
-    @property
+    @cached_property
     def slack(self) -> float:
         """See `FileRounding.slack`."""
         return self.rounding.slack
 
     @cached_property
-    def _solve_exact(self) -> Code:
-        return one_pose(self.chain, self.form, is_reversed=self.is_reversed)
+    def _canonical(self) -> Callable[[FloatArray, Sequence[float]], list[Angles]]:
+        """A function for the canonical angles of all branches, without the rounding of the file.
+
+        It takes a pose (4, 4) and the canonical angles that are used where it leaves them free.
+        """
+        form, is_reversed = self.form, self.is_reversed
+        solve = form.build(form.links, FLOATS)
+        before, after = form.links.T_1_S, form.T_after
+
+        def canonical(T: FloatArray, free: Sequence[float]) -> list[Angles]:
+            seen = se3.inverse(T) if is_reversed else T
+            # For one pose `dot` takes half the time of `@`.
+            return solve(before.dot(seen).dot(after).tolist(), free)
+
+        return canonical
 
     @cached_property
-    def _solve(self) -> Code:
-        return self.rounding.corrected_code(self._solve_exact, self._solve_exact)
+    def _joints(self) -> Callable[[Sequence[float]], Angles]:
+        """A function for the joint angles [rad] of canonical angles."""
+        shift, is_reversed = self.form.links.shift, self.is_reversed
+        ends = zip(self.chain.lower.tolist(), self.chain.upper.tolist(), strict=True)
+        limits = [(k, *end) for k, end in enumerate(ends) if another_turn_helps(*end)]
+        remainder, tau = math.remainder, math.tau
 
-    def __post_init__(self) -> None:
-        # An attribute that is found faster than a cached property.
-        object.__setattr__(self, "_solve_pose", self._first_pose)
+        def joints(alpha: Sequence[float]) -> Angles:
+            q = [remainder(angle - offset, tau) for angle, offset in zip(alpha, shift, strict=True)]
+            if is_reversed:
+                q.reverse()
+            for joint, lower, upper in limits:
+                q[joint] = in_turn(q[joint], lower, upper)
+            return tuple(q)
 
-    def _first_pose(self, pose: Sequence[float]) -> list[tuple[float, ...]] | None:
-        code = one_pose(self.chain, self.form, is_reversed=self.is_reversed, checks=True)
-        if self.rounding.is_corrected:
-            code = self.rounding.corrected_code(code, self._solve_exact)
-        object.__setattr__(self, "_solve_pose", code)
-        found: list[tuple[float, ...]] | None = code(pose)
-        return found
+        return joints
 
-    def solve(self, T: FloatArray, free: Sequence[float] | None = None) -> list[tuple[float, ...]]:
+    def solve(self, T: FloatArray, free: Sequence[float] | None = None) -> list[Angles]:
         """Return the joint angles of all branches for the pose `T` (4, 4), without checks.
 
         For loops over many poses. `free` (n,) [rad] are the angles that are taken where the pose
         leaves them free; None for zeros. Each angle is in the turn inside its limits if there is
         one, else in [-pi, pi].
         """
-        return self._solved(T.ravel().tolist(), free)
-
-    def _solved(
-        self, pose: Sequence[float], free: Sequence[float] | None
-    ) -> list[tuple[float, ...]]:
         alpha = shift = self.form.links.shift
         if free is not None:
             alpha = tuple(map(float.__add__, free[::-1] if self.is_reversed else free, shift))
-        found: list[tuple[float, ...]] = self._solve(pose, alpha)
-        return found
+        canonical, joints = self._canonical, self._joints
+        q = [joints(angles) for angles in canonical(T, alpha)]
+        if not self.rounding.is_corrected:
+            return q
+
+        def again(targets: FloatArray) -> FloatArray:
+            return np.array([joints(canonical(each, alpha)[k]) for k, each in enumerate(targets)])
+
+        poses = np.repeat(T[None], len(q), axis=0)
+        return list(map(tuple, self.rounding.corrected(np.array(q), poses, again).tolist()))
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Postures:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
@@ -136,22 +143,15 @@ class ClosedForm:
         point, or the wrist's centre, nearest along the links. Their errors give the difference.
         Two branches coincide where they meet.
         """
-        found = Postures()
-        found.solver = self
-        if q_hint is None and type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4):
-            # One function checks the pose and solves it.
-            pose = _NUMBERS(T.tobytes())
-            angles = self._solve_pose(pose)
-            if angles is not None:
-                found.pose, found.angles = pose, angles
-                return found
-        pose = tuple(itertools.chain.from_iterable(se3.validated_rows(T)))
+        pose = se3.validated(T)
+        if q_hint is None and not self.rounding.is_corrected:
+            # The joint angles of a branch follow from its canonical angles when they are read.
+            return Postures(self, pose, self._canonical(pose, self.form.links.shift), self._joints)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
-        angles = self._solved(pose, None if hint is None else hint.tolist())
+        angles = self.solve(pose, None if hint is None else hint.tolist())
         if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
             angles = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in angles]
-        found.pose, found.angles = pose, angles
-        return found
+        return Postures(self, pose, angles)
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].
@@ -175,7 +175,9 @@ class ClosedForm:
         seen = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
-            found = self._solve_arrays(self.form.columns(seen), shift)
+            found = self._solve_arrays(
+                np.moveaxis(self.form.links.T_1_S @ seen @ self.form.T_after, 0, -1), shift
+            )
         zeros = np.zeros(len(poses))
         alpha = np.array([[each + zeros for each in angles] for angles in found])
         q = alpha.transpose(2, 0, 1) - shift
@@ -184,7 +186,7 @@ class ClosedForm:
             # Where axes 4 and 6 are in line, case distinctions keep axis 4 in reach.
             in_line = (np.abs(np.sin(alpha[:, 4])) < LOOSE).any(axis=0)
             for number in np.flatnonzero(in_line).tolist():
-                q[number] = self._solve_exact(poses[number].ravel().tolist(), shift)
+                q[number] = list(map(self._joints, self._canonical(poses[number], shift)))
         return q
 
 

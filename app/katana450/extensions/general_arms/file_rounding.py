@@ -8,7 +8,7 @@ by the size of the rounding, divided by the distance of the posture from a singu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,7 +17,6 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.extensions.general_arms.straight_line import Code
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
@@ -109,22 +108,3 @@ class FileRounding:
     @cached_property
     def _search(self) -> Numerical:
         return Numerical(self.chain, links_of(self.chain, exact=False))
-
-    def corrected_code(self, code: Code, exact: Code) -> Code:
-        """Return ``code`` with the solutions of `corrected`; ``exact`` does not check the pose."""
-        if not self.is_corrected:
-            return code
-
-        def solve(pose: Sequence[float], *free: Sequence[float]) -> list[tuple[float, ...]] | None:
-            found: list[tuple[float, ...]] | None = code(pose, *free)
-            if found is None:
-                return None
-
-            def again(aimed: FloatArray) -> FloatArray:
-                rows = aimed.reshape(-1, 16).tolist()
-                return np.array([exact(row, *free)[k] for k, row in enumerate(rows)])
-
-            T = np.repeat(np.reshape(pose, (1, 4, 4)), len(found), axis=0)
-            return [tuple(q) for q in self.corrected(np.array(found), T, again).tolist()]
-
-        return solve

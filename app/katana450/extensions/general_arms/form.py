@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from katana450.extensions.general_arms.functions import Operations
 from katana450.extensions.general_arms.links import DHLinks
 from katana450.extensions.general_arms.parallel_axes import (
@@ -21,6 +23,7 @@ from katana450.extensions.general_arms.spherical_wrist import (
     parallel_shoulder,
     why_not_spherical,
 )
+from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -39,17 +42,11 @@ class Form(NamedTuple):
     build: Callable[[DHLinks, Operations], Solve]
     keeps_tool_point: bool = False
 
-    def columns(self, T: FloatArray) -> list[list[FloatArray]]:
-        """Return the rows that the formulas read, for many poses `T` (N, 4, 4) = T_S_tool.
-
-        An array (N,) is in place of a number.
-        """
-        here = self.links.T_1_S @ T
-        if self.keeps_tool_point:
-            here[:, :3, :3] = here[:, :3, :3] @ self.links.T_n_tool[:3, :3].T
-        else:
-            here = here @ self.links.T_tool_n
-        return [[here[:, i, j] for j in range(4)] for i in range(4)]
+    @property
+    def T_after(self) -> FloatArray:
+        """The rows of a pose `T` = T_S_tool are those of T_1_S T T_after."""
+        T = self.links.T_tool_n
+        return se3.from_rotation_translation(T[:3, :3], np.zeros(3)) if self.keeps_tool_point else T
 
 
 def form_of(links: DHLinks) -> Form | str:

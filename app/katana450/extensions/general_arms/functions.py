@@ -17,7 +17,6 @@ from katana450.extensions.general_arms.links import sine_and_cosine
 
 # A float or an array: the formulas are the same.
 Number = Any
-Numbers = tuple[Number, ...]
 
 FREE: Final = 1e-13
 """[1] or [m] Distance from an axis below which the turn about it is free. Any turn then
@@ -35,10 +34,9 @@ class Operations(NamedTuple):
         root: sqrt(x), and 0 where x < 0.
         select: (condition, a, b) to a where the condition holds, else b.
         bounded: the nearest number in [-1, 1].
-        rarely: (condition, function, arguments, usual) to function(*arguments) in the rare case in
-            which the condition holds, else ``usual``. Arrays always have ``usual``.
-        quickly: (condition, quick, careful) to quick() where the condition holds, else careful(),
-            which is always right. Arrays always have careful().
+        is_scalar: whether the numbers are floats. A formula may then take a shorter way where a
+            condition holds, and has further ways for rare poses. Arrays take the way that is right
+            for all poses but the rare ones.
     """
 
     atan2: Callable[[Number, Number], Number]
@@ -48,8 +46,7 @@ class Operations(NamedTuple):
     root: Callable[[Number], Number]
     select: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
-    rarely: Callable[[Number, Callable[..., Numbers], tuple[Number, ...], Numbers], Numbers]
-    quickly: Callable[[Number, Callable[[], Numbers], Callable[[], Numbers]], Numbers]
+    is_scalar: bool
 
 
 def _root(x: float) -> float:
@@ -72,8 +69,7 @@ FLOATS: Final = Operations(
     _root,
     _select,
     _bounded,
-    lambda condition, function, arguments, usual: function(*arguments) if condition else usual,
-    lambda condition, quick, careful: quick() if condition else careful(),
+    is_scalar=True,
 )
 
 ARRAYS: Final = Operations(
@@ -84,8 +80,7 @@ ARRAYS: Final = Operations(
     lambda x: np.sqrt(np.maximum(x, 0.0)),
     np.where,
     lambda x: np.clip(x, -1.0, 1.0),
-    lambda _condition, _function, _arguments, usual: usual,
-    lambda _condition, _quick, careful: careful(),
+    is_scalar=False,
 )
 
 Facing = tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]]
@@ -99,18 +94,17 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
     nearest. A point on axis 1 leaves the turn to ``free`` [rad], if d is 0.
     """
     hypot, root, select, bounded, cos, sin = f.hypot, f.root, f.select, f.bounded, f.cos, f.sin
+    is_scalar = f.is_scalar
 
     def turns(x: Number, y: Number, d: Number, free: Number) -> Facing:
         rho = hypot(x, y)
-
-        def near() -> Numbers:
+        if is_scalar and rho > FREE:
+            cx, cy, sine = x / rho, y / rho, bounded(d / rho)
+        else:
             on_axis = rho <= FREE
             scale = select(on_axis, 1.0, rho)
-            along = select(on_axis, cos(free), x / scale), select(on_axis, sin(free), y / scale)
-            return *along, d / scale
-
-        cx, cy, sine = f.quickly(rho > FREE, lambda: (x / rho, y / rho, d / rho), near)
-        sine = bounded(sine)
+            cx, cy = select(on_axis, cos(free), x / scale), select(on_axis, sin(free), y / scale)
+            sine = bounded(d / scale)
         cosine = root((1.0 - sine) * (1.0 + sine))
         xc, yc, xs, ys = cx * cosine, cy * cosine, cx * sine, cy * sine
         ahead = rho * cosine
@@ -206,30 +200,26 @@ def _square_turns(
     Q: its second row is -s s2 (sin c, cos c, 0).
     """
     atan2, hypot, select, cos, sin = f.atan2, f.hypot, f.select, f.cos, f.sin
-    sign = -s * s2
-    pi = math.pi
+    sign, pi, is_scalar = -s * s2, math.pi, f.is_scalar
 
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
         (q11, q12, q13), (q21, q22, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-
-        def apart() -> Numbers:
+        if is_scalar and radius > DISTINCT:
             a, c = atan2(s2 * q23, s2 * q13), atan2(-s * q32, s * q31)
-            return a, c, s2 * q13 / radius, s2 * q23 / radius
+            ca, sa = s2 * q13 / radius, s2 * q23 / radius
+        else:
 
-        def left(ca: Number, sa: Number) -> Number:
-            return atan2(sign * (ca * q21 - sa * q11), sign * (ca * q22 - sa * q12))
+            def left(ca: Number, sa: Number) -> Number:
+                return atan2(sign * (ca * q21 - sa * q11), sign * (ca * q22 - sa * q12))
 
-        def near() -> Numbers:
-            # Of a direction any length gives the angles.
             is_free = radius <= FREE
             taken = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
+            # Of a direction any length gives the angles.
             x = select(is_free, cos(taken), s2 * q13)
             y = select(is_free, sin(taken), s2 * q23)
             length = select(is_free, 1.0, radius)
-            return atan2(y, x), left(x, y), x / length, y / length
-
-        a, c, ca, sa = f.quickly(radius > DISTINCT, apart, near)
+            a, c, ca, sa = atan2(y, x), left(x, y), x / length, y / length
         b = atan2(radius, sign * q33)
         return (a, b, c, ca, sa), (a + pi, -b, c + pi, -ca, -sa), radius
 

@@ -92,15 +92,14 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             for psi, five, six, cp, sp in (first, second):
                 wx, wy = u - ex * cp + ey * sp, v - ex * sp - ey * cp
                 towards, opening, bend, square = bent(wx, wy)
-                moved = radius * f.sin(0.5 * (six - free[5]))
-                # Up to FREE alpha6 has the wanted angle already.
-                is_held = (radius > FREE) & (abs(moved) <= 0.5 * held)
-                psi, six, towards, opening, bend = f.rarely(  # noqa: PLW2901
-                    (radius <= LOOSE) & ((square <= 0.0) | is_held),
-                    loosened,
-                    (u, v, wx, wy, psi, six, free[5], f.select(m33 < 0.0, -radius, radius)),
-                    (psi, six, towards, opening, bend),
-                )
+                if f.is_scalar and radius <= LOOSE:
+                    moved = radius * f.sin(0.5 * (six - free[5]))
+                    # Up to FREE alpha6 has the wanted angle already.
+                    if square <= 0.0 or (radius > FREE and abs(moved) <= 0.5 * held):
+                        side = -radius if m33 < 0.0 else radius
+                        psi, six, towards, opening, bend = loosened(  # noqa: PLW2901
+                            u, v, wx, wy, psi, six, free[5], side
+                        )
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
                     found.append((one, two, flip2 * bend_, four, five, six))
@@ -184,9 +183,9 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
         up = c1 * beside + s1 * z
         front, back = turns(x, y, beside, free[0])
         along = -flip * s1 * r23, flip * s1 * r13
-        planes = f.rarely(
-            front[2] <= near, _by_axes, (*front, *back, x, y, beside, *along), (*front, *back)
-        )
+        planes: Angles = (*front, *back)
+        if f.is_scalar and front[2] <= near:
+            planes = _by_axes(*planes, x, y, beside, *along)
         found = []
         for c, s, ahead in (planes[:3], planes[3:]):
             one = atan2(s, c)

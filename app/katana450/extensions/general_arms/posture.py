@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, Protocol, overload
 
 import numpy as np
@@ -20,6 +20,9 @@ counts as singular. Translations in it are divided by the length of the arm."""
 
 TURNS: Final = 1e-3
 """[1] Component of a unit motion of the joints from which on a joint takes part in it."""
+
+
+Angles = tuple[float, ...]
 
 
 class GeneralPosture:
@@ -123,32 +126,38 @@ class Branched(Protocol):
 
 
 class Postures(Sequence[GeneralPosture]):
-    """The postures of one pose in the order of the branches, created on first access."""
+    """The postures of one pose in the order of the branches, each created when it is first read."""
 
-    __slots__ = ("_made", "angles", "pose", "solver")
+    __slots__ = ("_angles", "_joints", "_made", "_pose", "_solver")
 
-    # Set by `ClosedForm.inverse` without a constructor, which would take a tenth of its time.
-    solver: Branched
-    pose: Sequence[float]
-    """The numbers of T_S_tool (4, 4), row by row."""
-    angles: Sequence[tuple[float, ...]]
-    """The joint angles [rad] of each branch."""
-    _made: tuple[GeneralPosture, ...]
+    def __init__(
+        self,
+        solver: Branched,
+        pose: FloatArray,
+        angles: Sequence[Angles],
+        joints: Callable[[Angles], Angles] = tuple,
+    ) -> None:
+        """Hold the ``angles`` of each branch of ``solver`` for ``pose`` (4, 4).
 
-    def _all(self) -> tuple[GeneralPosture, ...]:
-        try:
-            return self._made
-        except AttributeError:
-            T = np.array(self.pose).reshape(4, 4)
-        slack = self.solver.slack
-        self._made = tuple(
-            GeneralPosture(self.solver.chain, T, angles, branch, slack)
-            for angles, branch in zip(self.angles, self.solver.branches, strict=True)
-        )
-        return self._made
+        ``joints`` returns the joint angles [rad] of angles.
+        """
+        self._solver = solver
+        self._pose = pose
+        self._angles = angles
+        self._joints = joints
+        self._made: list[GeneralPosture | None] = [None] * len(angles)
+
+    def _posture(self, k: int) -> GeneralPosture:
+        posture = self._made[k]
+        if posture is None:
+            solver, angles = self._solver, self._joints(self._angles[k])
+            posture = self._made[k] = GeneralPosture(
+                solver.chain, self._pose, angles, solver.branches[k], solver.slack
+            )
+        return posture
 
     def __len__(self) -> int:
-        return len(self.angles)
+        return len(self._angles)
 
     @overload
     def __getitem__(self, index: int) -> GeneralPosture: ...
@@ -157,14 +166,14 @@ class Postures(Sequence[GeneralPosture]):
     def __getitem__(self, index: slice) -> tuple[GeneralPosture, ...]: ...
 
     def __getitem__(self, index: int | slice) -> GeneralPosture | tuple[GeneralPosture, ...]:
-        return self._all()[index]
+        return tuple(self)[index] if isinstance(index, slice) else self._posture(index)
 
     def __iter__(self) -> Iterator[GeneralPosture]:
-        return iter(self._all())
+        return map(self._posture, range(len(self._angles)))
 
     def __repr__(self) -> str:
         """Return the postures as text."""
-        return repr(self._all())
+        return repr(tuple(self))
 
 
 def scaled_jacobian(chain: Chain, q: Sequence[float] | FloatArray) -> FloatArray:

@@ -102,6 +102,8 @@ def validated(T: npt.ArrayLike, name: str = "The pose") -> FloatArray:
     Raises InputError when `T` is not finite, has another shape, its last row is not 0 0 0 1, it is
     too far away to be computed with, or `so3.misfit` of its rotation exceeds ROTATION_INPUT.
     """
+    if type(T) is _ARRAY and T.dtype is _FLOAT and T.shape == (4, 4) and _is_clean(T.tolist()):
+        return T.copy()
     return np.array(validated_rows(T, name))
 
 

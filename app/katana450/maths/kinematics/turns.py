@@ -46,3 +46,12 @@ def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatA
         return q
     other = q + math.tau * np.round((hint - q) / math.tau)
     return np.where((other >= chain.lower) & (other <= chain.upper), other, q)
+
+
+def another_turn_helps(lower: float, upper: float) -> bool:
+    """Return whether an angle in [-pi, pi] may be inside the limits [rad] after a whole turn.
+
+    It can only be beyond one limit then, and the other one beyond a half turn.
+    """
+    slack = tolerances.LIMIT_SLACK
+    return (lower <= slack - math.pi) != (upper >= math.pi - slack)
