@@ -353,11 +353,11 @@ def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
     start = begun(session)
     far = cmd.MoveTool(pose(session, start)[:3, 3] + (0.6, 0.3, 0.2))
     state = session.step(start, [far], TICK)
-    text = json_text(codec.encoded(State, state))
+    text = json_text(codec.encoded(state))
     again = codec.decoded(State, json_form(text))
-    assert json_text(codec.encoded(State, again)) == text
+    assert json_text(codec.encoded(again)) == text
     following, repeated = (session.step(each, [], 2 * TICK) for each in (state, again))
     np.testing.assert_array_equal(following.goal, repeated.goal)
     for command in (cmd.OrientTool(TURN), cmd.TakeBranch("left-up-noflip")):
-        form = json_text(codec.encoded(cmd.Command, command))
+        form = json_text(codec.encoded(command))
         assert type(codec.decoded(cmd.Command, json_form(form))) is type(command)

@@ -28,7 +28,7 @@ from katana450.extensions.programs.simulation import Simulation
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.tilting import UNDERSIDES
 from katana450.extensions.recording.codec import Codec
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
@@ -268,7 +268,7 @@ def test_turn_by_a_polynomial_keeps_the_lip_in_its_place() -> None:
 def test_turn_is_read_from_recordings(kept: bool) -> None:
     """Older recordings have no `axis_in_pose`: it is the axis then."""
     codec = Codec()
-    form = codec.encoded(PoseTurn, TURN)
+    form = codec.encoded(TURN)
     if not kept:
         del form["axis_in_pose"]
     read = codec.decoded(PoseTurn, form)
@@ -289,8 +289,8 @@ def test_turn_of_wrong_numbers_is_refused(name: str, wrong: FloatArray) -> None:
     with pytest.raises(InputError, match=why):
         replace(TURN, **changed)
     codec = Codec()
-    form = codec.encoded(PoseTurn, TURN)
-    form[name] = codec.encoded(FloatArray, wrong)
+    form = codec.encoded(TURN)
+    form[name] = codec.encoded(wrong)
     with pytest.raises(FormError, match=f"these fields are no PoseTurn: {why}"):
         codec.decoded(PoseTurn, form)
 

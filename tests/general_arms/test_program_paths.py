@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.source import ScriptError
@@ -87,7 +86,7 @@ def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
     writer, reader, session = Codec(), Codec(), session_of(chain)
     states: list[list[bytes]] = [[], []]
     for plan in plans(made):
-        form = json_text(writer.encoded(cmd.Follow, cmd.Follow(plan)))
+        form = json_text(writer.encoded(cmd.Follow(plan)))
         for shared in writer.shared.take_new():
             reader.shared.add(shared)
         found = reader.decoded(cmd.Follow, json_form(form))
@@ -98,7 +97,7 @@ def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
                 state = session.step(state, commands, state.t + TICK)
                 state = session.observe(state, state.setpoint, 0.0)
                 seen.append(state.setpoint.tobytes())
-                assert writer.encoded(State, state)
+                assert writer.encoded(state)
         assert found.plan.segments[0].path.joins == plan.segments[0].path.joins
     assert states[0] == states[1]
     assert len(set(states[0])) > 60

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import run_state_machine_as_test
+from msgspec import Struct
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
@@ -30,19 +31,25 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.water import water_environment
 from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
+from katana450.extensions.programs.pose_curve import TurnedCurve
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
-from katana450.extensions.recording.allowed import CLASSES
-from katana450.extensions.recording.codec import Codec, json_form, json_text
+from katana450.extensions.recording.codec import (
+    Codec,
+    form_of,
+    json_form,
+    json_text,
+    recorded_classes,
+)
 from katana450.extensions.recording.digest import Digester
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.shared_values import key_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.path import Path
-from katana450.maths.planning.plan import plan
+from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
 from katana450.maths.water.course import Course
 from katana450.maths.water.flow import WaterFlow
@@ -57,14 +64,14 @@ TWIST = np.array((0.0, 0.0, 0.1, 0.01, 0.02, 0.0))
 def copied(kind: Any, value: Any) -> Any:
     """Return ``value`` read from its text, by a reader that knows only the texts."""
     writer, reader = Codec(), Codec()
-    text = json_text(writer.encoded(kind, value))
+    text = json_text(writer.encoded(value))
     for shared in writer.shared.take_new():
         reader.shared.add(shared)
     return reader.decoded(kind, json_form(text))
 
 
-def text_of(kind: Any, value: Any) -> bytes:
-    return json_text(Codec().encoded(kind, value))
+def text_of(value: Any) -> bytes:
+    return json_text(Codec().encoded(value))
 
 
 @pytest.fixture
@@ -121,13 +128,13 @@ def test_every_command_survives_to_the_bit(
     for each in given:
         back = copied(cmd.Command, each)
         assert type(back) is type(each)
-        assert text_of(cmd.Command, back) == text_of(cmd.Command, each), each
+        assert text_of(back) == text_of(each), each
 
 
 def test_water_of_older_versions_is_read_and_other_liquids_are_refused(state: State) -> None:
     """They wrote the liquid in the cup, which counts in the digests of their states."""
     fill = cmd.Fill(1e-4)
-    form = Codec().encoded(cmd.Command, fill)
+    form = Codec().encoded(fill)
     liquid = ["water", 998.2, 0.0010016, 0.07274, [74, 148, 192]]
     assert Codec().decoded(cmd.Command, {**form, "liquid": liquid}) == fill
     honey = ["honey", 1421.0, 19.0, 0.055, [194, 116, 0]]
@@ -142,12 +149,12 @@ def test_water_of_versions_with_one_vessel_is_read() -> None:
     """They wrote the cup's fields beside those of the basin."""
     water = WaterFlow(water_environment(load_props())).begin(1e-4, np.eye(4))
     poured = MotionWithWater(water, (VesselMotion(Course(), (0.0, 0.0, 0.1)),), 0.5)
-    form = Codec().encoded(MotionWithWater, poured)
+    form = Codec().encoded(poured)
     ((cup,), (motion,)) = form["water"].pop("vessels"), form.pop("motions")
     old = form["water"] | {"cup": cup["volume"], "T_base_cup": cup["T"]}
     old |= {name: cup[name] for name in ("slosh", "film", "wetted")}
     decoded = Codec().decoded(MotionWithWater, {**form, **motion, "water": old})
-    assert text_of(MotionWithWater, decoded) == text_of(MotionWithWater, poured)
+    assert text_of(decoded) == text_of(poured)
     forms: tuple[Any, ...] = ({}, {"water": 1}, {"water": {"cup": 1}}, {"course": {}})
     for wrong in forms:
         with pytest.raises(FormError):
@@ -168,11 +175,11 @@ def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:
 
 def test_shared_value_is_written_once(follow: cmd.Follow) -> None:
     codec = Codec()
-    forms = [json_text(codec.encoded(cmd.Command, follow)) for _ in range(3)]
+    forms = [json_text(codec.encoded(follow)) for _ in range(3)]
     assert len(list(codec.shared.take_new())) == 1
     # An equal plan has the same key.
     equal = copied(cmd.Command, follow)
-    forms.append(json_text(codec.encoded(cmd.Command, equal)))
+    forms.append(json_text(codec.encoded(equal)))
     assert not list(codec.shared.take_new())
     assert len(set(forms)) == 1
     assert len(forms[0]) < 100
@@ -182,7 +189,7 @@ def test_actors_survive() -> None:
     person = Person("k", "Ada \u0001\N{ROBOT FACE} é", Role.ADMIN, "3", "::1")
     for each in (SERVER, Actor(person, CommandChannel.TCP, 3, Grounds.LEASE), None):
         back = copied(Actor | None, each)
-        assert text_of(Actor | None, back) == text_of(Actor | None, each)
+        assert text_of(back) == text_of(each)
         assert back == each
 
 
@@ -285,7 +292,7 @@ def changed(form: Any, path: tuple[Any, ...], how: str, wrong: Any) -> None:
 def mutated(data: st.DataObject, kind: Any, value: Any) -> None:
     """Change the text of ``value``; its reader returns a value or raises FormError."""
     writer, reader = Codec(), Codec()
-    form = json_form(json_text(writer.encoded(kind, value)))
+    form = json_form(json_text(writer.encoded(value)))
     texts = list(writer.shared.take_new())
     found = list(places(form))
     for _ in range(data.draw(st.integers(1, 3))):
@@ -316,7 +323,7 @@ def test_changed_text_raises_only_the_error_of_forms(data: st.DataObject) -> Non
 
 def mutated_plan(data: st.DataObject) -> None:
     writer, reader = Codec(), Codec()
-    form = writer.encoded(cmd.Command, SESSIONS["follow"])
+    form = writer.encoded(SESSIONS["follow"])
     (text,) = writer.shared.take_new()
     plan_form = json_form(text.text)
     path = data.draw(st.sampled_from(list(places(plan_form))))
@@ -376,11 +383,12 @@ def test_deep_batches_are_refused() -> None:
         Codec().decoded(cmd.Command, json_form(text))
 
 
-def test_every_allowed_class_has_a_coder_and_is_frozen() -> None:
-    codec = Codec()
-    for kind in CLASSES:
-        codec.fields(kind)
-        assert kind.__dataclass_params__.frozen, kind  # type: ignore[attr-defined]
+def test_every_class_that_is_recorded_is_frozen() -> None:
+    kinds = recorded_classes()
+    assert {State, cmd.Follow, Plan, ToolPath, ToolScrew, Linear, TurnedCurve} <= set(kinds)
+    for kind in kinds:
+        frozen = kind.__struct_config__ if issubclass(kind, Struct) else kind.__dataclass_params__  # type: ignore[attr-defined]
+        assert frozen.frozen, kind
 
 
 def test_values_of_other_classes_are_refused(state: State) -> None:
@@ -388,11 +396,11 @@ def test_values_of_other_classes_are_refused(state: State) -> None:
         pass
 
     with pytest.raises(FormError, match="has no form"):
-        Codec().encoded(cmd.Command, Other())
+        Codec().encoded(Other())
     with pytest.raises(TypeError, match="not a type of recorded values"):
-        Codec().coder(Other)
+        form_of(Other)
     with pytest.raises(FormError, match="not a number of 64 bits"):
-        Codec().encoded(State, replace(state, gripper=10**40))
+        Codec().encoded(replace(state, gripper=10**40))
 
 
 def test_kinematics_of_a_read_chain_are_the_same(follow: cmd.Follow) -> None:

@@ -96,7 +96,7 @@ def test_tick_inputs_are_those_of_the_loop(path: Path, records: list[TickRecord]
         ticks = [reader.tick(message) for message in file.messages(COMMANDS)]
     assert len(ticks) == len(records)
     for tick, made in zip(ticks, records, strict=True):
-        assert tick.t == made.t  # type: ignore[union-attr]
+        assert tick.t == made.t
         given = [type(each.command) for each in tick.submissions]  # type: ignore[union-attr]
         assert given == [type(each.command) for each in made.submissions]
         names = [each.actor.name for each in tick.submissions if each.actor]  # type: ignore[union-attr]

@@ -20,7 +20,6 @@ from katana450.extensions.recording.datasets.tool_orientation import orientation
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
 from katana450.extensions.recording.files.checking import (
-    MissingMessage,
     TickReader,
     session_for,
     state_numbers,
@@ -36,6 +35,7 @@ from katana450.extensions.recording.run_again.again_command import (
 )
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
+from katana450.extensions.recording.tick_message import TickMessage
 from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -157,7 +157,7 @@ class Recording:
                     reader.add_shared(message)
                     continue
                 tick = reader.tick(message)
-                if not isinstance(tick, MissingMessage) and tick.t >= self.start:
+                if not isinstance(tick, TickMessage) and tick.t >= self.start:
                     for each in tick.submissions:
                         giver = "" if each.actor is None else each.actor.name
                         found.append(RecordedCommand(tick.t, each.command, giver))

@@ -19,8 +19,8 @@ from katana450.arm.control.following import Following
 from katana450.arm.control.modes import Leaving, Mode, Positioning
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.extensions.recording.form_error import FormError
 from katana450.extensions.recording.former_forms import poured_content
+from katana450.extensions.recording.forms import FormError
 
 DIGEST_DIGITS = 10
 """Length of a digest. One of 10^10 states that differ has the same digest by chance. Decimal digits

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from katana450.arm.control.pouring import CUP, MotionWithWater
-from katana450.extensions.recording.form_error import FormError, shown
+from katana450.extensions.recording.forms import FormError, shown
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
 """Fields that are not written any more, each with the only form that is read."""

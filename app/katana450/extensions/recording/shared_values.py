@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from katana450.extensions.recording.form_error import FormError, shown
+from katana450.extensions.recording.forms import FormError, shown
 
 KEY_BYTES = 16
 """Length of a key [bytes]; in text it has twice as many digits."""
@@ -43,10 +43,10 @@ class SharedValues:
 
     def key(self, value: Any, text: Callable[[Any], bytes]) -> str:
         """Return the key of ``value``. ``text`` returns the form of a value that is not known."""
-        found = self._by_id.get(id(value))
+        known = self._by_id.get(id(value))
         # The value is kept, so that no other can get its identity.
-        if found is not None and found[1] is value:
-            return found[0]
+        if known is not None and known[1] is value:
+            return known[0]
         form = text(value)
         key = key_of(form)
         if key not in self._keys:
@@ -76,30 +76,3 @@ class SharedValues:
         if key not in self._values:
             self._values[key] = decode(shared.text)
         return self._values[key]
-
-
-class SharedCoder:
-    """Coder of a shared value by its key."""
-
-    json: tuple[type, ...] = (str,)
-
-    def __init__(
-        self,
-        kind: type,
-        values: SharedValues,
-        text: Callable[[Any], bytes],
-        decode: Callable[[bytes], Any],
-    ) -> None:
-        """Code values of ``kind``, kept in ``values``, by their texts."""
-        self.python: tuple[type, ...] = (kind,)
-        self._kind, self._values, self._text, self._decode = kind, values, text, decode
-
-    def encode(self, value: Any) -> Any:
-        """Return the key of ``value``."""
-        if type(value) is not self._kind:
-            raise FormError(f"a {type(value).__name__} is not a {self._kind.__name__}")
-        return self._values.key(value, self._text)
-
-    def decode(self, form: Any) -> Any:
-        """Return the value with the key ``form``."""
-        return self._values.value(self._kind.__name__, form, self._decode)

@@ -13,10 +13,11 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.sampling import MAX_STEP, sampled
-from katana450.extensions.recording.files.checking import MissingMessage, TickReader
+from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.replay import after, check_fits
+from katana450.extensions.recording.tick_message import TickMessage
 from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS, STATE
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
@@ -74,7 +75,7 @@ class RecordedStates:
                 yield message.t, state
                 continue
             tick = reader.tick(message)
-            if isinstance(tick, MissingMessage):
+            if isinstance(tick, TickMessage):
                 self.unknown += tick.ticks
                 state = None
                 continue

@@ -18,10 +18,10 @@ from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, json_form
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.replay import Checker, Verification
 from katana450.extensions.recording.shared_values import SharedText
-from katana450.extensions.recording.tick_form import TickInput, tick_input
+from katana450.extensions.recording.tick_message import TickInput, TickMessage, tick_input
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     COMMANDS,
@@ -41,13 +41,6 @@ class SharedMessage(msgspec.Struct):
     value: msgspec.Raw
 
 
-class MissingMessage(msgspec.Struct):
-    """Message in place of ticks that were lost."""
-
-    missing: str | None = None
-    ticks: int = 1
-
-
 KINDS = {topic: kind for kind, topic in SHARED_TOPICS.items()}
 
 
@@ -63,13 +56,11 @@ class TickReader:
             found = msgspec.json.decode(message.data, type=SharedMessage)
             self._codec.shared.add(SharedText(KINDS[message.topic], found.key, bytes(found.value)))
 
-    def tick(self, message: Message) -> TickInput | MissingMessage:
+    def tick(self, message: Message) -> TickInput | TickMessage:
         """Return the tick in ``message``, or the note that it is missing. Raises InputError."""
         with _placed(message):
-            missing = msgspec.json.decode(message.data, type=MissingMessage)
-            if missing.missing is not None:
-                return missing
-            return tick_input(self._codec, json_form(message.data))
+            tick: TickMessage = json_form(message.data, TickMessage)
+            return tick if tick.missing is not None else tick_input(self._codec, tick)
 
     def checkpoint(self, message: Message) -> State:
         """Return the state in ``message``. Raises InputError."""
@@ -122,7 +113,7 @@ def verify_recording(
         elif message.topic == CHECKPOINTS:
             if checker.state is None:
                 checker.checkpoint(reader.checkpoint(message))
-        elif isinstance(found := reader.tick(message), MissingMessage):
+        elif isinstance(found := reader.tick(message), TickMessage):
             checker.missing(found.ticks)
         else:
             checker.tick(found)
@@ -140,9 +131,7 @@ def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
             raise FormError("the setpoint is not a row of numbers") from None
 
 
-def gaps_in(
-    file: RecordingFile, start: float, end: float
-) -> Iterator[tuple[float, MissingMessage]]:
+def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[float, TickMessage]]:
     """Yield the gaps from ``start`` to ``end`` [s], each with its time [s].
 
     Raises InputError for a damaged recording.
@@ -151,7 +140,7 @@ def gaps_in(
         if b'"missing"' not in message.data:
             continue
         with _placed(message):
-            gap = msgspec.json.decode(message.data, type=MissingMessage)
+            gap: TickMessage = json_form(message.data, TickMessage)
         if gap.missing is not None:
             yield message.t, gap
 

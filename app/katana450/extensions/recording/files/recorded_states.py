@@ -9,9 +9,10 @@ from dataclasses import replace
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.extensions.recording.files.checking import MissingMessage, TickReader
+from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.replay import after, check_fits
+from katana450.extensions.recording.tick_message import TickMessage
 from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS
 from katana450.maths.motion.limiter import JointMotion
 
@@ -40,7 +41,7 @@ def recorded_states(
             check_fits(session, state)
         elif state is None:
             continue
-        elif isinstance(tick := reader.tick(message), MissingMessage):
+        elif isinstance(tick := reader.tick(message), TickMessage):
             state = None
             continue
         else:

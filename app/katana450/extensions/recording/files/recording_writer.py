@@ -21,10 +21,10 @@ from katana450.extensions.recording.files.script_runs import (
     attached_script,
     program_event,
 )
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.pseudonyms import Pseudonyms
 from katana450.extensions.recording.state_message import StateMessages, nanoseconds
-from katana450.extensions.recording.tick_form import tick_form
+from katana450.extensions.recording.tick_message import TickMessage, tick_message
 from katana450.extensions.recording.topics import (
     CHECKPOINTS,
     COMMANDS,
@@ -87,10 +87,10 @@ class RecordingWriter:
         try:
             content = self._digester.content(state)
             digest = self._digester.digest(state, content)
-            form = tick_form(self._codec, record, written.t, digest)
+            form = tick_message(self._codec, record, written.t, digest)
         except FormError as error:
             written.checkpoint_t = written.t = None
-            self._add(COMMANDS, t, {"t": t, "missing": str(error), "ticks": 1})
+            self._add(COMMANDS, t, TickMessage(t, missing=str(error)))
             return
         self._add_shared(t)
         self._add(COMMANDS, t, form)
@@ -110,7 +110,7 @@ class RecordingWriter:
         """Record that ``ticks`` ticks until ``t`` [s] were lost, for the reason ``why``."""
         self._number += ticks
         self._written.checkpoint_t = self._written.t = None
-        self._add(COMMANDS, t, {"t": t, "missing": why, "ticks": ticks})
+        self._add(COMMANDS, t, TickMessage(t, missing=why, ticks=ticks))
 
     def event(self, t: float, kind: str, what: Mapping[str, Any]) -> None:
         """Record an event at ``t`` [s] with further fields, which are JSON values."""
@@ -165,7 +165,7 @@ class RecordingWriter:
 
     def _add_checkpoint(self, t: float, state: State) -> None:
         try:
-            form = self._codec.encoded(State, state)
+            form = self._codec.encoded(state)
         except FormError:
             # A value without a form, whose tick was written as missing. A later state may do.
             return

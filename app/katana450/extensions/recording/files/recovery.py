@@ -29,6 +29,7 @@ from katana450.extensions.recording.files.recording_file import (
     unpacked,
 )
 from katana450.extensions.recording.files.trimming import KEY
+from katana450.extensions.recording.tick_message import TickMessage
 from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS
 from katana450.platform_support import claim_file
 
@@ -211,5 +212,5 @@ def _write(file: BinaryIO, copy: RecordingCopy, recovered: Recovered) -> None:
 
 def _gap(message: Message, ticks: int) -> Message:
     """Return the note that ``ticks`` are missing before ``message``."""
-    form = {"t": message.t, "missing": "This part of the file was damaged.", "ticks": ticks}
-    return Message(COMMANDS, message.number, message.log_time, json_text(form))
+    gap = TickMessage(message.t, missing="This part of the file was damaged.", ticks=ticks)
+    return Message(COMMANDS, message.number, message.log_time, json_text(gap))

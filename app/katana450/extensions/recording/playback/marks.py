@@ -9,7 +9,7 @@ from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.recording.codec import json_form
 from katana450.extensions.recording.files.recording_file import Message
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.live import run_events
 from katana450.extensions.recording.topics import EPISODES
 

@@ -16,7 +16,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, json_form
 from katana450.extensions.recording.files.checking import KINDS, SharedMessage
 from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
-from katana450.extensions.recording.form_error import FormError
+from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.shared_values import SharedText
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -230,7 +230,6 @@ class Describer:
 
     def __init__(self) -> None:
         self._codec = Codec()
-        self._fields = self._codec.fields(State)
 
     def add_solid(self, message: Message) -> None:
         """Remember the solid in ``message``, to which objects refer. Raises InputError."""
@@ -247,10 +246,9 @@ class Describer:
         """Return that of the complete state in ``message``. Raises InputError."""
         try:
             form = json_form(message.data)["state"]
-            objects: tuple[SceneObject, ...] = self._fields["objects"].decode(
-                form.get("objects", [])
-            )
-            poured: MotionWithWater | None = self._fields["poured"].decode(form.get("poured"))
+            codec, found = self._codec, form.get("objects", [])
+            objects: tuple[SceneObject, ...] = codec.field(State, "objects", found)
+            poured: MotionWithWater | None = codec.field(State, "poured", form.get("poured"))
         except (FormError, TypeError, KeyError, AttributeError) as error:
             raise InputError(
                 f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
