@@ -136,20 +136,6 @@ def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
     ]
 
 
-def test_problem_with_many_addresses_is_one_entry(caplog: pytest.LogCaptureFixture) -> None:
-    async def act() -> int:
-        async with _accepting() as (acceptor, server):
-            crowd = [await _connected(server, f"127.0.1.{n}") for n in range(1, WAITING + 20)]
-            for each in crowd:
-                each.close()
-            return len(acceptor._logged)
-
-    with caplog.at_level(logging.WARNING):
-        assert asyncio.run(act()) == 1
-    (record,) = caplog.records
-    assert record.getMessage() == "Too many connections wait; closed the oldest of 127.0.1.1."
-
-
 @pytest.mark.parametrize("of", [["127.0.0.1"], [f"127.0.1.{n}" for n in range(1, 30)]])
 def test_connections_beyond_the_rate_are_opened_once_they_send(
     of: list[str], monkeypatch: pytest.MonkeyPatch

@@ -21,7 +21,7 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.main import main
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, ROOT, AppServer, free_port
-from tests.gateway.client import HOUR, enter
+from tests.gateway.client import HOUR
 from tests.gateway.virtual import VirtualServer
 
 
@@ -151,14 +151,6 @@ def test_access_commands_give_list_and_revoke(
     assert main(["access", "revoke", known[0], *options]) == 1
     with pytest.raises(SystemExit):
         main([*give_anna[:4], "--for", "forever", *options])
-
-
-@pytest.mark.long
-def test_public_server_without_links_is_well() -> None:
-    command = (sys.executable, "-m", "katana450", "serve", "--host", "0.0.0.0", "--port", "{port}")
-    with AppServer((*command, "--insecure")) as server:
-        assert enter(server.url)
-        check_health(server.pid, f"{server.url} is well.")
 
 
 def check_health(process: int, said: str, status: int = 0) -> None:

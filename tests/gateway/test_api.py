@@ -137,13 +137,6 @@ def test_single_requests_can_be_posted(local: VirtualServer) -> None:
     assert local.post(do="release_lease")[0] == 200
 
 
-def test_page_of_another_site_cannot_send_requests_as_a_program(local: VirtualServer) -> None:
-    for origin in ("https://evil.example", "null"):
-        names = {"X_Program": "a-test-that-posts", "Origin": origin}
-        assert local.ask("/api/v1/stop", data=b"", **names)[0] == 403
-    assert local.state().stopped is None
-
-
 def test_openapi_lists_every_route(local: VirtualServer) -> None:
     described = json.loads(local.ask("/api/v1/openapi.json")[2])
     for path in described["paths"]:

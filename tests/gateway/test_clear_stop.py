@@ -10,15 +10,13 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import ActiveStop, Finding, Reason, State
+from katana450.arm.control.state import ActiveStop, State
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import LeaseError
 from katana450.server.service import status
-from katana450.server.service.event_log import EventLog
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, key_of, presser_of
@@ -126,21 +124,6 @@ def test_copy_of_the_press_of_an_unknown_page_names_it(table: ClearingTable) -> 
         names = [each.cause.by for each in table.stoppable.sent[sent:]]
         assert names == ([] if stopped.why == table.hub.stopped.why else ["Window 9"])
         assert table.hub.stopped.cause.at == 5.0
-
-
-def test_lines_of_the_log_name_the_page_of_the_port_of_stop(table: ClearingTable) -> None:
-    page, key = table.join(PAGES[0]), "session/unknown"
-    entries = [
-        LogEntry(float(each), Finding(Reason.STOPPED), True, pressed_on_its_port(whose), "Stop")
-        for each, whose in enumerate((page.person.key, key))
-    ]
-    log = EventLog()
-    log.follow(entries, table.hub._known.named)
-    assert [line.who for line in log.lines] == [page.person.name, "Somebody"]
-
-
-def pressed_on_its_port(key: str) -> Actor:
-    return Actor(Person(key, "Somebody", Role.ADMIN), CommandChannel.PAGE, grounds=Grounds.SAFETY)
 
 
 def stops(table: ClearingTable) -> list[Note]:

@@ -241,24 +241,6 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
     asyncio.run(slide())
 
 
-def test_slider_of_a_spectator_has_no_effect(table: Table, viser_server: viser.ViserServer) -> None:
-    driver, other = (table.join(page, Role.OPERATOR) for page in PAGES)
-    table.hub.acquire(driver)
-
-    async def slide() -> None:
-        hooked = Hooked(table, viser_server, other)
-        slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
-        listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
-        before = len(internals.sent(viser_server))
-        hooked.receive()
-        await hooked.handle(internals.value_change(slider, 0.5))
-        assert (table.arm.commands, slider.value) == ([], 0.0)
-        assert len(internals.sent(viser_server)) == before
-        assert hooked.refusals == ["Window 1 holds the arm: ask for it."]
-
-    asyncio.run(slide())
-
-
 def test_event_of_a_browser_without_a_gesture_has_no_actor(
     table: Table, viser_server: viser.ViserServer
 ) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from typing import cast
 from unittest.mock import Mock
 
@@ -14,7 +13,6 @@ from katana450.arm.control.state import State
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
-from katana450.server.service import derived
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.derived import once
@@ -47,17 +45,6 @@ def test_branches_are_computed_once_per_snapshot() -> None:
     arm.snapshot = _snapshot()
     Dispatcher(hub).query("branches")
     assert len(computed) == 2
-
-
-def test_cached_values_are_dropped_with_their_snapshot() -> None:
-    gc.collect()
-    snapshot = _snapshot()
-    before = len(derived._FOUND)
-    assert once(snapshot, "a", lambda: 1) == once(snapshot, "a", lambda: 2) == 1
-    assert len(derived._FOUND) == before + 1
-    del snapshot
-    gc.collect()
-    assert len(derived._FOUND) == before
 
 
 def test_error_is_not_cached() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.client import Client, RefusedError
+from katana450.client import Client
 from katana450.server.api import answers, requests
 from tests.gateway.virtual import VirtualServer
 
@@ -58,26 +58,3 @@ def test_offered_detour_is_taken_by_go(program: Client) -> None:
     assert distance(arrived) < 1e-6
     assert arrived.branch == state.branch
     assert arrived.detour is None
-
-
-def test_go_is_refused_without_an_offer_and_after_a_change(program: Client) -> None:
-    program.go(requests.Home())
-    with pytest.raises(RefusedError, match="No detour is offered"):
-        program.ask(requests.Go())
-    state = held_at_the_gap(program)
-    program.ask(requests.Hold())
-    with pytest.raises(RefusedError, match="No detour is offered"):
-        program.ask(requests.Go())
-    assert program.query(answers.State).q == state.q
-
-
-def test_stop_withdraws_the_offer(program: Client) -> None:
-    held_at_the_gap(program)
-    program.ask(requests.Stop())
-    wait_for(program, lambda state: state.stopped is not None)
-    with pytest.raises(RefusedError, match="clear the stop first"):
-        program.ask(requests.Go())
-    program.clear_stop()
-    with pytest.raises(RefusedError, match="No detour is offered"):
-        program.ask(requests.Go())
-    assert program.query(answers.State).detour is None

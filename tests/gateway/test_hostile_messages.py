@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import msgspec
-import pytest
 from websockets.exceptions import ConnectionClosed
 
-from tests.browser.server import BARE_APP, AppServer
+from tests.browser.server import AppServer
 from tests.gateway.client import SUBPROTOCOL, UPRIGHT, Peer, enter, opened, page_name, websocket
 from tests.gateway.hostile import BRIEF, moves_the_arm, peers
 from tests.gateway.virtual import VirtualServer
@@ -149,33 +148,6 @@ def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
     assert "Dropped a GuiUpdateMessage" in server.output
 
 
-def test_attack_without_the_guard_would_do_harm() -> None:
-    """Without the guard, viser lets the same message disable a control for all browsers."""
-
-    @asynccontextmanager
-    async def bare_peers(url: str) -> AsyncIterator[tuple[Peer, Peer]]:
-        async with (
-            websocket(url, "/", subprotocols=[SUBPROTOCOL]) as bad,
-            websocket(url, "/", subprotocols=[SUBPROTOCOL]) as good,
-        ):
-            pair = Peer(bad), Peer(good)
-            for peer in pair:
-                await peer.learn()
-            yield pair
-
-    async def attack(url: str) -> list[dict[str, Any]]:
-        async with bare_peers(url) as (bad, good):
-            await good.set("Axis 1", value=10.0)
-            assert await good.listen()
-            await bad.set("Axis 1", removed=True)
-            await good.listen()
-            await good.set("Axis 1", value=20.0)
-            return await good.listen()
-
-    with AppServer(BARE_APP) as bare:
-        assert asyncio.run(attack(bare.url)) == []
-
-
 def test_invalid_request_changes_nothing(local: VirtualServer) -> None:
     texts = [
         "",
@@ -211,18 +183,3 @@ def test_invalid_request_changes_nothing(local: VirtualServer) -> None:
         await watching.close()
 
     local.run(attack())
-
-
-@pytest.mark.long
-def test_browser_with_false_acknowledgements_is_closed(server: AppServer) -> None:
-    async def lie(count: Any) -> int | None:
-        async with opened(server.url) as (bad, _):
-            await bad.say(type="Seen", count=count)
-            with suppress(ConnectionClosed):
-                await bad.listen()
-            return bad.socket.close_code
-
-    for count in (-1, 10**6, 2**60):
-        assert asyncio.run(lie(count)) == 1008
-    # A value that is not a count is an invalid message.
-    assert asyncio.run(lie("all")) is None

@@ -349,17 +349,6 @@ def test_page_name_of_another_session_is_another_window(table: Table) -> None:
         table.touch(key_of(stranger, PAGES[0]))
 
 
-def test_jog_continues_while_renewed_and_then_ends(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    forward = (0.2, 0.0, 0.0, 0.0, 0.5)
-    for _ in range(5):
-        table.hub.move(driver, cmd.Jog(np.array(forward), JogFrame.TOOL))
-        table.wait(0.04, driver)
-    assert table.arm.jogs == [(forward, JogFrame.TOOL)] * 5
-    table.hub.move(driver, cmd.SpeedScale(0.25))
-    assert table.arm.fraction == 0.25
-
-
 def test_released_jog_is_ended_explicitly(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.hub.move(driver, cmd.Jog(np.array((0.2, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE))

@@ -16,7 +16,7 @@ from katana450.client import Client, connect
 from katana450.client.files import LostError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
-from tests.browser.server import APP, ATTENTIVE_APP, AppServer
+from tests.browser.server import APP, AppServer
 from tests.gateway.postures import FAR
 
 pytestmark = pytest.mark.skipif(
@@ -72,24 +72,6 @@ def check_restart(server: AppServer) -> None:
         assert arm.query(answers.State).q == state.q
         there = arm.joints(np.deg2rad((10.0, -68.0, 85.0, 8.0, 0.0)))
         assert there.status == "ok"
-
-
-@pytest.mark.long
-def test_frozen_front_end_causes_a_stop_in_time() -> None:
-    with AppServer(ATTENTIVE_APP) as server, connect(server.url, "Driver") as arm:
-        before = under_way(arm)
-        front = server.front
-        os.kill(front, signal.SIGSTOP)
-        # Shorter than the time after which the supervisor ends it.
-        time.sleep(0.5)
-        os.kill(front, signal.SIGCONT)
-        # Messages that arrived meanwhile are read first.
-        while (state := arm.query(answers.State)).stopped is None:
-            time.sleep(0.02)
-        # A quarter of a second of silence, and the braking distance.
-        assert state.q[0] - before.q[0] < 2.2 * 0.5 + 1.0
-        assert state.q[0] < FAR[0] - 0.2
-        assert "STOP" in server.output
 
 
 def may_have_real_time() -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ import yourdfpy
 
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import DescribedRobot, find_robot
-from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program
@@ -105,43 +103,6 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     assert "Joints only." in described.notes[-1]
 
 
-def test_value_beyond_a_limit_is_clamped_and_reported_in_its_unit(
-    program: Client, robot: Robot
-) -> None:
-    slide = robot.joint_group.slides.index(True)
-    there = program.go(requests.Joint(axis=slide + 1, value=2.0))
-    assert there.q[slide] == robot.joint_group.upper[slide]
-    (finding,) = there.findings
-    assert (finding.reason, finding.unit, finding.axis) == ("slide limit", "m", slide + 1)
-    assert finding.amount == robot.joint_group.upper[slide]
-    assert there.why.endswith(" mm.")
-
-
-def test_stop_pause_and_lease_are_those_of_an_arm(
-    local: VirtualServer, program: Client, robot: Robot
-) -> None:
-    program.ask(requests.Speed(value=0.05))
-    far = np.where(np.arange(robot.joint_group.n) == 0, robot.joint_group.lower, 0.0)
-    program.ask(requests.Joints(q=far.tolist()))
-    with local.connect("Other") as other, pytest.raises(RefusedError, match="Test holds"):
-        other.ask(requests.Home())
-    program.ask(requests.Pause())
-    while (now := program.query(answers.State)).moving:
-        time.sleep(0.02)
-    assert now.status == "paused"
-    assert now.q[0] != far[0]
-    program.ask(requests.Resume())
-    with local.connect("Other") as other:
-        other.ask(requests.Stop())
-    while (now := program.query(answers.State)).moving:
-        time.sleep(0.02)
-    assert now.status == "stopped"
-    assert now.stopped == "Other pressed STOP."
-    assert now.q[0] != far[0]
-    with pytest.raises(RefusedError, match="clear the stop first"):
-        program.joints(far)
-
-
 def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
     slide = robot.joint_group.names[robot.joint_group.slides.index(True)]
     axis = robot.axis(robot.joints[slide])
@@ -153,15 +114,3 @@ def test_its_vrml_world_has_names(program: Client, robot: Robot) -> None:
     world = {node.node: node for node in program.query(answers.World).nodes}
     assert world["link1_look"].fields[0].value == 1.0
     program.ask(requests.Set(node="link1_look", field="whichChoice", value=None))
-
-
-@pytest.mark.long
-def test_undrivable_robot_is_refused_at_start(
-    tmp_path: Path, path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    locked = tmp_path / "locked.urdf"
-    locked.write_text(path.read_text().replace('type="prismatic"', 'type="planar"'))
-    assert main(["serve", "--port", "0", "--urdf", str(locked)]) == 1
-    assert "is planar" in capfd.readouterr().err
-    assert main(["serve", "--port", "0", "--urdf", str(path), "--tool", "link3"]) == 1
-    assert "link3" in capfd.readouterr().err

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from katana450.assembly.robot_session import DescribedRobot, find_robot
-from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
@@ -68,32 +65,6 @@ def test_table_is_named_at_the_start_and_stops_a_joint(
     assert STOP - 1e-7 <= height(robot) <= STOP + SHORT
 
 
-def test_object_stops_a_joint_and_the_goal_is_reached_without_it(robot: Client) -> None:
-    place(robot)
-    try:
-        found = end(robot.ask(requests.Joint(axis=1, value=-0.29, wait=30)))
-        assert found.how == "contact"
-        assert found.why.startswith("Beam and block are ")
-        assert 0.1 + STOP - 1e-7 <= height(robot) <= 0.1 + STOP + SHORT
-    finally:
-        robot.ask(requests.Remove(name="block"))
-    found = end(robot.ask(requests.Joint(axis=1, value=-0.29, wait=30)))
-    assert (found.how, robot.query(answers.State).q[0]) == ("reached", -0.29)
-
-
-def test_object_stops_a_swing(robot: Client) -> None:
-    robot.ask(requests.Joint(axis=1, value=-0.29, wait=30))
-    found = end(robot.ask(requests.Joint(axis=2, value=2.0, wait=30)))
-    assert found.how == "contact"
-    assert found.why.startswith("Beam and crate are ")
-    assert 0.5 < robot.query(answers.State).q[1] < 1.5
-    # A stream of joints meets it in the same way.
-    robot.ask(requests.Joint(axis=2, value=0.5, wait=30))
-    for number in range(60):
-        robot.ask(requests.Servo(q=[-0.29, 0.5 + 0.02 * number]))
-    assert robot.query(answers.State).q[1] < 1.5
-
-
 def test_object_is_attached_undone_and_saved_with_the_scene(
     local: VirtualServer, robot: Client
 ) -> None:
@@ -109,21 +80,3 @@ def test_object_is_attached_undone_and_saved_with_the_scene(
     robot.ask(requests.Undo())
     assert {each.name for each in robot.query(answers.Objects).objects} == {"crate", "block"}
     robot.ask(requests.Remove(name="block"))
-
-
-def test_new_object_stands_on_the_table(robot: Client) -> None:
-    robot.ask(requests.Place(name="ball", shape=requests.Shape.SPHERE, size=[0.03]))
-    ball = next(each for each in robot.query(answers.Objects).objects if each.name == "ball")
-    robot.ask(requests.Remove(name="ball"))
-    assert np.array(ball.T)[2, 3] == pytest.approx(-0.3, abs=1e-6)
-
-
-@pytest.mark.long
-def test_scene_with_joints_is_refused_at_the_start(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    robot, scene = tmp_path / "column.urdf", tmp_path / "scene.yaml"
-    robot.write_text(column())
-    scene.write_text("scene: 1\njoints: [0, 0]\nobjects: []\n")
-    assert main(["serve", "--port", "0", "--urdf", str(robot), "--scene", str(scene)]) == 1
-    assert "driven joint by joint" in capfd.readouterr().err

@@ -16,16 +16,10 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
-from katana450.arm.runtime.mailbox import Mailbox
 from katana450.client import Client, RefusedError
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
-from katana450.server.api.program_requests import (
-    Breakpoints,
-    Program,
-    ProgramOrder,
-    Steer,
-)
+from katana450.server.api.program_requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.server.service import pending_answer, serialize
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
@@ -189,15 +183,6 @@ def wait_until_planned(program: Client) -> None:
         time.sleep(0.02)
 
 
-def test_second_stop_does_not_refuse_the_first(session: Session) -> None:
-    mailbox = Mailbox(session.check)
-    mailbox.put(cmd.Home())
-    mailbox.put(cmd.Stop())
-    mailbox.put(cmd.Stop())
-    drained = mailbox.drain()
-    assert (drained.dropped, drained.tickets) == ([1], [[2, 3]])
-
-
 def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     gone, turned = cmd.MoveObject("ball", position=np.zeros(3)), cmd.SetJoint(4, 30.0)
@@ -229,12 +214,6 @@ def test_server_names_the_refused_parts_of_a_request(local: VirtualServer) -> No
     assert answer["refused"] == [
         {"part": 2, "command": "move_object", "why": "There is no 'ball'."}
     ]
-
-
-def test_request_without_a_command_has_no_outcome(program: Client) -> None:
-    answer = done(program.ask(requests.ReleaseLease()))
-    assert (answer.outcome, answer.ticket) == (None, None)
-    program.clear_stop()
 
 
 def test_every_channel_reports_the_outcome(local: VirtualServer) -> None:

@@ -24,9 +24,6 @@ steps:
   - joints: [-100, -60, 85, 8, 0]
 """
 
-BRAKING = 2.0
-"""Time [s] to come to rest, and to query the state on a busy machine."""
-
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:

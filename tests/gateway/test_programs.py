@@ -74,22 +74,6 @@ def test_program_runs_to_its_end_under_its_own_name(arm: Client) -> None:
     assert np.abs(np.array(after.q) - READY).max() < 1e-9
 
 
-def test_stop_ends_a_running_program(arm: Client) -> None:
-    run(arm)
-    wait(arm, lambda program: program.line == 3 and program.fraction > 0.3)
-    arm.ask(requests.Stop())
-    program = wait(arm, lambda program: program.status != "running", 1.0)
-    assert program.status == "stopped"
-    assert "STOP" in program.why
-    # The brake takes about half a second.
-    time.sleep(1.0)
-    state = arm.query(answers.State)
-    assert not state.moving
-    assert np.abs(state.qd).max() == 0.0
-    with pytest.raises(RefusedError, match="clear the stop first"):
-        arm.ask(Steer(order=ProgramOrder.RUN))
-
-
 def test_program_is_paused_stepped_and_ended(arm: Client) -> None:
     run(arm, ProgramOrder.STEP)
     assert wait(arm, lambda program: program.status == "paused").line == 4
@@ -111,15 +95,6 @@ def test_lease_can_be_taken_from_a_program(local: VirtualServer, arm: Client) ->
         program = wait(boss, lambda program: program.status != "running", 1.0)
         assert program.status == "stopped"
         assert "taken" in program.why
-
-
-def test_program_ends_when_its_owner_leaves(local: VirtualServer) -> None:
-    with local.connect("Guest") as guest:
-        run(guest)
-    with local.connect("Watcher") as watcher:
-        program = wait(watcher, lambda program: program.status != "running", 2.0)
-        assert program.status == "stopped"
-        assert "left" in program.why
 
 
 def test_errors_are_reported_with_their_lines(arm: Client) -> None:

@@ -153,18 +153,6 @@ def test_mesh_is_placed_fixed_to_the_hand_and_touched(
     assert list(objects(arm)) == ["cup", "gate", "ring"]
 
 
-@pytest.mark.parametrize(
-    "kind", [*(pytest.param(kind, marks=pytest.mark.long) for kind in ("dae", "3mf")), "off"]
-)
-def test_file_read_by_a_library_is_uploaded(arm: Client, tmp_path: Path, kind: str) -> None:
-    path = tmp_path / f"box.{kind}"
-    made = trimesh.creation.box((40.0, 60.0, 80.0)).export(file_type=kind)
-    path.write_bytes(made.encode() if isinstance(made, str) else made)
-    mesh = arm.upload(path, "mm")
-    assert (mesh.name, mesh.triangles) == ("box", 12)
-    assert sorted(mesh.size) == pytest.approx([0.04, 0.06, 0.08], abs=1e-6)
-
-
 def test_scene_is_saved_and_loaded_whole_or_not_at_all(arm: Client) -> None:
     data = arm.save_scene()
     before = objects(arm)

@@ -159,22 +159,6 @@ def test_server_checks_the_scene_of_a_script(
     assert program.why.startswith(why)
 
 
-@pytest.mark.parametrize(
-    ("condition", "end", "why"),
-    [
-        ("gripper: {at_most: 1}", "done", ""),
-        ("held: cup", "failed", "Line 2, wait for cup in the hand: The condition did not hold"),
-    ],
-)
-def test_server_waits_for_a_condition(
-    server: VirtualServer, condition: str, end: str, why: str
-) -> None:
-    text = f"steps:\n  - wait_for: {{{condition}, timeout: 0.5}}\n  - nudge: {{axis: 5, by: 5}}\n"
-    program = run_to_the_end(server, text)
-    assert program.status == end
-    assert program.why.startswith(why)
-
-
 def test_server_reports_the_steps_that_were_not_taken(server: VirtualServer) -> None:
     text = (
         "steps:\n  - if:\n      gripper: {at_least: 1}\n      then: [home, {wait: 9}]\n"

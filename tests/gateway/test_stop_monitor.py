@@ -4,37 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import math
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
 from katana450.server.service.stop_path import StopPath
 from katana450.server.web import stop_monitor
 from katana450.server.web.stop_monitor import watch_stop_path
-from tests.browser.server import AppServer, ServerError
-from tests.gateway.client import ask
-
-# Ends the thread that reads the pipe to the arm, like an unexpected error, once a file exists.
-# Every process of the server imports this file.
-FATAL = """
-import pathlib
-import sys
-import threading
-from multiprocessing.connection import Connection
-from katana450.cli.main import main
-receive = Connection.recv
-def checked(pipe):
-    message, fuse = receive(pipe), pathlib.Path(sys.argv[2])
-    if threading.current_thread().name == "stop pipe" and fuse.exists():
-        fuse.unlink()
-        raise SystemExit
-    return message
-Connection.recv = checked
-if __name__ == "__main__":
-    sys.exit(main(["serve", "--port", sys.argv[1]]))
-"""
 
 
 async def problem_with(answer: bytes, arm_age: float) -> str:
@@ -76,24 +51,3 @@ def test_port_serves_stop_only_if_it_reaches_the_arm(
     monkeypatch.setattr(stop_monitor, "CHECK_EVERY", 0.01)
     problem = asyncio.run(problem_with(answer, arm_age))
     assert bool(problem) != serves
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform != "linux", reason="finds the server's processes by their names")
-def test_stop_process_that_no_longer_reads_from_the_arm_is_replaced(tmp_path: Path) -> None:
-    app, fuse = tmp_path / "fatal.py", tmp_path / "fuse"
-    app.write_text(FATAL, encoding="utf-8")
-    with AppServer((sys.executable, str(app), "{port}", str(fuse))) as server:
-        killed = server.stop_process
-        fuse.touch()
-        end = time.monotonic() + 20.0
-        while True:
-            try:
-                if server.stop_process != killed and ask(f"{server.stop_url}/health")[0] == 200:
-                    break
-            except (ServerError, OSError):
-                pass
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        assert "The process of STOP has not answered" in server.output
-        assert "STOP is not served on port" in server.output

@@ -205,17 +205,6 @@ def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
         assert state.q[0] - before.q[0] < 1.5
 
 
-@pytest.mark.long
-def test_stop_of_a_frozen_arm_is_requested_and_then_executed() -> None:
-    with AppServer(APP) as server, connect(server.url, "Driver") as program:
-        under_way(program)
-        with server.frozen(server.arm):
-            time.sleep(0.5)
-            assert stop(server.stop_url, X_Name="Vera") == (202, {"stop": "requested", "why": ""})
-            assert ask(f"{server.stop_url}/health")[0] == 503
-        until(lambda: program.query(answers.State).stop == "confirmed")
-
-
 def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> None:
     with AppServer(APP) as server, connect(server.url, "Driver") as program:
         program.ask(requests.Speed(value=0.1))
@@ -275,25 +264,6 @@ def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> 
         assert (status, answer["stop"]) == (200, "confirmed")
         cookie = enter(server.url, viewer)
         assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
-
-
-def test_flood_of_presses_delays_no_other_stop(server: AppServer, program: Client) -> None:
-    async def flood(done: asyncio.Event) -> None:
-        while not done.is_set():
-            await asyncio.to_thread(stop, server.stop_url, X_Name="Flooder")
-
-    async def act() -> None:
-        done = asyncio.Event()
-        floods = [asyncio.create_task(flood(done)) for _ in range(3)]
-        await asyncio.sleep(0.2)
-        for _ in range(3):
-            status, answer = await asyncio.to_thread(stop, server.stop_url, X_Name="Vera")
-            assert (status, answer["stop"]) == (200, "confirmed")
-        done.set()
-        await asyncio.gather(*floods)
-
-    under_way(program)
-    asyncio.run(act())
 
 
 def test_client_stops_on_all_paths_and_clears_when_possible(

@@ -9,7 +9,6 @@ import pytest
 
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from katana450.server.api import program_requests as script_requests
 from tests.gateway.virtual import VirtualServer
 
 
@@ -136,19 +135,6 @@ def test_undo_that_began_before_a_stop_is_refused(program: Client) -> None:
     with pytest.raises(RefusedError, match="Do it again"):
         program.ask(requests.Undo(revocations=before))
     np.testing.assert_allclose(state(program).q, moved.q, atol=1e-6)
-
-
-def test_program_from_before_a_stop_is_refused(program: Client) -> None:
-    before = state(program).revocations
-    program.ask(requests.Stop())
-    program.clear_stop()
-    for request in (
-        script_requests.Program(text="steps: [home]", revocations=before),
-        script_requests.Steer(order=script_requests.ProgramOrder.RUN, revocations=before),
-    ):
-        with pytest.raises(RefusedError, match="Do it again"):
-            program.ask(request)
-    assert state(program).program is None
 
 
 def test_undo_does_not_leap_over_a_stream(program: Client) -> None:

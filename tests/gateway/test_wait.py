@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.silence import SilenceProfile
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
@@ -378,24 +376,3 @@ def test_end_of_a_program_that_does_not_reach_its_end_is_honest(
     status, done = local.post(do="steer", order="run", wait=30)
     assert status == 409
     assert "line 3" in json.dumps(done)
-
-
-def test_without_wait_the_program_falls_silent(local: VirtualServer, watcher: Client) -> None:
-    slow(watcher)
-    assert local.post(do="joints", q=THERE.tolist())[0] == 200
-    now = wait_for(watcher, lambda now: now.stopped is not None)
-    assert now.stopped == "Program fell silent while the arm moved."
-    wait_for(watcher, lambda now: now.holder is None)
-
-
-def test_simulated_arm_names_the_silence_too(described: DescribedRobot) -> None:
-    with (
-        VirtualServer(described, profile=SilenceProfile.SIMULATION) as local,
-        local.connect("Watcher") as watcher,
-    ):
-        slow(watcher)
-        assert local.post(do="joints", q=THERE.tolist())[0] == 200
-        paused = wait_for(watcher, lambda now: now.status == "paused")
-        assert "the driver fell silent" in paused.why
-        stopped = wait_for(watcher, lambda now: now.stopped is not None, 8.0)
-        assert stopped.stopped == "Program was silent for 5 s."
