@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    precondition,
-    rule,
-    run_state_machine_as_test,
-)
+from hypothesis.stateful import precondition, rule, run_state_machine_as_test
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.branch_options import current_target

@@ -11,12 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, Verdict
 from katana450.arm.control.stop_cause import WATCHDOG, StopCause, pressed
-from katana450.arm.control.stopping import (
-    HOLD_OFF,
-    REPORTED_PRESSES,
-    clear_refusal,
-    joined,
-)
+from katana450.arm.control.stopping import HOLD_OFF, REPORTED_PRESSES, clear_refusal, joined
 
 TICK = 0.01
 ANNA = pressed("Anna", "a", "one", 1.0)

@@ -12,14 +12,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.chain_urdf import chain_urdf
-from tests.general_arms.published_arms import (
-    KR_6,
-    LEVEL,
-    OPENMANIPULATOR_X,
-    PANDA,
-    TOOL,
-    UR5E,
-)
+from tests.general_arms.published_arms import KR_6, LEVEL, OPENMANIPULATOR_X, PANDA, TOOL, UR5E
 
 FINGER = 0.02
 """[m] Width of a finger."""

@@ -24,14 +24,7 @@ from katana450.settings import Settings
 from tests.general_arms import singular_postures as singular
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.driven import begun, pose, session_of, settled
-from tests.general_arms.published_arms import (
-    IIWA_7,
-    KR_6,
-    PANDA,
-    PINCHERX_100,
-    PUMA_560,
-    UR5E,
-)
+from tests.general_arms.published_arms import IIWA_7, KR_6, PANDA, PINCHERX_100, PUMA_560, UR5E
 
 ARMS = {"UR5e": UR5E, "KR 6": KR_6, "Puma 560": PUMA_560, "Panda": PANDA, "iiwa": IIWA_7}
 ALL = ARMS | {"PincherX-100": PINCHERX_100}

@@ -31,13 +31,7 @@ from tests.general_arms.programs import (
     point,
     program,
 )
-from tests.general_arms.published_arms import (
-    KR_6,
-    OPENMANIPULATOR_X,
-    PANDA,
-    PUMA_560,
-    UR5E,
-)
+from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, PUMA_560, UR5E
 
 
 @every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"KR 6": KR_6, "Panda": PANDA})

@@ -33,13 +33,7 @@ from tests.general_arms.programs import (
     point,
     program,
 )
-from tests.general_arms.published_arms import (
-    KR_6,
-    OPENMANIPULATOR_X,
-    PANDA,
-    SKEWED_6,
-    UR5E,
-)
+from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, SKEWED_6, UR5E
 
 
 @every(SOME, REST)

@@ -16,14 +16,7 @@ from dataclasses import dataclass
 
 from katana450 import tolerances
 from katana450.maths.kinematics.turns import wrapped
-from katana450.maths.water.vectors import (
-    Vector,
-    cross,
-    dot,
-    norm,
-    perpendicular,
-    sub,
-)
+from katana450.maths.water.vectors import Vector, cross, dot, norm, perpendicular, sub
 
 EXACT = 1e-9
 """[m, or the unit of the plane's d] Misfit up to which an answer counts as exact."""

@@ -7,15 +7,8 @@ import pytest
 
 from katana450.arm.control.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.replies import FirmwareError
-from katana450.extensions.real_arm.codec.requests import (
-    More,
-    MotorFlag,
-    SendSplines,
-)
+from katana450.extensions.real_arm.codec.requests import More, MotorFlag, SendSplines
 from tests.real_arm.paper_arm import ENDS, JOINTS, MAP, Conversation, sway
-
-COLLISION = FirmwareError(ord("H"), -10, 3, "StopperThread: collision on axis: 3")
 
 
 def test_gripper_moves_by_targets_and_not_by_polynomials(talk: Conversation) -> None:

@@ -18,9 +18,6 @@ from katana450.maths.water.units import GRAVITY
 Step = tuple[FloatArray, FloatArray]
 """Pose (4, 4) [m] of the cup, and acceleration (3,) [m/s^2] of its middle, in the base frame."""
 
-NO_ACCELERATION = np.zeros(3)
-"""[m/s^2] Zero acceleration of the cup."""
-
 
 def placed(x: float, y: float, z: float, tilt: float = 0.0) -> FloatArray:
     """Return the pose of a cup with the middle of its foot at ``x``, ``y``, ``z`` [m].

@@ -11,13 +11,7 @@ from hypothesis import strategies as st
 
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.slosh import (
-    FIRST_MODE,
-    REST_TOLERANCE,
-    Slosh,
-    damping,
-    frequency,
-)
+from katana450.maths.water.slosh import FIRST_MODE, REST_TOLERANCE, Slosh, damping, frequency
 from katana450.maths.water.units import GRAVITY
 from tests.geometry.strategies import repeatable
 from tests.water.motions import steady_acceleration
