@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from katana450.extension import extensions
+from katana450.extension import extensions, load
 from katana450.extensions.api_description.messages import documentation, kinds
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Request, tag_of
@@ -208,10 +208,8 @@ def page() -> str:
 
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
     """Return the requests of extensions, by the name of the extension, as a server has them."""
-    serve = {each.name: each.serve for each in extensions() if each.serve is not None}
-    runners = {name: part.runner().request_types for name, part in serve.items() if part.runner}
-    handlers = {name: part.handler().request_types for name, part in serve.items() if part.handler}
-    return runners | handlers
+    classes = {each.name: each.runner or each.handler for each in extensions()}
+    return {name: load(target).request_types for name, target in classes.items() if target}
 
 
 def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:

@@ -1,23 +1,20 @@
-"""Test found, missing and added extensions with the command line in subprocesses."""
+"""Test built-in and added extensions with the command line in subprocesses."""
 
 from __future__ import annotations
 
-import json
+import dataclasses
 import os
 import subprocess
 import sys
-import urllib.error
 import urllib.request
 from pathlib import Path
 
 import pytest
 
-from katana450.client import RefusedError, connect
-from katana450.extension import BUILT_IN, extensions
-from katana450.server.api import answers, requests
+from katana450.extension import Extension, extensions, load
 from katana450.server.api.fields import ROOT as ROOT_PATH
-from tests.browser.server import APP, AppServer, free_port
-from tests.extensions.environments import distribution, without, write_blocking
+from tests.browser.server import AppServer, free_port
+from tests.extensions.environments import distribution
 
 ROOT = Path(__file__).resolve().parents[2]
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
@@ -39,7 +36,7 @@ SERVED = """
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 
-from katana450.extension import Extension, ServeExtension
+from katana450.extension import Extension
 
 def add_options(parser):
     parser.add_argument("--degrees", type=int, default=20)
@@ -53,16 +50,15 @@ def routes(context):
 def view_layer(options):
     assert options.degrees == 7
 
-SERVE = ServeExtension(add_options, view_layer=view_layer, routes=routes)
-EXTENSION = Extension("weather", serve=SERVE)
+EXTENSION = Extension(
+    "weather", serve_options=add_options, view_layer=view_layer, routes="station:routes"
+)
 """
 
 
-def katana450(*options: str, folder: Path | None = None, blocked: str = "", text: str = "") -> str:
+def katana450(*options: str, folder: Path | None = None, text: str = "") -> str:
     """Return exit status, a space, and the output of a command with its errors."""
-    environment = os.environ | {"BLOCKED": blocked}
-    if folder is not None:
-        environment["PYTHONPATH"] = str(folder)
+    environment = os.environ | ({} if folder is None else {"PYTHONPATH": str(folder)})
     done = subprocess.run(
         [sys.executable, "-m", "katana450", *options],
         input=text,
@@ -77,125 +73,14 @@ def katana450(*options: str, folder: Path | None = None, blocked: str = "", text
     return f"{done.returncode} {done.stdout}{done.stderr}"
 
 
-@pytest.fixture
-def blocking(tmp_path: Path) -> Path:
-    """Return a folder whose module blocks the import of the packages in BLOCKED."""
-    write_blocking(tmp_path)
-    return tmp_path
-
-
-def test_every_built_in_extension_is_found() -> None:
-    assert tuple(extension.name for extension in extensions()) == BUILT_IN
-
-
-@pytest.mark.parametrize(
-    ("name", "commands"),
-    [
-        ("event_log", ["log"]),
-        ("reachability", ["workspace"]),
-        ("export", ["export", "render"]),
-        ("experiments", ["run", "demo"]),
-        ("programs", ["run", "demo"]),
-        ("media", ["render"]),
-        ("kinematics", ["fk", "ik"]),
-        ("server_commands", ["access", "people"]),
-    ],
-)
-def test_commands_of_a_missing_extension_are_not_listed(
-    blocking: Path, name: str, commands: list[str]
-) -> None:
-    blocked = f"katana450.extensions.{name}"
-    output = katana450("--help", folder=blocking, blocked=blocked)
-    listed = [line.split()[0] for line in output.splitlines() if line.startswith("    ")]
-    everything = [
-        "serve",
-        "fk",
-        "ik",
-        "access",
-        "people",
-        "log",
-        "workspace",
-        "export",
-        "run",
-        "demo",
-        "render",
-    ]
-    assert [each for each in everything if each not in listed] == commands
-    refused = katana450(commands[0], folder=blocking, blocked=blocked)
-    assert refused.startswith("2 ")
-    assert f"invalid choice: '{commands[0]}'" in refused
-
-
-def test_server_command_works_without_any_extension(blocking: Path) -> None:
-    blocked = "katana450.extensions"
-    helped = katana450("--help", folder=blocking, blocked=blocked)
-    assert helped.startswith("0 ")
-    assert "serve" in helped
-    assert "demo" not in helped
-    assert "left out" not in helped
-    serve = katana450("serve", "--help", folder=blocking, blocked=blocked)
-    assert serve.startswith("0 ")
-    assert "--workspace" not in serve
-
-
-def test_command_of_a_missing_extension_reports_it(blocking: Path) -> None:
-    blocked = "katana450.extensions.media"
-    output = katana450("demo", "circle", "--headless", folder=blocking, blocked=blocked)
-    assert output.startswith("1 ")
-    assert "The extension media is needed but not installed." in output
-
-
-NOT_NEEDED = (
-    *("importers", "scene", "reachability", "export", "experiments", "media"),
-    *("conduit", "ellipsoid", "objects", "undo", "server_commands"),
-)
-"""Extensions that a server does not need."""
-
-
-def test_server_runs_without_the_extensions_it_does_not_need(
-    blocking: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("BLOCKED", " ".join(f"katana450.extensions.{name}" for name in NOT_NEEDED))
-    monkeypatch.setenv("PYTHONPATH", str(blocking))
-    with AppServer() as server:
-        assert server.running
-        with connect(server.url, "Test") as arm:
-            assert arm.query(answers.Objects).objects
-            assert arm.query(answers.Links).links
-            with pytest.raises(RefusedError, match="Install the extension"):
-                arm.ask(requests.Get(node="Clock", field="startTime"))
-            for absent in (requests.Undo(), requests.Remove(name="cup"), requests.ListPeople()):
-                with pytest.raises(RefusedError, match="This server has no request"):
-                    arm.ask(absent)
-            arm.ask(requests.Home())
-        with urllib.request.urlopen(f"{server.url}{ROOT_PATH}/openapi.json", timeout=10) as answer:
-            shapes = json.load(answer)["components"]["schemas"]
-        assert {"Home", "Stop", "Steer"} <= set(shapes)
-        assert not {"Undo", "Place", "Attach", "Load", "Remove", "Fill", "Kick"} & set(shapes)
-        upload = urllib.request.Request(f"{server.url}{ROOT_PATH}/mesh?name=a.stl", b"solid")
-        with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(upload, timeout=10)
-        with refused.value:
-            assert refused.value.code == 404
-
-
-def test_robot_without_a_tool_is_driven_without_its_view(tmp_path: Path) -> None:
-    gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
-    command = (*APP, "--urdf", gantry)
-    with (
-        without(tmp_path, "joint_view"),
-        AppServer(command) as server,
-        connect(server.url, "Test") as arm,
-    ):
-        goal = [0.1, *arm.query(answers.State).q[1:]]
-        assert arm.joints(goal).q == pytest.approx(goal)
-
-
-def test_option_of_a_missing_extension_is_refused(blocking: Path) -> None:
-    blocked = "katana450.extensions.importers"
-    output = katana450("serve", "--scene", "scene.yaml", folder=blocking, blocked=blocked)
-    assert output.startswith("2 ")
-    assert "katana450 serve: error: unrecognized arguments: --scene" in output
+def test_every_part_of_the_built_in_extensions_is_found() -> None:
+    parts = [field.name for field in dataclasses.fields(Extension)]
+    for extension in extensions():
+        targets = [getattr(extension, part) for part in parts if part not in ("name", "commands")]
+        for command in extension.commands:
+            targets += [command.add_options, command.run]
+        for target in targets:
+            assert target is None or callable(load(target)), (extension.name, target)
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason
-from katana450.extensions.programs.extension import OWNER_SILENCE
+from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.command_gate import SETTLE_TIME
 from tests.gateway.test_hub import PAGES

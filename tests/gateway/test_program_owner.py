@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.extension import OWNER_SILENCE
+from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from tests.browser.server import ATTENTIVE_APP, AppServer
 from tests.gateway.client import ask
 from tests.gateway.lines import post

@@ -15,7 +15,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.extensions.programs.extension import OWNER_SILENCE
+from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests

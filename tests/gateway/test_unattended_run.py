@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from katana450.extensions.programs.extension import OWNER_SILENCE
+from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
 from tests.gateway.client import ask
 from tests.gateway.test_program_owner import SCRIPT, clear_stop, state_of, wait

@@ -43,13 +43,12 @@ from katana450.cli.serve_options import add_serve_options
 from katana450.client import Client
 from katana450.client.asynchronous import AsyncClient
 from katana450.client.files import RefusedError, Site
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import ARRIVAL, Arrival
 from katana450.server.service.hub import TICK, Hub
-from katana450.server.service.nodes import Nodes
 from katana450.server.service.people import People
 from katana450.server.service.runner import guarded
 from katana450.server.service.stop_state import ClearBy
@@ -325,15 +324,10 @@ class VirtualServer:
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)
         self.authenticator = Authenticator(access, 9, address, hub.people)
         budgets = Budgets(now)
-        parts = serve_extensions()
-        for part in parts:
-            if part.runner is not None:
-                hub.use_runner(part.runner()(hub, options))
-        for part in parts:
-            if part.handler is not None:
-                hub.add_handler(part.handler()(hub, options))
-        provided = [part.routes for part in parts if part.routes is not None]
-        api = Api(hub, self.authenticator, budgets, options, provided)
+        hub.use_runner(next(provided("runner"))(hub, options))
+        for handler in provided("handler"):
+            hub.add_handler(handler(hub, options))
+        api = Api(hub, self.authenticator, budgets, options, list(provided("routes")))
         ready = asyncio.Event()
         ready.set()
         web = cast(Any, SimpleNamespace(authenticator=self.authenticator, ready=ready))
@@ -347,8 +341,7 @@ class VirtualServer:
         acceptor = cast(Any, SimpleNamespace(kept=lambda _client: nullcontext()))
         admission = Admission(app, hub, self.authenticator, acceptor)
         self.app = SecurityMiddleware(admission, address)
-        makers = (part.initial_scene for part in parts if part.initial_scene is not None)
-        scenes = (make(options, lambda: session) for make in makers)
+        scenes = (make(options, lambda: session) for make in provided("initial_scene"))
         scene = next((each for each in scenes if each is not None), None)
         hub.meshes.put(() if scene is None else scene.meshes, ())
         self.arm = _Pipe(found, self.loop, self.clock, profile, scene)
@@ -358,8 +351,7 @@ class VirtualServer:
             worker = PlanningWorker(session, self.arm.state_publisher, pipe)
             worker.notify = lambda why: self._soon(hub.announce, why)
             worker.redirected = guarded(hub.runner.redirected)
-        nodes = next((part.nodes for part in parts if part.nodes is not None), None)
-        values = Nodes(robot) if nodes is None else nodes(robot, session.environment)
+        values = next(provided("nodes"))(robot, session.environment)
         hub.gate.arm = ArmHandle(robot, session, pipe, worker, values)
         self._detours: DetourPlanner | None = None
         if detours and worker is not None:

@@ -14,7 +14,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.general_arms.described_arm import described_arm
-from katana450.extensions.loops.extension import EXTENSION
+from katana450.extensions.loops.loop_joints import solve_loops
 from katana450.extensions.loops.solved_file import solved_file
 
 
@@ -169,11 +169,10 @@ def test_commands_solve_the_loops_of_their_file(
 ) -> None:
     path = write(tmp_path, four_bar())
     options = Namespace(urdf=path)
-    assert EXTENSION.prepare is not None
-    EXTENSION.prepare(options)
+    solve_loops(options)
     assert load(options.urdf).driven == ("a",)
     plain = Namespace(urdf=tmp_path / "missing.urdf")
-    EXTENSION.prepare(plain)
+    solve_loops(plain)
     assert plain.urdf == tmp_path / "missing.urdf"
     bad = write(tmp_path, four_bar(width=0.25, closed_at=0.15))
     assert main(["serve", "--port", "0", "--urdf", str(bad)]) == 1

@@ -16,7 +16,7 @@ from katana450.extensions.importers.reading import answer
 from katana450.extensions.importers.shape_file import Format
 from katana450.extensions.real_arm.commands.serve_arm import driver_of
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.rosbridge.extension import _check_installed
+from katana450.extensions.rosbridge.serve_parts import check_installed
 from katana450.extras import MissingExtraError
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.test_library_formats import threemf
@@ -55,7 +55,7 @@ def test_each_missing_extra_is_named_with_its_command(
         ("embreex", "pictures", lambda: answered("render", "--out", picture)),
         ("robot_descriptions", "gallery", lambda: answered("arms")),
         ("robot_descriptions", "gallery", lambda: answered("serve", "--arm", "ur5e")),
-        ("foxglove", "foxglove", lambda: refused(_check_installed, *foxglove)),
+        ("foxglove", "foxglove", lambda: refused(check_installed, *foxglove)),
         ("serial", "serial", lambda: refused(ArmUrl("/dev/ttyUSB0", None).open)),
         ("serial", "serial", lambda: refused(driver_of, *arm)),
         ("DracoPy", "meshes", lambda: read(draco_glb(), Format.GLB)),

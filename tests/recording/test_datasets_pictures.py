@@ -18,7 +18,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 
 from katana450.arm.robot.props import load_props
 from katana450.cli.main import main
-from katana450.extensions.media.extension import CAMERAS
+from katana450.extensions.media.options import CAMERAS
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo

@@ -20,7 +20,7 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.joint_view.machine_panel import MachinePanel, page
 from katana450.extensions.joint_view.machine_view import MachineView
@@ -159,9 +159,8 @@ def machine_view(
             options,
             tabs,
         )
-        for part in serve_extensions():
-            folder = None if part.folder is None else part.folder(context)
-            if folder is not None:
+        for make in provided("folder"):
+            if (folder := make(context)) is not None:
                 yield folder
 
     view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())

@@ -16,16 +16,14 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.real_arm.extension import EXTENSION
+from katana450.extensions.real_arm.commands.serve_parts import view_layer
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.scenery import Scenery
 from tests.viser_bridge.internals import nodes
 
 
 def layer(arm: str | None) -> ViewLayer | None:
-    assert EXTENSION.serve is not None
-    assert EXTENSION.serve.view_layer is not None
-    return EXTENSION.serve.view_layer(Namespace(arm=arm))
+    return view_layer(Namespace(arm=arm))
 
 
 def test_simulated_arm_has_no_such_layer() -> None:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmAddress, ArmListener, Roles
 from katana450.assembly.output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -81,9 +81,8 @@ def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: Supe
         config.settings, found, scene, again=again, kept=state, make_driver=make_driver
     )
     roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
-    for part in () if config.options is None else serve_extensions():
-        sender = part.tick_sender(config.options) if part.tick_sender and config.options else None
-        if sender is not None:
+    for tick_sender in () if config.options is None else provided("tick_sender"):
+        if (sender := tick_sender(config.options)) is not None:
             arm.record(sender)
             roles[RECORD] = sender.attach
     listener = ArmListener(config.address, roles)
@@ -117,9 +116,9 @@ def _driver(
     options: Namespace | None, robot: Robot, q: FloatArray, gripper: float
 ) -> Driver | None:
     """Return the driver that an extension has for the arm; None if none has."""
-    makers = [] if options is None else [each.driver for each in serve_extensions()]
-    found = (make(options, robot, q, gripper) for make in makers if make and options)
-    return next(filter(None, found), None)
+    makers = () if options is None else provided("driver")
+    drivers = (make(options, robot, q, gripper) for make in makers)
+    return next(filter(None, drivers), None)
 
 
 def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene | None]:
@@ -138,9 +137,8 @@ def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene 
         return found_robots[0].session
 
     scene = None
-    for part in serve_extensions():
-        if scene is None and part.initial_scene is not None:
-            scene = part.initial_scene(config.options, session)
+    for initial_scene in provided("initial_scene"):
+        scene = scene or initial_scene(config.options, session)
     if scene is not None:
         Meshes(config.folder).put(scene.meshes, ())
         for note in scene.notes:

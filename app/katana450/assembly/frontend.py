@@ -18,7 +18,7 @@ from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
-from katana450.extension import extensions, serve_extensions
+from katana450.extension import provided
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
@@ -114,22 +114,22 @@ class Frontend:
 
 def find_gizmo(freedoms: int) -> type[Gizmo] | None:
     """Return the class of the gizmo that an extension has for a tool of so many freedoms."""
-    return next((each.gizmo(freedoms) for each in extensions() if each.gizmo is not None), None)
+    return next((gizmo(freedoms) for gizmo in provided("gizmo")), None)
 
 
 def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
     """Return the layers that the extensions add to the scene of an arm."""
     if options is None:
         return ()
-    found = [part.view_layer(options) for part in serve_extensions() if part.view_layer is not None]
-    return tuple(layer for layer in found if layer is not None)
+    made = (make(options) for make in provided("view_layer"))
+    return tuple(layer for layer in made if layer is not None)
 
 
 def _nodes(options: Namespace | None, robot: Robot, environment: Environment) -> Nodes:
     """Return the nodes of the first extension that provides any, else those of the links alone."""
-    for part in () if options is None else serve_extensions():
-        if part.nodes is not None:
-            return part.nodes(robot, environment)
+    for make in () if options is None else provided("nodes"):
+        nodes: Nodes = make(robot, environment)
+        return nodes
     return Nodes(robot)
 
 
@@ -149,13 +149,12 @@ def _folders(
         options,
         tabs,
     )
-    for part in serve_extensions():
-        folder = None if part.folder is None else part.folder(context)
-        if folder is not None:
+    for make in provided("folder"):
+        if (folder := make(context)) is not None:
             yield folder
 
 
 def _joint_view() -> Callable[..., ViewUpdater]:
-    """Return what makes the view of a robot without a tool; without an extension, an empty one."""
-    found = (each.joint_view() for each in extensions() if each.joint_view is not None)
-    return next(found, lambda server, _, publisher, *rest: ViewUpdater(server, publisher, rest[-2]))
+    """Return what makes the view of a robot without a tool."""
+    view: Callable[..., ViewUpdater] = next(provided("joint_view"))
+    return view

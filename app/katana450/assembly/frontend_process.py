@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from katana450.assembly.arm_process import ARM
 from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.supervised import READY, SupervisorPipe
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.platform_support import reset_priority
 
 if TYPE_CHECKING:
@@ -76,9 +76,9 @@ def _run(
         frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
         # Browsers draw the scene meanwhile.
-        for part in serve_extensions():
-            if config.options is not None and part.send_records is not None:
-                senders.append(part.send_records(config.options, web.recorder, records))
+        if config.options is not None:
+            for send_records in provided("send_records"):
+                senders.append(send_records(config.options, web.recorder, records))
         # Without a reader, notes would only take memory.
         web.recorder.enabled = any(senders)
         gateway.start(config.options)

@@ -27,7 +27,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.routes import control_routes
 from katana450.assembly.web_server import WebServer
 from katana450.errors import LeaseError
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import keep_alive
@@ -102,18 +102,13 @@ class Gateway:
         from katana450.server.web.program_socket import LineServer
 
         hub, authenticator = self.hub, self._web.authenticator
-        parts = () if options is None else serve_extensions()
-        runners = [part.runner for part in parts if part.runner is not None]
-        handlers = [part.handler for part in parts if part.handler is not None]
-        provided = [part.routes for part in parts if part.routes is not None]
-        if runners:
-            hub.use_runner(runners[0]()(hub, options or Namespace()))
-        for runner in runners[1:]:
-            name, used = runner().__name__, type(hub.runner).__name__
-            log.warning("The runner %s is left out: a server has one runner, here %s.", name, used)
-        for handler in handlers:
-            hub.add_handler(handler()(hub, options or Namespace()))
-        api = Api(hub, authenticator, self._budgets, options, provided)
+        routes: list[Any] = []
+        if options is not None:
+            hub.use_runner(next(provided("runner"))(hub, options))
+            for handler in provided("handler"):
+                hub.add_handler(handler(hub, options))
+            routes = list(provided("routes"))
+        api = Api(hub, authenticator, self._budgets, options, routes)
         self._app.router.routes.extend(api.routes())
         lines = LineServer(hub, authenticator, self._budgets).run(self._lines_socket)
         self.soon(self._web.complete, lines, *self._watches())

@@ -8,7 +8,7 @@ from katana450.arm.robot.arm_reader import FindArm
 from katana450.arm.robot.description import checked, unexpanded
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extension import extensions
+from katana450.extension import provided
 from katana450.resources import URDF_PATH
 
 
@@ -26,5 +26,5 @@ def read_urdf(path: Path) -> bytes:
 
 def _expand(path: Path) -> bytes:
     """Return the URDF that an extension makes of xacro. Raises RobotDescriptionError."""
-    found = (each.expand for each in extensions() if each.expand is not None)
-    return next(found, unexpanded)(path)
+    urdf: bytes = next(provided("expand"), unexpanded)(path)
+    return urdf

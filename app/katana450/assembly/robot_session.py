@@ -18,7 +18,7 @@ from katana450.arm.robot.urdf import Urdf
 from katana450.arm.robot.water import water_environment
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
-from katana450.extension import RobotWorld, extensions
+from katana450.extension import RobotWorld, provided
 from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
 
@@ -44,8 +44,7 @@ def describe_robot(
 
 def find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     """Return the arm outside the five-axis family that an extension finds; None if none does."""
-    found = (each.find_arm(urdf, path, tool) for each in extensions() if each.find_arm is not None)
-    return next(found, None)
+    return next((find(urdf, path, tool) for find in provided("find_arm")), None)
 
 
 def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:
@@ -78,7 +77,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
     objects: tuple[SceneObject, ...] = ()
     if world is not None:
         hand, objects = hand_of(robot, world), scene_objects_of(props)
-        for complete in (each.hand for each in extensions() if each.hand is not None):
+        for complete in provided("hand"):
             hand = complete(world, hand)
         if hand.gripper != arm.gripper:
             robot = replace(robot, arm=replace(arm, gripper=hand.gripper))
@@ -96,7 +95,7 @@ def arm_session(settings: Settings, robot: Robot) -> DescribedRobot:
 
 def _with_world(robot: Robot) -> tuple[Robot, CollisionWorld | None, tuple[str, ...]]:
     """Return ``robot`` with its cautions, the world that an extension makes, and notes."""
-    make = next((each.world for each in extensions() if each.world is not None), _world_of_arm)
+    make = next(provided("world"), _world_of_arm)
     world, notes, cautions = make(robot)
     notes = (*robot.notes, *robot.joint_notes, *notes, *cautions)
     return replace(robot, cautions=cautions), world, notes

@@ -11,7 +11,7 @@ from katana450.assembly.output import drop_output
 from katana450.cli.core_commands import CORE_COMMANDS
 from katana450.cli.version import version
 from katana450.errors import KatanaError
-from katana450.extension import CliCommand, extensions, missing_extension
+from katana450.extension import CliCommand, extensions, load, provided
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 """Errors of a full or broken disk to which the output is written."""
@@ -28,18 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"unrecognized arguments: {' '.join(unknown)}")
     command: CliCommand = options.command
     try:
-        for each in extensions():
-            if each.prepare is not None:
-                each.prepare(options)
-        return command.run(options)
+        for prepare in provided("prepare"):
+            prepare(options)
+        status: int = load(command.run)(options)
+        return status
     except KatanaError as error:
         print(f"katana450: {error}", file=sys.stderr)
-        return 1
-    except ImportError as error:
-        missing = missing_extension(error)
-        if missing is None:
-            raise
-        print(f"katana450: The extension {missing} is needed but not installed.", file=sys.stderr)
         return 1
     except BrokenPipeError:
         # The reader has closed the pipe; write nothing more, not even at exit.
@@ -70,6 +64,6 @@ def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     # To collect the options of the other commands too takes 10 ms.
     for name in offered.keys() & set(arguments[:1]) or offered:
         options = commands.add_parser(name, help=offered[name].help)
-        offered[name].add_options(options)
+        load(offered[name].add_options)(options)
         options.set_defaults(command=offered[name], parser=options)
     return parser

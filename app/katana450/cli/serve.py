@@ -28,7 +28,7 @@ from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError
-from katana450.extension import ExtraProcess, ServerFacts, serve_extensions
+from katana450.extension import ExtraProcess, ServerFacts, provided
 from katana450.platform_support import (
     claim_file,
     create_file,
@@ -197,18 +197,15 @@ def _set_on_signals(stopping: threading.Event) -> None:
 
 def _server_log(options: Namespace | None, port: int) -> ServerLog:
     """Return the event log that an extension provides, or none."""
-    if options is not None:
-        for part in serve_extensions():
-            found = None if part.server_log is None else part.server_log(options, port)
-            if found is not None:
-                return found
-    return ServerLog()
+    makers = () if options is None else provided("server_log")
+    logs = (make(options, port) for make in makers)
+    return next(filter(None, logs), ServerLog())
 
 
 def _extra_processes(options: Namespace | None, facts: ServerFacts) -> list[ExtraProcess]:
     """Return the processes that extensions add. Raises KatanaError."""
-    makes = [part.process for part in serve_extensions() if part.process and options]
-    return [found for make in makes if options and (found := make(options, facts))]
+    makers = () if options is None else provided("process")
+    return [process for make in makers if (process := make(options, facts))]
 
 
 def _private_folder() -> tuple[Path, int]:

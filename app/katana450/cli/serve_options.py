@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.arm_options import add_arm_options
-from katana450.extension import serve_extensions
+from katana450.extension import provided
 from katana450.settings import Settings
 
 MIN_SILENCE, MAX_SILENCE = 0.2, 2.0
@@ -92,9 +92,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "person who pressed STOP and admins (default: %(default)s)",
     )
     parser.add_argument("--no-browser", action="store_true", help="do not open the page by itself")
-    for part in serve_extensions():
-        if part.add_options is not None:
-            part.add_options(parser)
+    for add_options in provided("serve_options"):
+        add_options(parser)
     # The real arm adds an option of that name, which takes an address too.
     add_arm_options(parser, names="--arm" not in parser.format_usage())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from argparse import Namespace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,11 @@ class DiskLog(ServerLog):
         """Record the end of the server, and write what waits. ``requested``: by a signal."""
         what = {"cause": "requested" if requested else "the server could not start, or failed"}
         self._writer.close(_by_server("end", what), CLOSE_TIMEOUT)
+
+
+def disk_log(options: Namespace, port: int) -> DiskLog | None:
+    """Return the event log of the server on ``port``; None if the options choose none."""
+    return None if options.no_log else DiskLog(options.log or default_folder(port), port)
 
 
 def _by_server(kind: str, what: dict[str, Any]) -> Record:

@@ -1,4 +1,4 @@
-"""Options of ``katana450 log``, separate from its work: reading them must load nothing heavy."""
+"""Options of ``katana450 log`` and of ``serve``, read without what is heavy."""
 
 from __future__ import annotations
 
@@ -42,6 +42,18 @@ def add_log_options(parser: argparse.ArgumentParser) -> None:
         metavar="KIND",
         help="only records of this kind, such as stop or lease; can be repeated",
     )
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 serve`` to ``parser``."""
+    logged = parser.add_mutually_exclusive_group()
+    logged.add_argument(
+        "--log",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the event log (default: one for each port, named at the start)",
+    )
+    logged.add_argument("--no-log", action="store_true", help="write no event log")
 
 
 def _since(text: str) -> str:

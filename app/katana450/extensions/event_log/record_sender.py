@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from argparse import Namespace
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import Empty
@@ -27,6 +29,16 @@ IDLE_TURN = 1.0
 
 CLOSE_TIMEOUT = 1.0
 """[s] Time for the last records at the end of the process."""
+
+
+def send_records(
+    options: Namespace, recorder: Recorder, pipe: Connection
+) -> Callable[[], None] | None:
+    """Send records of the notes of ``recorder`` by ``pipe``; return the function that ends this.
+
+    None if the options choose no event log.
+    """
+    return None if options.no_log else RecordSender(recorder, pipe).close
 
 
 class RecordSender:

@@ -17,6 +17,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.server.view.gizmo import Aim, Gizmo, quaternion, turn_ring
 
+ALL_FREEDOMS = 6
+"""Number of freedoms of a tool that can have every orientation."""
+
 PITCHING = 4
 """Number of axes of an arm that can only pitch its tool."""
 
@@ -72,3 +75,8 @@ class PoseGizmo(Gizmo):
         wxyz = np.asarray(event.target.wxyz, dtype=float)
         R = self._arm.T_base_shoulder[:3, :3].T @ so3.from_quaternion(wxyz) @ self._R_ring_tool
         self._submit(event, actor, OrientTool(R), tuple(wxyz.tolist()))
+
+
+def gizmo_for(freedoms: int) -> type[Gizmo] | None:
+    """Return the class of the gizmo of a tool with so many freedoms; None if it is another one."""
+    return PoseGizmo if freedoms == ALL_FREEDOMS else None

@@ -7,9 +7,19 @@ from argparse import Namespace
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.described_arm import DescribedArm, described_arm
 from katana450.extensions.kinematics.general_lines import GeneralLines
-from katana450.extensions.kinematics.json_lines import JsonKinematics
+from katana450.extensions.kinematics.json_lines import JsonKinematics, answer_lines
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 from katana450.maths.kinematics.priority import Priority
+
+
+def fk(options: Namespace) -> int:
+    """Execute ``katana450 fk``; return the exit status."""
+    return answer_lines(lines_of(options).fk)
+
+
+def ik(options: Namespace) -> int:
+    """Execute ``katana450 ik``; return the exit status."""
+    return answer_lines(lines_of(options).ik)
 
 
 def lines_of(options: Namespace) -> JsonKinematics | GeneralLines:

@@ -20,8 +20,8 @@ CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
 """QR codes that are drawn per second, and in a burst, for all pages together."""
 
 
-def phone_route(context: RouteContext) -> Route:
-    """Return the route that answers with the address of this server for a phone."""
+def phone_routes(context: RouteContext) -> list[Route]:
+    """Return the one route, which answers with the address of this server for a phone."""
     hub, authenticator = context.hub, context.authenticator
     codes = TokenBucket(CODES_PER_SECOND, CODES_BURST, hub.clock())
 
@@ -38,4 +38,4 @@ def phone_route(context: RouteContext) -> Route:
         )
         return Response(msgspec.json.encode(found), media_type="application/json")
 
-    return Route(f"{ROOT}/phone", phone)
+    return [Route(f"{ROOT}/phone", phone)]

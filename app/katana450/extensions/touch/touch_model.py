@@ -11,6 +11,7 @@ import numpy as np
 from katana450.arm.control.scene_objects import Hand, SceneObject, same
 from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
+from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
 from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.held_load import (
@@ -220,6 +221,11 @@ def touch_model(
     """Return the model of the fingers of ``hand``; None if their pads are not known."""
     pads = pads_of(hand.fingers)
     return TouchModel(world, hand, (pads[0], pads[1]), masses) if len(pads) == 2 else None
+
+
+def with_touch(world: CollisionWorld, hand: Hand) -> Hand:
+    """Return ``hand`` with the model of its touch."""
+    return replace(hand, grip_model=touch_model(world, hand, {"cup": load_props().cup.mass}))
 
 
 def _untouched(pad: Pad) -> PadReport:

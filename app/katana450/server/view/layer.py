@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from typing import NamedTuple
 
 import viser
@@ -33,6 +34,9 @@ class LayerContext(NamedTuple):
 
 class ViewLayer:
     """Nodes of the scene with controls in the folder "Show" of the panel. The base has none."""
+
+    def __init__(self, options: Namespace | None = None) -> None:
+        """Take the options of ``katana450 serve``; None outside a server."""
 
     @property
     def what(self) -> str:

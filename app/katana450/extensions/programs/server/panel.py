@@ -21,13 +21,16 @@ from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server import step_list
+from katana450.extensions.programs.server.panel_access import PanelAccess
 from katana450.extensions.programs.server.preview import TIME_STEP, Preview
+from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.view.controls import GestureGate, refuse, set_value
+from katana450.server.view.panel_folder import FolderContext
 
 ORDERS = {
     "Run": ProgramOrder.RUN,
@@ -68,6 +71,28 @@ class Steering(Protocol):
 
 ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
 """Statuses of a program whose run has ended."""
+
+
+TAB = "Programs"
+"""Label of the panel's tab with the controls."""
+
+
+def programs_panel(context: FolderContext) -> ProgramsPanel | None:
+    """Return the controls for programs, added to their tab; None for a robot without an arm."""
+    runner = context.hub.runner
+    # Another extension may provide the only runner of this server.
+    if context.robot.arm is None or not isinstance(runner, ProgramRunner):
+        return None
+    with context.tabs.tab(TAB):
+        return ProgramsPanel(
+            context.server,
+            context.robot,
+            PanelAccess(runner, context.hub, context.call),
+            Scripts(context.options.programs),
+            context.gestures,
+            context.state,
+            lambda: context.hub.present().session,
+        )
 
 
 class ProgramsPanel:

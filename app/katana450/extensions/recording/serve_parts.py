@@ -1,4 +1,7 @@
-"""The extension ``recording``: what the arm does is recorded, and a command about recordings."""
+"""Parts of ``katana450 serve`` that record, and the choice among the commands on recordings.
+
+It loads nothing heavy before it is used.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from katana450.errors import ConfigurationError
-from katana450.extension import (
-    CliCommand,
-    Extension,
-    ExtraProcess,
-    ServeExtension,
-    ServerFacts,
-    TickSender,
-)
-from katana450.extensions.recording.record_options import add_record_options
-from katana450.extensions.recording.scoring.score_options import add_score_options
+from katana450.extension import ExtraProcess, ServerFacts, TickSender
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
     from katana450.server.service.runner import Runner
-    from katana450.server.view.panel_folder import FolderContext, PanelFolder
     from katana450.server.web.http_api import RouteContext
 
 
@@ -45,7 +38,11 @@ def add_serve_options(parser: ArgumentParser) -> None:
     )
 
 
-def _process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
+def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
+    """Return the process that records; None if the options choose none.
+
+    Raises ConfigurationError.
+    """
     if options.no_record:
         if options.episodes:
             raise ConfigurationError("--episodes needs the recording: leave out --no-record.")
@@ -77,7 +74,8 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
     return folder.absolute()
 
 
-def _routes(context: RouteContext) -> list[BaseRoute]:
+def routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the routes of recordings, play back and episodes."""
     from katana450.extensions.late_routes import LateRoutes
     from katana450.extensions.recording.places import default_folder
     from katana450.server.api.fields import ROOT
@@ -101,12 +99,12 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
         from katana450.extensions.recording.playback.store import RecordingStore
 
         store = RecordingStore(folder)
-        routes: list[BaseRoute] = [*recording_routes(context, store)]
-        routes += JobRoutes(context, store).routes()
-        routes += PlaybackRoutes(context, store).routes()
+        made: list[BaseRoute] = [*recording_routes(context, store)]
+        made += JobRoutes(context, store).routes()
+        made += PlaybackRoutes(context, store).routes()
         if episodes is not None:
-            routes += EpisodeRoutes(context, episodes, port).routes()
-        return routes
+            made += EpisodeRoutes(context, episodes, port).routes()
+        return made
 
     names = [f"{ROOT}/{name}" for name in ("recording", "playback", "episodes")]
     return LateRoutes(names, make).routes()
@@ -121,13 +119,8 @@ def _note_scripts(runner: Runner, folder: Path, port: int) -> None:
         runner.follow_run = ScriptNoter(notes_folder(folder, port)).note
 
 
-def _folder(context: FolderContext) -> PanelFolder:
-    from katana450.extensions.recording.playback.folder import PlaybackFolder
-
-    return PlaybackFolder(context)
-
-
-def _tick_sender(options: Namespace) -> TickSender | None:
+def tick_sender(options: Namespace) -> TickSender | None:
+    """Return the sender of ticks to the process that records; None without it."""
     if options.no_record:
         return None
     from katana450.extensions.recording.live.record_end import RecordEnd
@@ -135,36 +128,12 @@ def _tick_sender(options: Namespace) -> TickSender | None:
     return RecordEnd()
 
 
-def _record(options: Namespace) -> int:
+def record(options: Namespace) -> int:
+    """Execute ``katana450 record``; return the exit status."""
     if options.act == "again":
         from katana450.extensions.recording.run_again.again_command import again
 
         return again(options)
-    from katana450.extensions.recording.files.record_command import record
+    from katana450.extensions.recording.files.record_command import record as keep
 
-    return record(options)
-
-
-def _score(options: Namespace) -> int:
-    from katana450.extensions.recording.scoring.score_command import score_files
-
-    return score_files(options)
-
-
-EXTENSION = Extension(
-    "recording",
-    (
-        CliCommand(
-            "record", "keep, verify, repair and cut recordings", add_record_options, _record
-        ),
-        CliCommand("score", "measure and compare recordings", add_score_options, _score),
-    ),
-    ServeExtension(
-        add_serve_options,
-        routes=_routes,
-        folder=_folder,
-        process=_process,
-        tick_sender=_tick_sender,
-        needs=("programs",),
-    ),
-)
+    return keep(options)

@@ -1,13 +1,12 @@
-"""The extension ``loops``: a file with closed loops is solved before a command reads it."""
+"""The choice of files with closed loops, which loads nothing for all others."""
 
 from __future__ import annotations
 
 from argparse import Namespace
 
-from katana450.extension import Extension
 
-
-def _prepare(options: Namespace) -> None:
+def solve_loops(options: Namespace) -> None:
+    """Let ``options`` name a file without loops, if that of the robot has some."""
     urdf = getattr(options, "urdf", None)
     if urdf is None:
         return
@@ -20,6 +19,3 @@ def _prepare(options: Namespace) -> None:
         from katana450.extensions.loops.solved_file import solved_file
 
         options.urdf = solved_file(urdf)
-
-
-EXTENSION = Extension("loops", prepare=_prepare)

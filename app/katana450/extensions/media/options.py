@@ -1,4 +1,4 @@
-"""The extension ``media``: the command that renders pictures and films of the arm."""
+"""Options of ``katana450 render``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.arm_options import add_arm_options
-from katana450.extension import CliCommand, Extension
-from katana450.extensions.export.extension import joint_values
+from katana450.extensions.export.options import joint_values
 
 CAMERAS = ("free", "front", "side", "top", "tool")
 """Camera presets, as on the page; the first is its 3D view."""
@@ -78,22 +77,3 @@ def _size(text: str) -> tuple[int, int]:
             f"expected two numbers from 16 to 4096, such as 1280x720, not {text!r}"
         )
     return width, height
-
-
-def _render(options: argparse.Namespace) -> int:
-    from katana450.extensions.media.render import render
-
-    return render(options)
-
-
-EXTENSION = Extension(
-    "media",
-    (
-        CliCommand(
-            "render",
-            "render a picture or a film of the arm, without a browser",
-            add_render_options,
-            _render,
-        ),
-    ),
-)

@@ -1,4 +1,4 @@
-"""The extension ``rosbridge``: ROS clients without ROS."""
+"""Options and routes of ``katana450 serve`` for ROS clients and Foxglove."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
-from katana450.extension import Extension, ServeExtension
 from katana450.extras import require
 
 if TYPE_CHECKING:
@@ -16,7 +15,8 @@ if TYPE_CHECKING:
     from katana450.server.web.http_api import RouteContext
 
 
-def _add_options(parser: ArgumentParser) -> None:
+def add_serve_options(parser: ArgumentParser) -> None:
+    """Add the options of ``katana450 serve`` to ``parser``."""
     parser.add_argument(
         "--ros-page",
         action="append",
@@ -48,13 +48,14 @@ def _origin(text: str) -> str:
     return f"{parts.scheme}://{parts.netloc.lower()}"
 
 
-def _check_installed(options: Namespace, _facts: ServerFacts) -> None:
+def check_installed(options: Namespace, _facts: ServerFacts) -> None:
     """Raise MissingExtraError, before the server starts, if the extra is missing."""
     if options.foxglove is not None:
         require("foxglove", "foxglove", "Connections of Foxglove")
 
 
-def _routes(context: RouteContext) -> list[BaseRoute]:
+def routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the route of ROS clients, and start the server of Foxglove if it is requested."""
     from katana450.extensions.late_routes import LateRoutes
 
     assert context.options is not None
@@ -71,11 +72,3 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
         return RosRoutes(context, urdf).routes()
 
     return LateRoutes(["/rosbridge"], make).routes()
-
-
-EXTENSION = Extension(
-    "rosbridge",
-    serve=ServeExtension(
-        _add_options, routes=_routes, process=_check_installed, needs=("programs", "export")
-    ),
-)

@@ -1,13 +1,12 @@
-"""The extension ``gallery``: ``--arm NAME``, and the command ``arms`` that lists the names."""
+"""Options of ``katana450 arms``, and ``--arm NAME`` of every command."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from katana450.extension import CliCommand, Extension
 
-
-def _add_options(parser: ArgumentParser) -> None:
+def add_arms_options(parser: ArgumentParser) -> None:
+    """Add the options of ``katana450 arms`` to ``parser``."""
     parser.description = (
         "List the robots that --arm NAME can name, with the licence of each description. With "
         "NAME, download that one if it is not here yet, and print its file and licence."
@@ -16,13 +15,8 @@ def _add_options(parser: ArgumentParser) -> None:
     parser.add_argument("--find", metavar="WORD", help="list only names and makers with this word")
 
 
-def _arms(options: Namespace) -> int:
-    from katana450.extensions.gallery.arms_command import arms
-
-    return arms(options)
-
-
-def _named(options: Namespace) -> None:
+def choose_named(options: Namespace) -> None:
+    """Let ``options`` name the file of the robot that ``--arm`` names. Raises KatanaError."""
     name = getattr(options, "arm", None)
     # No robot has a dot or a colon in its name: this is the address of a real arm.
     if name is None or "." in name or ":" in name:
@@ -30,10 +24,3 @@ def _named(options: Namespace) -> None:
     from katana450.extensions.gallery.arms_command import choose
 
     choose(options, name)
-
-
-EXTENSION = Extension(
-    "gallery",
-    (CliCommand("arms", "list the robots that --arm can name", _add_options, _arms),),
-    prepare=_named,
-)

@@ -1,4 +1,7 @@
-"""The extension ``real_arm``: the real Katana450, an emulator of it, and a simulated plant."""
+"""The choice of driver and view of ``katana450 serve``, and of the work of ``katana450 arm``.
+
+It loads nothing heavy before it is used.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,6 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from katana450.errors import ConfigurationError
-from katana450.extension import CliCommand, Extension, ServeExtension
-from katana450.extensions.real_arm.commands.options import (
-    add_arm_command_options,
-    add_emulate_options,
-    add_serve_options,
-)
 
 if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
@@ -20,13 +17,8 @@ if TYPE_CHECKING:
     from katana450.server.view.layer import ViewLayer
 
 
-def _emulate(options: Namespace) -> int:
-    from katana450.extensions.real_arm.commands.emulate import emulate
-
-    return emulate(options)
-
-
-def _arm(options: Namespace) -> int:
+def arm(options: Namespace) -> int:
+    """Execute ``katana450 arm``; return the exit status."""
     if options.act == "probe":
         from katana450.extensions.real_arm.commands.probe import probe
 
@@ -36,7 +28,11 @@ def _arm(options: Namespace) -> int:
     return show_log(options)
 
 
-def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
+def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
+    """Return the driver of a real arm or a plant; None if the options choose neither.
+
+    q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
+    """
     if options.arm is not None:
         from katana450.extensions.real_arm.commands.serve_arm import driver_of
 
@@ -51,29 +47,10 @@ def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> 
     return PlantDriver(robot, q, gripper, profile_named(options.plant))
 
 
-def _view_layer(options: Namespace) -> ViewLayer | None:
+def view_layer(options: Namespace) -> ViewLayer | None:
+    """Return the layer of a real arm whose posture may be unknown; None for a simulated one."""
     if options.arm is None:
         return None
     from katana450.extensions.real_arm.unknown_posture import UnknownPosture
 
     return UnknownPosture()
-
-
-EXTENSION = Extension(
-    "real_arm",
-    (
-        CliCommand(
-            "arm",
-            "probe a real arm, or show its log",
-            add_arm_command_options,
-            _arm,
-        ),
-        CliCommand(
-            "emulate",
-            "emulate the firmware of a Katana450 behind a TCP port",
-            add_emulate_options,
-            _emulate,
-        ),
-    ),
-    ServeExtension(add_serve_options, view_layer=_view_layer, driver=_driver),
-)

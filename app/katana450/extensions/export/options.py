@@ -1,20 +1,13 @@
-"""The extension ``export``: the command that writes files for other programs."""
+"""Options of ``katana450 export``, and the choice of the format."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from katana450.cli.arm_options import add_arm_options
 from katana450.errors import InputError
-from katana450.extension import CliCommand, Extension, ServeExtension
 from katana450.extensions.export.formats import FORMATS, named
-
-if TYPE_CHECKING:
-    from katana450.arm.control.scene_objects import Environment
-    from katana450.arm.robot.robot import Robot
-    from katana450.server.service.nodes import Nodes
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
@@ -62,7 +55,8 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     add_arm_options(parser, tool=False)
 
 
-def _export(options: argparse.Namespace) -> int:
+def export_format(options: argparse.Namespace) -> int:
+    """Execute ``katana450 export``; return the exit status."""
     row = FORMATS[options.format]
     if not row.scene and (options.plain or not options.objects):
         names = " or ".join(named(lambda each: each.scene))
@@ -88,20 +82,3 @@ def joint_values(text: str) -> tuple[float, ...]:
         raise argparse.ArgumentTypeError(
             f"expected comma-separated numbers, not {text!r}"
         ) from None
-
-
-def _nodes(robot: Robot, environment: Environment) -> Nodes:
-    from katana450.extensions.export.vrml_nodes import VrmlNodes
-
-    return VrmlNodes(robot, environment)
-
-
-EXTENSION = Extension(
-    "export",
-    (
-        CliCommand(
-            "export", "write the arm as files for other programs", add_export_options, _export
-        ),
-    ),
-    ServeExtension(nodes=_nodes),
-)

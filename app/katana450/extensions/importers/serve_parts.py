@@ -1,4 +1,7 @@
-"""The extension ``importers``: meshes and scenes from files, at the start and by upload."""
+"""Initial scene and uploads of ``katana450 serve``, from files.
+
+It loads nothing heavy before a file is read.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,6 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-from katana450.extension import Extension, ServeExtension
 
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
@@ -37,7 +38,8 @@ def add_serve_options(parser: ArgumentParser) -> None:
     )
 
 
-def _initial_scene(options: Namespace, session: Callable[[], Session]) -> InitialScene | None:
+def chosen_scene(options: Namespace, session: Callable[[], Session]) -> InitialScene | None:
+    """Return the scene that the options name; None without one. Raises KatanaError."""
     if options.scene is None and not options.objects:
         return None
     from katana450.extensions.importers.initial_scene import initial_scene
@@ -45,7 +47,8 @@ def _initial_scene(options: Namespace, session: Callable[[], Session]) -> Initia
     return initial_scene(session(), options.scene, options.objects)
 
 
-def _routes(context: RouteContext) -> list[BaseRoute]:
+def upload_routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the routes that upload meshes and scenes."""
     from katana450.extensions.late_routes import LateRoutes
     from katana450.server.api.fields import ROOT
 
@@ -55,14 +58,3 @@ def _routes(context: RouteContext) -> list[BaseRoute]:
         return Uploads(context.hub, context.authenticator, context.identity).routes()
 
     return LateRoutes([f"{ROOT}/mesh", f"{ROOT}/scene"], make).routes()
-
-
-EXTENSION = Extension(
-    "importers",
-    serve=ServeExtension(
-        add_serve_options,
-        initial_scene=_initial_scene,
-        routes=_routes,
-        needs=("programs", "scene", "export", "objects"),
-    ),
-)

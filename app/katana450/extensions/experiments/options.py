@@ -1,4 +1,4 @@
-"""The extension ``experiments``: commands that run a script, or an experiment of the paper."""
+"""Options of ``katana450 run`` and ``katana450 demo``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 import math
 from pathlib import Path
 
-from katana450.extension import CliCommand, Extension
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.real_arm.plant.profile import PROFILES
@@ -189,24 +188,3 @@ def _direction(text: str) -> str:
 
 def _pitch(text: str) -> str:
     return text if text in ("keep", "roomiest") else f"{_number(text):g}"
-
-
-def _run(options: argparse.Namespace) -> int:
-    from katana450.extensions.experiments.run import run
-
-    return run(options)
-
-
-def _demo(options: argparse.Namespace) -> int:
-    from katana450.extensions.experiments.run import demo
-
-    return demo(options)
-
-
-EXTENSION = Extension(
-    "experiments",
-    (
-        CliCommand("run", "run a script of your own", add_run_options, _run),
-        CliCommand("demo", "run an experiment of the paper", add_demo_options, _demo),
-    ),
-)

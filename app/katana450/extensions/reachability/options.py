@@ -1,4 +1,4 @@
-"""The extension ``reachability``: a command that maps the workspace, and a layer of the scene."""
+"""Options of ``katana450 workspace`` and of ``serve``, and the map that they choose."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from katana450.cli.arm_options import add_arm_options
-from katana450.extension import CliCommand, Extension, ServeExtension
 
 if TYPE_CHECKING:
     from katana450.server.view.layer import ViewLayer
@@ -46,12 +45,6 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
     add_arm_options(parser)
 
 
-def _workspace(options: argparse.Namespace) -> int:
-    from katana450.extensions.reachability.workspace import workspace
-
-    return workspace(options)
-
-
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
     """Add the option for a map to ``katana450 serve``."""
     parser.add_argument(
@@ -62,23 +55,10 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _view_layer(options: argparse.Namespace) -> ViewLayer | None:
+def chosen_map(options: argparse.Namespace) -> ViewLayer | None:
+    """Return the layer of the map that ``options`` name; None without one."""
     if options.workspace is None:
         return None
     from katana450.extensions.reachability.view import ReachabilityLayer
 
     return ReachabilityLayer(options.workspace)
-
-
-EXTENSION = Extension(
-    "reachability",
-    (
-        CliCommand(
-            "workspace",
-            "map where the tool can be, and how freely it can be turned there",
-            add_workspace_options,
-            _workspace,
-        ),
-    ),
-    ServeExtension(add_serve_options, view_layer=_view_layer),
-)

@@ -1,0 +1,232 @@
+"""The extensions of this distribution, in the order of their commands in the help text."""
+
+from __future__ import annotations
+
+from katana450.extension import CliCommand, Extension
+
+HERE = "katana450.extensions"
+
+EXTENSIONS = (
+    Extension(
+        "server_commands",
+        (
+            CliCommand(
+                "access",
+                "give people links with which they sign in",
+                f"{HERE}.server_commands.access_options:add_access_options",
+                f"{HERE}.server_commands.access:access",
+            ),
+            CliCommand(
+                "people",
+                "list who is connected, and disconnect people",
+                f"{HERE}.server_commands.people_options:add_people_options",
+                f"{HERE}.server_commands.people:people",
+            ),
+        ),
+        handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
+    ),
+    Extension("api_description", routes=f"{HERE}.api_description.routes:description_routes"),
+    Extension(
+        "event_log",
+        (
+            CliCommand(
+                "log",
+                "show the event log of a server",
+                f"{HERE}.event_log.log_options:add_log_options",
+                f"{HERE}.event_log.log_command:log",
+            ),
+        ),
+        serve_options=f"{HERE}.event_log.log_options:add_serve_options",
+        server_log=f"{HERE}.event_log.disk_log:disk_log",
+        send_records=f"{HERE}.event_log.record_sender:send_records",
+    ),
+    Extension(
+        "programs",
+        serve_options=f"{HERE}.programs.serve_options:add_serve_options",
+        view_layer=f"{HERE}.programs.server.traces:TracesLayer",
+        routes=f"{HERE}.programs.server.script_routes:routes",
+        runner=f"{HERE}.programs.server.program_runner:ProgramRunner",
+        folder=f"{HERE}.programs.server.panel:programs_panel",
+    ),
+    Extension(
+        "importers",
+        serve_options=f"{HERE}.importers.serve_parts:add_serve_options",
+        initial_scene=f"{HERE}.importers.serve_parts:chosen_scene",
+        routes=f"{HERE}.importers.serve_parts:upload_routes",
+    ),
+    Extension(
+        "reachability",
+        (
+            CliCommand(
+                "workspace",
+                "map where the tool can be, and how freely it can be turned there",
+                f"{HERE}.reachability.options:add_workspace_options",
+                f"{HERE}.reachability.workspace:workspace",
+            ),
+        ),
+        serve_options=f"{HERE}.reachability.options:add_serve_options",
+        view_layer=f"{HERE}.reachability.options:chosen_map",
+    ),
+    Extension(
+        "export",
+        (
+            CliCommand(
+                "export",
+                "write the arm as files for other programs",
+                f"{HERE}.export.options:add_export_options",
+                f"{HERE}.export.options:export_format",
+            ),
+        ),
+        nodes=f"{HERE}.export.vrml_nodes:VrmlNodes",
+    ),
+    Extension(
+        "experiments",
+        (
+            CliCommand(
+                "run",
+                "run a script of your own",
+                f"{HERE}.experiments.options:add_run_options",
+                f"{HERE}.experiments.run:run",
+            ),
+            CliCommand(
+                "demo",
+                "run an experiment of the paper",
+                f"{HERE}.experiments.options:add_demo_options",
+                f"{HERE}.experiments.run:demo",
+            ),
+        ),
+    ),
+    Extension(
+        "media",
+        (
+            CliCommand(
+                "render",
+                "render a picture or a film of the arm, without a browser",
+                f"{HERE}.media.options:add_render_options",
+                f"{HERE}.media.render:render",
+            ),
+        ),
+    ),
+    Extension("phone", routes=f"{HERE}.phone.route:phone_routes"),
+    Extension(
+        "recording",
+        (
+            CliCommand(
+                "record",
+                "keep, verify, repair and cut recordings",
+                f"{HERE}.recording.record_options:add_record_options",
+                f"{HERE}.recording.serve_parts:record",
+            ),
+            CliCommand(
+                "score",
+                "measure and compare recordings",
+                f"{HERE}.recording.scoring.score_options:add_score_options",
+                f"{HERE}.recording.scoring.score_command:score_files",
+            ),
+        ),
+        serve_options=f"{HERE}.recording.serve_parts:add_serve_options",
+        routes=f"{HERE}.recording.serve_parts:routes",
+        folder=f"{HERE}.recording.playback.folder:PlaybackFolder",
+        process=f"{HERE}.recording.serve_parts:process",
+        tick_sender=f"{HERE}.recording.serve_parts:tick_sender",
+    ),
+    Extension(
+        "kinematics",
+        (
+            CliCommand(
+                "fk",
+                "JSON lines from stdin to stdout, joints to poses: "
+                '{"q": [angles, rad], "tool": "tcp"} per line',
+                f"{HERE}.kinematics.options:add_fk_options",
+                f"{HERE}.kinematics.lines_of:fk",
+            ),
+            CliCommand(
+                "ik",
+                "JSON lines from stdin to stdout, poses to joints: "
+                '{"T": [[4x4, m]], "tool": "tcp"} per line, or "p" with "wxyz", "xyzw", "rpy", or '
+                '"pitch" and "roll"',
+                f"{HERE}.kinematics.options:add_ik_options",
+                f"{HERE}.kinematics.lines_of:ik",
+            ),
+        ),
+    ),
+    Extension(
+        "real_arm",
+        (
+            CliCommand(
+                "arm",
+                "probe a real arm, or show its log",
+                f"{HERE}.real_arm.commands.options:add_arm_command_options",
+                f"{HERE}.real_arm.commands.serve_parts:arm",
+            ),
+            CliCommand(
+                "emulate",
+                "emulate the firmware of a Katana450 behind a TCP port",
+                f"{HERE}.real_arm.commands.options:add_emulate_options",
+                f"{HERE}.real_arm.commands.emulate:emulate",
+            ),
+        ),
+        serve_options=f"{HERE}.real_arm.commands.options:add_serve_options",
+        view_layer=f"{HERE}.real_arm.commands.serve_parts:view_layer",
+        driver=f"{HERE}.real_arm.commands.serve_parts:driver",
+    ),
+    Extension("hands", hand=f"{HERE}.hands.sides:with_sides"),
+    Extension(
+        "touch",
+        hand=f"{HERE}.touch.touch_model:with_touch",
+        folder=f"{HERE}.touch.pad_patches:PadPatches",
+    ),
+    Extension(
+        "leader",
+        (
+            CliCommand(
+                "leader",
+                "drive the arm by a leader arm, joint to joint",
+                f"{HERE}.leader.leader_options:add_leader_options",
+                f"{HERE}.leader.leader_command:lead",
+            ),
+        ),
+    ),
+    Extension(
+        "rosbridge",
+        serve_options=f"{HERE}.rosbridge.serve_parts:add_serve_options",
+        routes=f"{HERE}.rosbridge.serve_parts:routes",
+        process=f"{HERE}.rosbridge.serve_parts:check_installed",
+    ),
+    Extension(
+        "gallery",
+        (
+            CliCommand(
+                "arms",
+                "list the robots that --arm can name",
+                f"{HERE}.gallery.options:add_arms_options",
+                f"{HERE}.gallery.arms_command:arms",
+            ),
+        ),
+        prepare=f"{HERE}.gallery.options:choose_named",
+    ),
+    Extension("bodies", world=f"{HERE}.bodies.robot_world:robot_world"),
+    Extension(
+        "xacro",
+        expand=f"{HERE}.xacro.xacro_file:expanded",
+        prepare=f"{HERE}.xacro.arguments:expand_with_arguments",
+    ),
+    Extension("loops", prepare=f"{HERE}.loops.loop_joints:solve_loops"),
+    Extension(
+        "objects",
+        view_layer=f"{HERE}.objects.handles:HandlesLayer",
+        handler=f"{HERE}.objects.object_requests:ObjectRequests",
+        folder=f"{HERE}.objects.objects_panel:ObjectsFolder",
+    ),
+    Extension("undo", handler=f"{HERE}.undo.undo_requests:UndoRequests"),
+    Extension("joint_view", joint_view=f"{HERE}.joint_view.machine_view:MachineView"),
+    Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
+    Extension("water", view_layer=f"{HERE}.water.nodes:WaterLayer"),
+    Extension("ellipsoid", view_layer=f"{HERE}.ellipsoid.layer:EllipsoidLayer"),
+    Extension(
+        "general_arms",
+        find_arm=f"{HERE}.general_arms.found_arm:found_arm",
+        gizmo=f"{HERE}.general_arms.pose_gizmo:gizmo_for",
+    ),
+)
+"""Each with where its parts are, so that nothing is imported before it is used."""

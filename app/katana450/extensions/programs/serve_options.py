@@ -1,0 +1,43 @@
+"""Options of ``katana450 serve`` for programs."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
+
+OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
+"""[s] Default and longest heartbeat timeout of a program's owner, after which the program ends."""
+
+
+def add_serve_options(parser: ArgumentParser) -> None:
+    """Add the options for programs to ``katana450 serve``."""
+    parser.add_argument(
+        "--owner-silence",
+        type=_owner_silence,
+        default=OWNER_SILENCE,
+        metavar="SECONDS",
+        help="heartbeat timeout of a program's owner, after which the program ends "
+        f"({MIN_SILENCE:g} to {LONGEST_OWNER_SILENCE:g}, default: %(default)s)",
+    )
+    parser.add_argument(
+        "--no-unattended",
+        action="store_true",
+        help="refuse programs that are to run without heartbeats of their owner",
+    )
+    parser.add_argument(
+        "--no-idle-planning",
+        action="store_true",
+        help="do not plan the scripts of the library while nobody uses the server",
+    )
+    parser.add_argument(
+        "--programs",
+        type=Path,
+        metavar="DIR",
+        help="folder of scripts for the panel; taught scripts are saved there too",
+    )
+
+
+def _owner_silence(text: str) -> float:
+    return heartbeat_timeout(text, LONGEST_OWNER_SILENCE)
