@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from katana450.extensions.programs.approach import Approach
-from katana450.extensions.programs.family_hand import FamilyHand
-from katana450.extensions.programs.hand_choice import hand_of
+from katana450.extensions.programs.hand_planning import hand_of
 from katana450.extensions.programs.source import ScriptError
+from katana450.maths.geometry import so3
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import HANDS, gripping_urdf
 from tests.general_arms.published_arms import SKEWED_6
@@ -130,11 +131,14 @@ def test_fixed_jaw_on_the_other_side_is_not_out_of_reach(tmp_path: Path) -> None
     plan = planned(tmp_path, so101_urdf(), ["gripper: open"], PART)
     arm, session = plan.session.require_arm(), plan.session
     hand = hand_of(session, plan.robot.require_arm().T_base_shoulder, arm.default_tool)
-    assert isinstance(hand, FamilyHand)
+    assert hand.plane is not None
     middle = np.array((0.23, 0.06, 0.03))
     at = hand.before(middle, Approach(0.5), 0.01)
-    farther = replace(hand, roll=hand.roll + math.pi)
+    turned = so3.rotation_x(math.pi) @ hand.plane.R_hand_tool
+    farther = replace(hand, plane=replace(hand.plane, R_hand_tool=turned))
     other = farther.before(middle, Approach(0.5, math.pi), 0.01)
-    assert other.roll == pytest.approx(at.roll, abs=1e-12)
+    assert isinstance(at, ToolTarget)
+    assert isinstance(other, ToolTarget)
+    assert math.remainder(other.roll - at.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(other.position, at.position, atol=1e-12)
     assert farther.branches_to(session.ready, other)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import cast
@@ -9,6 +10,7 @@ from typing import cast
 import numpy as np
 
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
 from katana450.extensions.programs.out_of_reach import (
@@ -25,6 +27,7 @@ from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import AnyBranch, Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
@@ -38,9 +41,14 @@ SAMPLES = 65
 
 @dataclass(frozen=True, eq=False)
 class FiveAxisPlanning:
-    """The functions of one chain as `ToolPlanning`."""
+    """The functions of one tool as `ToolPlanning`."""
 
-    chain: Chain
+    kinematics: ToolKinematics
+
+    @property
+    def chain(self) -> Chain:
+        """The chain to the tool."""
+        return self.kinematics.chain
 
     def at(self, q: FloatArray) -> DragTarget:
         """Return the five freedoms of the tool at `q`."""
@@ -58,6 +66,13 @@ class FiveAxisPlanning:
             pitch=five.pitch if angles.pitch is None else angles.pitch,
             roll=five.roll if angles.roll is None else angles.roll,
         )
+
+    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+        """Return the five freedoms of the tool, whose yaw is not used."""
+        arm = arm_of(self.chain)
+        K = arm.T_C_S[:3, :3] @ R @ arm.T_K_tool[:3, :3].T
+        pitch, roll = math.atan2(-K[2, 0], K[0, 0]), math.atan2(-K[1, 2], K[1, 1])
+        return ToolTarget(position, pitch, roll)
 
     def line(self, start: DragTarget, end: DragTarget) -> AnyCurve:
         """Return the line on which pitch and roll change evenly."""

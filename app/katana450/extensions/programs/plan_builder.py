@@ -18,8 +18,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan, MoveFingers
 from katana450.extensions.programs.approach import Approach
-from katana450.extensions.programs.hand_choice import hand_of
-from katana450.extensions.programs.hand_planning import HandPlanning
+from katana450.extensions.programs.hand_planning import HandPlanning, hand_of
 from katana450.extensions.programs.planning_choice import planning_of
 from katana450.extensions.programs.reaching import check_range
 from katana450.extensions.programs.script_frame import ScriptFrame

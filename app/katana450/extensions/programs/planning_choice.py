@@ -13,4 +13,4 @@ def planning_of(kinematics: ToolKinematics) -> ToolPlanning:
     """Return the planning of the tool of ``kinematics``."""
     if isinstance(kinematics, DrivenTool):
         return PosePlanning(kinematics)
-    return FiveAxisPlanning(kinematics.chain)
+    return FiveAxisPlanning(kinematics)

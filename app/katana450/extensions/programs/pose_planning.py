@@ -134,6 +134,10 @@ class PosePlanning:
             return None
         return axis * math.atan2(float(axis @ np.cross(now, wanted)), float(now @ wanted))
 
+    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+        """Return the pose."""
+        return ToolPose(frozen(position), frozen(R))
+
     def line(self, start: DragTarget, end: DragTarget) -> AnyCurve:
         """Return the line on which the tool turns about one axis."""
         points = ToolLine(_point(start.position), _point(end.position))

@@ -13,7 +13,6 @@ from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pose_curve import PoseTurn
-from katana450.extensions.programs.pose_hand import PoseHand
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -94,7 +93,6 @@ def about_the_lip(
         aim: distance of the lip before that middle [m].
     """
     level, hand = builder.target, builder.hand
-    assert isinstance(hand, PoseHand)
     radius, tall = size
     for height in UNDERSIDES:
         point = over + (tall + height) * UP

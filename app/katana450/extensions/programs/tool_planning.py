@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.extensions.programs.curve import Curve
 from katana450.extensions.programs.pose_curve import PoseCurve
 from katana450.extensions.programs.script_frame import ScriptFrame
@@ -25,6 +26,16 @@ AnyCurve = Curve | PoseCurve
 
 class ToolPlanning(Protocol):
     """The planning of one tool. Joint angles ``q`` are (n,) [rad], points (3,) [m] in {S}."""
+
+    @property
+    def kinematics(self) -> ToolKinematics:
+        """The kinematics of the tool."""
+
+    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+        """Return the target of the tool point at ``position`` (3,) [m].
+
+        `R` (3, 3) is the rotation of the tool; of fewer than six axes that with axis 1 at zero.
+        """
 
     def at(self, q: FloatArray) -> DragTarget:
         """Return the target at which the tool is with the joints at `q`."""
