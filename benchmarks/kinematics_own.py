@@ -14,16 +14,17 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task
 from katana450 import tolerances
-from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.inverse_batch import inverse_batch
 from katana450.maths.kinematics.solver import Solver
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
@@ -68,7 +69,7 @@ class Katana450:
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
         """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
-        return list(found.q)
+        return list(found)
 
 
 class Public:
@@ -81,7 +82,7 @@ class Public:
 
     def solve(self, T: FloatArray) -> Any:
         """Return all solutions for the pose ``T`` (4, 4)."""
-        solutions = IKSolutions.of_one(self._kinematics, T)
+        solutions = IKSolutions(self._kinematics, T)
         return solutions, solutions.q
 
     def joints(self, found: Any) -> FloatArray:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from katana450.library.trajectory import Trajectory
     from katana450.library.viewer import Viewer
     from katana450.maths.kinematics.branch import Branch
-    from katana450.maths.kinematics.inverse import Solution
+    from katana450.maths.kinematics.solution import Solution
 
 __all__ = [
     "Arm",
@@ -82,7 +82,7 @@ _MODULES = {
     "Recording": "library.recording",
     "RobotDescriptionError": "errors",
     "ScriptWriter": "library.script_writer",
-    "Solution": "maths.kinematics.inverse",
+    "Solution": "maths.kinematics.solution",
     "Trajectory": "library.trajectory",
     "Viewer": "library.viewer",
     "connect": "client",

@@ -10,11 +10,11 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import reversed_chain
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 from tests.general_arms import singular_postures as singular

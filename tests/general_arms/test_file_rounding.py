@@ -12,12 +12,12 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import exact_chain, links_of
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.extensions.reachability.pose_solver import PoseSolver
-from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings

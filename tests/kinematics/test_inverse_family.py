@@ -15,7 +15,8 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import Solution, inverse
+from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solution import Solution
 from katana450.maths.kinematics.solver import Solver
 from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
@@ -101,7 +102,9 @@ def assert_exact(chain: Chain, q: FloatArray, T: FloatArray, within: float) -> N
     solutions = [s for s in inverse(chain, T) if s.exact]
     assert any(same(s.q, q, within) for s in solutions)
     if arm_of(chain).d != 0.0:
-        both = [[s for s in solutions if s.branch.shoulder == side] for side in ("front", "back")]
+        both = [
+            [s for s in solutions if str(s.branch).startswith(side)] for side in ("front", "back")
+        ]
         both = [side for side in both if side]
         solutions = min(both, key=lambda side: max(s.rotation_error for s in side))
     assert len(solutions) >= 2

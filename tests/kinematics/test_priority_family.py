@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.inverse_batch import inverse_batch
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget
@@ -38,12 +38,11 @@ def least_pitch(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
         for branch in BRANCHES[::2]
         for target in targets
     ]
-    found = inverse_batch(chain, np.array(poses), residuals=True)
-    assert found.position_error is not None
-    assert found.rotation_error is not None
-    fits = ((found.q >= chain.lower) & (found.q <= chain.upper))[:, :, :4].all(axis=2)
-    fits &= (found.position_error < 1e-9) & (found.rotation_error < 1e-9)
-    alpha = arm_of(chain).canonical(found.q[fits])
+    q = inverse_batch(chain, np.array(poses))
+    position, rotation = errors_of(chain, q, np.array(poses))
+    fits = ((q >= chain.lower) & (q <= chain.upper))[:, :, :4].all(axis=2)
+    fits &= (position < 1e-9) & (rotation < 1e-9)
+    alpha = arm_of(chain).canonical(q[fits])
     pitch = alpha[:, 1:4].sum(axis=1) - arm_of(chain).tilt
     error = np.abs(pitch - target_pitch(chain, T, alpha[:, 0]) + math.pi) % math.tau - math.pi
     return float(np.abs(error).min()) if error.size else math.inf

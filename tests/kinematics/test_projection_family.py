@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.inverse_batch import inverse_batch
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.kinematics.family import Offsets, member, random_member, random_pose
@@ -77,12 +77,10 @@ def least_rotation(chain: Chain, T: FloatArray, q0: FloatArray) -> float:
         for branch in BRANCHES[::2]
         for target in (ToolTarget(T[:3, 3], float(pitch), 0.0) for pitch in pitches)
     ]
-    found = inverse_batch(chain, np.array(poses), residuals=True)
-    assert found.position_error is not None
-    assert found.rotation_error is not None
-    q = found.q
+    q = inverse_batch(chain, np.array(poses))
+    position, rotation = errors_of(chain, q, np.array(poses))
     fits = ((q >= chain.lower) & (q <= chain.upper))[:, :, :4].all(axis=2)
-    fits &= (found.position_error < 1e-9) & (found.rotation_error < 1e-9)
+    fits &= (position < 1e-9) & (rotation < 1e-9)
     q = np.repeat(q[fits][:, None], len(rolls), axis=1)
     q[:, :, 4] = chain.lower[4] + rolls * (chain.upper[4] - chain.lower[4])
     if not q.size:

@@ -29,6 +29,7 @@ from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 
 if TYPE_CHECKING:
     from katana450.library.viewer import Viewer
@@ -115,6 +116,10 @@ class Arm:
         """Home configuration M, screw axes S and limits, in the frame {S}."""
         return self._mounted.chain_to(self.tool)
 
+    @cached_property
+    def _kinematics(self) -> Kinematics:
+        return FiveAxisKinematics(self.chain)
+
     @property
     def T_base_frame(self) -> FloatArray:
         """(4, 4) maps coordinates of the frame of poses into the base [m]."""
@@ -166,10 +171,7 @@ class Arm:
         >>> arm.ik(np.stack([T, T, T])).q.shape
         (3, 4, 5)
         """
-        poses = self.pose_frame.to_shoulder(T)
-        if dimensions(T) == 3 and q_hint is None:
-            return IKSolutions.of_poses(self.chain, poses)
-        return IKSolutions.of_pose(self.chain, poses, q_hint)
+        return IKSolutions(self._kinematics, self.pose_frame.to_shoulder(T), q_hint)
 
     def nearest(
         self,

@@ -20,7 +20,7 @@ from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.library.arm import Arm, Priority
 from katana450.library.motion_plan import MotionPlan
-from katana450.library.pose_frame import PoseFrame, dimensions
+from katana450.library.pose_frame import PoseFrame
 from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -91,10 +91,7 @@ class GeneralArm(Arm):
         of each branch with the most room to the limits, or nearest to the hint. A numerical
         solution is one posture inside the limits. Arguments and errors are those of `Arm.ik`.
         """
-        kinematics, poses = self.described.kinematics, self.pose_frame.to_shoulder(T)
-        if dimensions(T) == 3 and q_hint is None:
-            return IKSolutions.of_many(kinematics, poses)
-        return IKSolutions.of_one(kinematics, poses, q_hint)
+        return IKSolutions(self.described.kinematics, self.pose_frame.to_shoulder(T), q_hint)
 
     def nearest(  # type: ignore[override]  # Yaw, pitch and roll are those of five axes.
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -11,16 +11,13 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.extensions.batch.inverse_batch import inverse_batch
-from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of, validated_poses
+from katana450.library.pose_frame import dimensions
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import BRANCHES, Branch
-from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse import inverse
-from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
+from katana450.maths.kinematics.batch import errors_of
+from katana450.maths.kinematics.inverse_batch import validated_poses
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.pose_units import check_metres
-
-Branches = tuple[Branch | str, ...]
+from katana450.maths.kinematics.solution import Solution, Solutions
 
 ROUNDING_ERRORS: Final = 10.0
 """[m], [rad] Error of a solution, relative to the misfit of its pose, that rounding explains."""
@@ -34,75 +31,32 @@ class IKSolutions:
     ``within_limits``, ``position_error``, ``rotation_error`` and ``exact``.
     """
 
-    # Of a single pose, all that follows from the postures is computed when it is first read.
+    # All that follows from the solutions is computed when it is first read.
     def __init__(
-        self, chain: Chain, T: FloatArray, postures: Sequence[SolvedPosture] | None = None
+        self, kinematics: Kinematics, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
     ) -> None:
-        """Hold the ``postures`` of the pose `T` (4, 4) in {S}; None for N poses.
+        """Solve the pose `T` (4, 4) in {S}, or, without a hint, poses (N, 4, 4).
 
-        Raises InputError for a pose whose unit is in doubt.
+        Errors are those of `Kinematics`, and InputError for a pose whose unit is in doubt.
         """
-        self._chain = chain
-        self._T = T
-        self._postures = postures
-        if postures is not None:
-            check_metres(chain, T[:3, 3].tolist())
-        elif len(T):
-            distances = np.linalg.norm(T[:, :3, 3], axis=1)
-            number = int(distances.argmax())
-            check_metres(chain, T[number, :3, 3].tolist(), f"Pose {number}")
-
-    @staticmethod
-    def of_pose(chain: Chain, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
-        """Solve the pose ``T`` (4, 4) in {S}; errors as in `maths.kinematics.inverse.inverse`."""
-        postures = inverse(chain, T, q_hint=q_hint)
-        solutions = IKSolutions(chain, np.array(T), postures)
-        solutions.branches = BRANCHES
-        return solutions
-
-    @staticmethod
-    def of_poses(chain: Chain, T: npt.ArrayLike) -> IKSolutions:
-        """Solve the poses ``T`` (N, 4, 4) in {S}; errors as in `inverse_batch`."""
-        found = inverse_batch(chain, T, residuals=True)
-        assert found.position_error is not None
-        assert found.rotation_error is not None
-        solutions = IKSolutions(chain, np.array(T))
-        solutions.q, solutions.branches = found.q, BRANCHES
-        solutions._errors = found.position_error, found.rotation_error
-        return solutions
-
-    @staticmethod
-    def of_one(
-        kinematics: Kinematics, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> IKSolutions:
-        """Solve the pose ``T`` (4, 4) in {S} of any arm; errors as in `Kinematics.inverse`."""
-        return IKSolutions(kinematics.chain, np.array(T), kinematics.inverse(T, q_hint))
-
-    @staticmethod
-    def of_many(kinematics: Kinematics, T: npt.ArrayLike) -> IKSolutions:
-        """Solve the poses ``T`` (N, 4, 4) in {S} of any arm; errors as in `of_one`."""
-        chain, poses = kinematics.chain, validated_poses(T)
-        solutions = IKSolutions(chain, np.array(T).reshape(-1, 4, 4))
-        if isinstance(kinematics, ClosedForm):
-            solutions.q, solutions.branches = kinematics.inverse_batch(poses), kinematics.branches
+        self._chain = chain = kinematics.chain
+        self.branches = kinematics.branches
+        self._solutions: Solutions | None = None
+        if q_hint is None and dimensions(T) == 3:
+            self.q = kinematics.inverse_batch(T)
+            self._T = np.array(T).reshape(-1, 4, 4)
+            if len(self._T):
+                number = int(np.linalg.norm(self._T[:, :3, 3], axis=1).argmax())
+                check_metres(chain, self._T[number, :3, 3].tolist(), f"Pose {number}")
         else:
-            found = [kinematics.inverse(each) for each in poses]
-            branches = tuple(str(each.branch) for each in found[0]) if found else ()
-            q = np.array([[each.q for each in some] for some in found])
-            solutions.q = q.reshape(len(found), len(branches), chain.n)
-            solutions.branches = branches
-        solutions._errors = errors_of(chain, solutions.q, poses)
-        return solutions
+            self._solutions = kinematics.inverse(T, q_hint)
+            self._T = np.array(T)
+            check_metres(chain, self._T[:3, 3].tolist())
 
     @cached_property
     def q(self) -> FloatArray:
         """(k, n) or (N, k, n) joint angles [rad]."""
         return np.array([each.q for each in self])
-
-    @cached_property
-    def branches(self) -> Branches:
-        """The k branches: of a five-axis arm `Branch`, of others their names."""
-        return tuple(str(each.branch) for each in self)
 
     @cached_property
     def within_limits(self) -> npt.NDArray[np.bool_]:
@@ -123,6 +77,8 @@ class IKSolutions:
 
     @cached_property
     def _errors(self) -> tuple[FloatArray, FloatArray]:
+        if self._solutions is None:
+            return errors_of(self._chain, self.q, validated_poses(self._T))
         errors = np.array([(each.position_error, each.rotation_error) for each in self])
         return errors[:, 0], errors[:, 1]
 
@@ -137,7 +93,7 @@ class IKSolutions:
         return misfit if misfit.ndim else float(misfit)
 
     @property
-    def feasible(self) -> tuple[SolvedPosture, ...]:
+    def feasible(self) -> tuple[Solution, ...]:
         """Solutions of a single pose that reach it and are inside the joint limits.
 
         They reach it exactly, or to within the rounding of its numbers.
@@ -150,11 +106,11 @@ class IKSolutions:
             and (each.exact or max(each.position_error, each.rotation_error) <= slack)
         )
 
-    def __iter__(self) -> Iterator[SolvedPosture]:
+    def __iter__(self) -> Iterator[Solution]:
         """Iterate over the solutions of a single pose. Raises InputError for several poses."""
-        if self._postures is None:
+        if self._solutions is None:
             raise InputError(
                 f"These are the solutions of {len(self.q)} poses. Index the arrays, for example "
                 "`.q[pose, branch]`, or solve one pose at a time."
             )
-        return iter(self._postures)
+        return iter(self._solutions)

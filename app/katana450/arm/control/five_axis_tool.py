@@ -35,7 +35,6 @@ READY_ROOM = 0.05
 class FiveAxisTool(FiveAxisKinematics):
     """The functions of the five-axis family as `ToolKinematics`."""
 
-    branches: ClassVar[Sequence[AnyBranch]] = BRANCHES
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = {
         each: (name, PRIORITY_HINTS[each]) for each, name in PRIORITIES.items()
     }

@@ -33,8 +33,6 @@ class ToolKinematics(Kinematics, Protocol):
     """
 
     @property
-    def branches(self) -> Sequence[AnyBranch]: ...  # noqa: D102
-    @property
     def priorities(self) -> Mapping[Priority, tuple[str, str]]: ...  # noqa: D102
     @property
     def freedoms(self) -> int: ...  # noqa: D102

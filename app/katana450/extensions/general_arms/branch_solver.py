@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +16,6 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import Kinematics
 
-ONLY = "numerical"
-"""Name of the one branch of an arm without a closed form."""
-
 
 @dataclass(frozen=True, eq=False)
 class BranchSolver:
@@ -30,13 +26,13 @@ class BranchSolver:
     @property
     def names(self) -> tuple[str, ...]:
         """The names, in the order of the solutions."""
-        solver = self.solver
-        return solver.branches if isinstance(solver, ClosedForm | SevenAxes) else (ONLY,)
+        return tuple(map(str, self.solver.branches))
 
     @property
-    def shown(self) -> Sequence[str]:
+    def shown(self) -> tuple[str, ...]:
         """The names in the order for people: those of usual postures first."""
-        return sorted(self.names, key=lambda name: [word in SECOND for word in name.split("-")])
+        second = {name: [word in SECOND for word in name.split("-")] for name in self.names}
+        return tuple(sorted(self.names, key=second.__getitem__))
 
     @property
     def swivel(self) -> int | None:
@@ -57,7 +53,7 @@ class BranchSolver:
             swivel = q[solver.swivel : solver.swivel + 1]
             found = solver.at_swivels(forward(solver.chain, q), swivel)[0]
         else:
-            return ONLY
+            return self.names[0]
         away = found - q
         away -= math.tau * np.round(away / math.tau)
         return self.names[int(np.nan_to_num(np.abs(away), nan=math.inf).max(axis=1).argmin())]

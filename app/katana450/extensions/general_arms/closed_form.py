@@ -11,19 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.caching import cached_property
-from katana450.errors import InputError
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.form import Form, form_of
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.parallel_axes import LOOSE, six_axes
-from katana450.extensions.general_arms.posture import Angles, Postures
 from katana450.extensions.general_arms.spherical_wrist import Solve
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.inverse_batch import validated_poses
+from katana450.maths.kinematics.solution import Angles, Solutions
 from katana450.maths.kinematics.turns import another_turn_helps, in_turn, nearest_turn
 
 
@@ -74,11 +73,6 @@ class ClosedForm:
     def rounding(self) -> FileRounding:
         """The rounding of the file that describes the chain."""
         return FileRounding(self.chain, self.form.links)
-
-    @cached_property
-    def slack(self) -> float:
-        """See `FileRounding.slack`."""
-        return self.rounding.slack
 
     @cached_property
     def _canonical(self) -> Callable[[FloatArray, Sequence[float]], list[Angles]]:
@@ -136,7 +130,7 @@ class ClosedForm:
         poses = np.repeat(T[None], len(q), axis=0)
         return list(map(tuple, self.rounding.corrected(np.array(q), poses, again).tolist()))
 
-    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Postures:
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
 
         Where no exact posture exists, the postures come as near as the subproblems can: the tool
@@ -146,12 +140,22 @@ class ClosedForm:
         pose = se3.validated(T)
         if q_hint is None and not self.rounding.is_corrected:
             # The joint angles of a branch follow from its canonical angles when they are read.
-            return Postures(self, pose, self._canonical(pose, self.form.links.shift), self._joints)
+            angles = self._canonical(pose, self.form.links.shift)
+            return self._solutions(pose, angles, self._joints)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
         angles = self.solve(pose, None if hint is None else hint.tolist())
         if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
             angles = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in angles]
-        return Postures(self, pose, angles)
+        return self._solutions(pose, angles)
+
+    def _solutions(
+        self,
+        T: FloatArray,
+        angles: Sequence[Angles],
+        joints: Callable[[Angles], Angles] = tuple,
+    ) -> Solutions:
+        slack = self.rounding.slack
+        return Solutions(self.chain, T, angles, self.branches, lambda _T: (slack, slack), joints)
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].
@@ -190,18 +194,6 @@ class ClosedForm:
         return q
 
 
-def validated_poses(T: npt.ArrayLike) -> FloatArray:
-    """Return poses (N, 4, 4), each as `se3.validated`. Raises InputError for an invalid one."""
-    try:
-        poses = np.asarray(T, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The poses are not a regular array of numbers: {error}.") from error
-    if poses.ndim != 3 or poses.shape[1:] != (4, 4):
-        raise InputError(f"The poses have shape {poses.shape}; it must be (N, 4, 4).")
-    clean = [se3.validated(each, f"Pose {number}") for number, each in enumerate(poses)]
-    return np.array(clean).reshape(-1, 4, 4)
-
-
 def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
     """Return `q` (..., n) [rad], each angle in the turn inside its limits, else in [-pi, pi]."""
     q = q - math.tau * np.round(q / math.tau)
@@ -211,19 +203,6 @@ def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
         fits = outside & (other >= chain.lower) & (other <= chain.upper)
         q = np.where(fits, other, q)
     return q
-
-
-def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the errors (N, k) [m], [rad] of joint angles `q` (N, k, n) for poses `T` (N, 4, 4)."""
-    count, k, n = q.shape
-    reached = forward_batch(chain, q.reshape(-1, n)).reshape(count, k, 4, 4)
-    distance = np.linalg.norm(reached[..., :3, 3] - T[:, None, :3, 3], axis=-1)
-    R = reached[..., :3, :3].swapaxes(-1, -2) @ T[:, None, :3, :3]
-    sine = 0.5 * np.linalg.norm(
-        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
-        axis=0,
-    )
-    return distance, np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
 
 
 def inverses(T: FloatArray) -> FloatArray:

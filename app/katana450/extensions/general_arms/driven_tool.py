@@ -34,9 +34,9 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.kinematics import SolvedPosture
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projection
+from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame, Task
@@ -98,15 +98,17 @@ class DrivenTool:
         return self._branches.solver.method
 
     @property
-    def branches(self) -> Sequence[AnyBranch]:
+    def branches(self) -> tuple[AnyBranch, ...]:
         """The names of the branches, those of usual postures first."""
         return self._branches.shown
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> Sequence[SolvedPosture]:
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each branch; see `Kinematics.inverse`."""
         return self._branches.solver.inverse(T, q_hint)
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return joint angles (N, branches, n) [rad]; see `Kinematics.inverse_batch`."""
+        return self._branches.solver.inverse_batch(T)
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the name of the branch of `q` (n,) [rad]."""

@@ -14,13 +14,13 @@ from katana450.arm.control.messages import REASONS
 from katana450.arm.control.state import Finding, Reason
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.extensions.general_arms.posture import GeneralPosture, scaled_jacobian
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
-from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
+from katana450.maths.kinematics.solution import Solution, scaled_jacobian
 
 POSITION_FIRST = 100.0
 """Weight of the position relative to the orientation if a pose cannot be reached."""
@@ -92,7 +92,7 @@ def nearest_posture(
             starts.insert(0, chain.clamp(q_hint))
         for weight in (POSITION_FIRST, POSITION_ALONE):
             q = search.nearest(target, starts, weight)
-            posture = GeneralPosture(chain, target, tuple(q), "numerical")
+            posture = Solution(chain, target, tuple(q), "numerical")
             usable = [*usable, posture]
             if posture.position_error <= POSITION_WORTH_TELLING:
                 break
@@ -101,7 +101,7 @@ def nearest_posture(
     return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
 
 
-def _errors(posture: SolvedPosture) -> tuple[float, float]:
+def _errors(posture: Solution) -> tuple[float, float]:
     return round(posture.position_error, 6), posture.rotation_error
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,12 +24,13 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.links import DHLinks
-from katana450.extensions.general_arms.posture import GeneralPosture
 from katana450.extensions.general_arms.tool_motion import Motion, tool_and_jacobian
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import inverse_one_by_one
+from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turn
 
 QUICK_STEPS: Final = 14
@@ -83,6 +84,8 @@ class Numerical:
     why: str = ""
     weight: float = 1.0
 
+    branches: ClassVar[tuple[str, ...]] = ("numerical",)
+
     @property
     def method(self) -> str:
         """The method in words."""
@@ -119,17 +122,19 @@ class Numerical:
         nearest = np.argpartition(far, SEEDS)[:SEEDS]
         return q[nearest[np.argsort(far[nearest], kind="stable")]]
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> Sequence[GeneralPosture]:
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return one posture inside the limits; see `Kinematics.inverse`.
 
         The search begins at `q_hint` (n,) [rad]. If no seed reaches the pose, the posture is the
         nearest that was found.
         """
-        pose = np.array(se3.validated_rows(T))
+        pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.clamp(q_hint)
-        return [GeneralPosture(self.chain, pose, self.solve(pose, hint), "numerical")]
+        return Solutions(self.chain, pose, [self.solve(pose, hint)], self.branches)
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return the joint angles (N, 1, n) [rad]; see `Kinematics.inverse_batch`."""
+        return inverse_one_by_one(self, T)
 
     def solve(
         self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS

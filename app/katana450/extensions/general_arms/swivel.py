@@ -16,7 +16,6 @@ whole range, a second one between the neighbours of the best.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -26,12 +25,11 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
-from katana450.extensions.general_arms.closed_form import errors_of, in_limits_turns, inverses
+from katana450.extensions.general_arms.closed_form import in_limits_turns, inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.extensions.general_arms.posture import GeneralPosture
 from katana450.extensions.general_arms.spherical_wrist import (
     crossing_shoulder,
     is_crossing_shoulder,
@@ -42,7 +40,10 @@ from katana450.extensions.general_arms.spherical_wrist import (
 )
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import inverse_one_by_one
+from katana450.maths.kinematics.solution import Solutions
 
 SWIVELS: Final = 64
 """Number of swivels of the first round."""
@@ -170,21 +171,19 @@ class SevenAxes:
                 q[:, k, place] = angle - links.shift[place]
         return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> Sequence[GeneralPosture]:
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
 
         With `q_hint` (7,) [rad] it is the one nearest to the hint, weighed against the room to the
         limits; else the one with the most room.
         """
-        pose = np.array(se3.validated_rows(T))
+        pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
-        q = self.best(pose, hint)
-        return [
-            GeneralPosture(self.chain, pose, tuple(each), branch)
-            for each, branch in zip(q.tolist(), self.branches, strict=True)
-        ]
+        return Solutions(self.chain, pose, self.best(pose, hint).tolist(), self.branches)
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return the joint angles (N, 8, 7) [rad]; see `Kinematics.inverse_batch`."""
+        return inverse_one_by_one(self, T)
 
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
         """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""

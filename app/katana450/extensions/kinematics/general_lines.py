@@ -10,13 +10,12 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.general_arms.described_arm import DescribedArm
 from katana450.extensions.general_arms.nearest import nearest_posture
-from katana450.extensions.general_arms.posture import singular_axes
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.kinematics import Kinematics, SolvedPosture
+from katana450.maths.kinematics.kinematics import Kinematics
+from katana450.maths.kinematics.solution import Solution
 
 GENERAL_KEYS = KEYS - {"pitch", "roll"}
 """The keys that describe a pose of any arm; pitch and roll are those of five axes."""
@@ -57,7 +56,7 @@ class GeneralLines:
         found = kinematics.inverse(T, hint)
         exact = [each for each in found if each.exact] or [min(found, key=_errors)]
         answer = {
-            "solutions": [_solution(chain, each) for each in exact],
+            "solutions": [_solution(each) for each in exact],
             "residual_mm": 1e3 * max(each.position_error for each in exact),
             "residual_rad": max(each.rotation_error for each in exact),
             "rotation_misfit": misfit,
@@ -89,14 +88,14 @@ class GeneralLines:
         return self._arm.kinematics_to(tool)
 
 
-def _errors(posture: SolvedPosture) -> tuple[float, float]:
+def _errors(posture: Solution) -> tuple[float, float]:
     return round(posture.position_error, 9), posture.rotation_error
 
 
-def _solution(chain: Chain, posture: SolvedPosture) -> dict[str, Any]:
+def _solution(posture: Solution) -> dict[str, Any]:
     return {
         "q": posture.q.tolist(),
         "within_limits": posture.within_limits,
         "branch": str(posture.branch),
-        "singular": [axis + 1 for axis in singular_axes(chain, posture.q)],
+        "singular": [axis + 1 for axis in posture.singular],
     }

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
-from katana450.extensions.general_arms.closed_form import ClosedForm, errors_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
 
 BoolArray = npt.NDArray[np.bool]

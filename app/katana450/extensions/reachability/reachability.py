@@ -23,13 +23,13 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.batch.inverse_batch import inverse_batch
 from katana450.extensions.reachability.grid import IntArray, VoxelGrid
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.inverse_batch import inverse_batch
 
 BoolArray = npt.NDArray[np.bool]
 
@@ -110,7 +110,7 @@ class Reachability:
             rolls = slice(roll, roll + 1) if beside else slice(None)
             for poses in self.tool_poses(p[near], roll):
                 T = poses.reshape(-1, 4, 4)
-                q = inverse_batch(self.chain, T).q
+                q = inverse_batch(self.chain, T)
                 pose, branch = np.nonzero(self._free(q))
                 # Postures for a pose out of reach are only near it.
                 exact = _same(forward_batch(self.chain, q[pose, branch]), T[pose])

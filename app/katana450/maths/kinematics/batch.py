@@ -32,6 +32,20 @@ def forward_batch(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     return result
 
 
+def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the errors (N, k) [m], [rad] of joint angles `q` (N, k, n) for poses `T` (N, 4, 4)."""
+    count, k, n = q.shape
+    reached = forward_batch(chain, q.reshape(-1, n)).reshape(count, k, 4, 4)
+    x, y, z = np.moveaxis(reached[..., :3, 3] - T[:, None, :3, 3], -1, 0)
+    distance = np.hypot(np.hypot(x, y), z)
+    R = reached[..., :3, :3].swapaxes(-1, -2) @ T[:, None, :3, :3]
+    sine = 0.5 * np.linalg.norm(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
+        axis=0,
+    )
+    return distance, np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
+
+
 def chunks(n: int) -> Iterator[slice]:
     """Return the slices of at most CHUNK poses."""
     return (slice(start, min(start + CHUNK, n)) for start in range(0, n, CHUNK))

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse import Solution
 from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.solution import Solution
 from katana450.maths.kinematics.velocity import singular_values
 
 

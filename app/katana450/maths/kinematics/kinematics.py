@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
+import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import BRANCHES, AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse import inverse
-
-
-class SolvedPosture(Protocol):
-    """Joint angles for a pose, with their distance from it; `inverse.Solution` is one.
-
-    Attributes:
-        q: joint angles (n,) [rad].
-        branch: name of the branch, by `str`.
-        within_limits: whether every angle is inside its limits.
-        position_error, rotation_error: distance [m] and angle [rad] between the target and the pose
-            that forward kinematics gives for `q`.
-        exact: whether both are only rounding.
-    """
-
-    @property
-    def q(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def branch(self) -> object: ...  # noqa: D102
-    @property
-    def within_limits(self) -> bool: ...  # noqa: D102
-    @property
-    def position_error(self) -> float: ...  # noqa: D102
-    @property
-    def rotation_error(self) -> float: ...  # noqa: D102
-    @property
-    def exact(self) -> bool: ...  # noqa: D102
+from katana450.maths.kinematics.inverse_batch import inverse_batch, validated_poses
+from katana450.maths.kinematics.solution import Solutions
 
 
 class Kinematics(Protocol):
@@ -45,21 +22,34 @@ class Kinematics(Protocol):
     Attributes:
         chain: the chain, whose `M` is the pose of the tool.
         method: the method in a few words, for people.
+        branches: the branches, in the order of the solutions.
     """
 
     @property
     def chain(self) -> Chain: ...  # noqa: D102
     @property
     def method(self) -> str: ...  # noqa: D102
+    @property
+    def branches(self) -> tuple[AnyBranch, ...]: ...  # noqa: D102
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> Sequence[SolvedPosture]:
-        """Return a posture for each branch of the pose `T` (4, 4) = T_S_tool [m].
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
+        """Return a solution for each branch of the pose `T` (4, 4) = T_S_tool [m].
 
         `q_hint` (n,) [rad] decides what the pose leaves free. Raises InputError for an invalid `T`
         or `q_hint`.
         """
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return the joint angles (N, branches, n) [rad] of poses `T` (N, 4, 4) [m], as `inverse`.
+
+        Raises InputError for the first invalid pose.
+        """
+
+
+def inverse_one_by_one(kinematics: Kinematics, T: npt.ArrayLike) -> FloatArray:
+    """Return `Kinematics.inverse_batch` of a method that solves one pose at a time."""
+    q = [[each.q for each in kinematics.inverse(pose)] for pose in validated_poses(T)]
+    return np.array(q).reshape(len(q), len(kinematics.branches), kinematics.chain.n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +58,12 @@ class FiveAxisKinematics:
 
     chain: Chain
     method: str = "closed form for five axes: pan, three parallel axes, roll"
+    branches: ClassVar[tuple[AnyBranch, ...]] = BRANCHES
 
-    def inverse(
-        self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None
-    ) -> Sequence[SolvedPosture]:
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return `inverse.inverse`."""
         return inverse(self.chain, T, q_hint=q_hint)
+
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return `inverse_batch.inverse_batch`."""
+        return inverse_batch(self.chain, T)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.maths.geometry.se3 import Rows
 from katana450.maths.kinematics.arm import Five, FiveAxisArm, arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.closed_form import Functions, closed_form
+from katana450.maths.kinematics.solution import Slack
 from katana450.maths.kinematics.turns import in_turn, wrapped
 
 FourBranches = tuple[Five, Five, Five, Five]
@@ -40,12 +42,12 @@ class Solver(NamedTuple):
             orthonormal rotation. `theta1` [rad] is used where the pose leaves it free. Returns
             joint angles [rad] in the order of BRANCHES, each in the turn inside its limits if there
             is one, else in [-pi, pi].
-        inside: inside(q) is True if every angle is inside its limits.
+        slack: returns the errors of a pose that rounding explains, see `Solution`.
     """
 
     arm: FiveAxisArm
     solve: Callable[..., FourBranches]
-    inside: Callable[[Five], bool]
+    slack: Slack
 
     @staticmethod
     @lru_cache(maxsize=64)
@@ -55,7 +57,25 @@ class Solver(NamedTuple):
         Raises RobotDescriptionError as `arm_of`.
         """
         arm = arm_of(chain)
-        return Solver(arm, _solve(chain, arm), _inside(chain))
+        return Solver(arm, _solve(chain, arm), partial(_rounding, arm))
+
+
+def _rounding(arm: FiveAxisArm, T: npt.ArrayLike) -> tuple[float, float]:
+    """Return the errors [m], [rad] of a pose `T` (4, 4) that rounding in the arm's file explains.
+
+    Each of four axes may be off by `skew`, and so displaces the parts on it by a `length`. theta1
+    follows from a point sqrt(rho^2 - d^2) outward of axis 1. A displacement by the length turns
+    theta1 by its ratio to this distance; nearer than the length theta1 is undetermined. A tool
+    point beside the roll axis turns with it.
+    """
+    length = 4.0 * (arm.skew * arm.reach + arm.gap)
+    if length == 0.0:
+        return 0.0, 0.0
+    x, y = arm.pose(np.array(T))[:2, 3].tolist()
+    rho, d = math.hypot(x, y), abs(arm.d)
+    outward = math.sqrt(abs(rho - d) * (rho + d) + length * (length + 2.0 * d))
+    turn = 4.0 * arm.skew + length / outward
+    return length + turn * arm.off_axis, turn
 
 
 Facing = tuple[float, float, float, float, float, float, float, float]
@@ -180,21 +200,3 @@ def _turned(chain: Chain, arm: FiveAxisArm) -> Callable[[Five], Five] | None:
         return one, two, three, four, five
 
     return turned
-
-
-def _inside(chain: Chain) -> Callable[[Five], bool]:
-    slack = tolerances.LIMIT_SLACK
-    a1, a2, a3, a4, a5 = (chain.lower - slack).tolist()
-    b1, b2, b3, b4, b5 = (chain.upper + slack).tolist()
-
-    def inside(q: Five) -> bool:
-        q1, q2, q3, q4, q5 = q
-        return bool(
-            a1 <= q1 <= b1
-            and a2 <= q2 <= b2
-            and a3 <= q3 <= b3
-            and a4 <= q4 <= b4
-            and a5 <= q5 <= b5
-        )
-
-    return inside

@@ -7,7 +7,6 @@ tool point near axis 1, which need case distinctions, use the scalar `Solver`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
@@ -17,12 +16,10 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.batch import CHUNK, chunks, forward_columns, number_array
+from katana450.maths.kinematics.batch import CHUNK, chunks, number_array
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.closed_form import Functions, closed_form
 from katana450.maths.kinematics.solver import Solver
-
-BoolArray = npt.NDArray[np.bool_]
 
 _LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])
 
@@ -30,27 +27,10 @@ _SQUARES_HOLD: Final = 1e-150
 """Minimum length whose square keeps its digits."""
 
 
-@dataclass(frozen=True, eq=False)
-class Solutions:
-    """The solutions of `inverse_batch` for N poses; the branches are in the order of BRANCHES.
+def inverse_batch(chain: Chain, T: npt.ArrayLike) -> FloatArray:
+    """Return the joint angles (N, 4, 5) [rad] of the four solutions of each pose, as `inverse`.
 
-    Attributes:
-        q: joint angles (N, 4, 5) [rad].
-        within_limits: True where the joint angles are inside the limits, (N, 4).
-        position_error, rotation_error: errors (N, 4) [m], [rad] of the forward kinematics of q
-            against the target poses; None unless residuals were requested.
-    """
-
-    q: FloatArray
-    within_limits: BoolArray
-    position_error: FloatArray | None = None
-    rotation_error: FloatArray | None = None
-
-
-def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) -> Solutions:
-    """Return the four solutions of each pose `T` (N, 4, 4) = T_S_tool [m], as `inverse` for each.
-
-    With `residuals`, the errors of each solution are measured by forward kinematics.
+    `T` (N, 4, 4) = T_S_tool [m]; the branches are in the order of BRANCHES.
 
     Raises InputError for the first invalid pose, RobotDescriptionError for an arm outside the
     family.
@@ -58,9 +38,6 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
     made = _arm(chain)
     T = number_array(T, (4, 4), "The poses")
     q = np.empty((len(T), 4, 5))
-    inside = np.empty((len(T), 4), dtype=np.bool_)
-    position = np.empty((len(T), 4)) if residuals else None
-    rotation = np.empty((len(T), 4)) if residuals else None
     # One block of memory: malloc reuses a block of the same size, so no page is cleared again.
     work = np.empty(36 * min(len(T), CHUNK))
     # Values that are not finite are rejected, or left to the scalar solver.
@@ -69,14 +46,21 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike, *, residuals: bool = False) ->
             canonical, angles = _arrays(work, rows.stop - rows.start)
             np.copyto(canonical, T[rows].transpose(1, 2, 0))
             _validate(canonical, rows.start, angles.reshape(20, -1))
-            _solve(made, canonical, angles, q[rows], inside[rows])
-            if position is not None and rotation is not None:
-                for branch in range(4):
-                    reached = forward_columns(chain, q[rows, branch].T)
-                    x, y, z = reached[:3, 3] - canonical[:3, 3]
-                    position[rows, branch] = np.hypot(np.hypot(x, y), z)
-                    rotation[rows, branch] = _angle(reached, canonical)
-    return Solutions(q, inside, position, rotation)
+            _solve(made, canonical, angles, q[rows])
+    return q
+
+
+def validated_poses(T: npt.ArrayLike) -> FloatArray:
+    """Return clean copies of poses `T` (N, 4, 4), each as `se3.validated`.
+
+    Raises InputError for the first invalid pose.
+    """
+    poses = number_array(T, (4, 4), "The poses").copy()
+    with np.errstate(over="ignore", invalid="ignore"):
+        for rows in chunks(len(poses)):
+            columns = poses[rows].transpose(1, 2, 0)
+            _validate(columns, rows.start, np.empty((15, columns.shape[2])))
+    return poses
 
 
 def _arrays(work: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
@@ -126,19 +110,6 @@ def _clean(T: FloatArray, start: int) -> None:
     T[3] = _LAST_ROW
 
 
-def _angle(Ta: FloatArray, Tb: FloatArray) -> FloatArray:
-    """Return the angle [rad] between two rotations (4, 4, C), accurate at 0 and pi."""
-    Ra, Rb = Ta[:3, :3], Tb[:3, :3]
-
-    def entry(i: int, j: int) -> FloatArray:
-        product: FloatArray = Ra[0, i] * Rb[0, j] + Ra[1, i] * Rb[1, j] + Ra[2, i] * Rb[2, j]
-        return product
-
-    x, y, z = (entry(i, j) - entry(j, i) for i, j in ((2, 1), (0, 2), (1, 0)))
-    trace = entry(0, 0) + entry(1, 1) + entry(2, 2)
-    return np.asarray(np.atan2(np.sqrt(x * x + y * y + z * z), trace - 1.0))
-
-
 def _root(x: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(x, 0.0)))
 
@@ -164,14 +135,11 @@ class _Arm(NamedTuple):
         posture: the closed form on arrays.
         turns: (joint, sign, shift, lower, upper) of the joints whose angle differs from that of the
             canonical arm, or whose limits [rad] exceed half a turn.
-        lower, upper: limits (5, 1) [rad], with the slack.
     """
 
     solver: Solver
     posture: Callable[..., Any]
     turns: tuple[tuple[int, float, float, float, float], ...]
-    lower: FloatArray
-    upper: FloatArray
 
 
 @lru_cache(maxsize=64)
@@ -185,11 +153,11 @@ def _arm(chain: Chain) -> _Arm:
         for i, sign, shift, a, b in joints
         if sign < 0.0 or shift or max(-a, b) > np.pi + tolerances.LIMIT_SLACK
     )
-    return _Arm(solver, closed_form(arm, _ARRAYS), turns, lower[:, None], upper[:, None])
+    return _Arm(solver, closed_form(arm, _ARRAYS), turns)
 
 
-def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside: BoolArray) -> None:
-    """Fill `q` (C, 4, 5) and `inside` (C, 4) for the poses `T` (4, 4, C).
+def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None:
+    """Fill `q` (C, 4, 5) for the poses `T` (4, 4, C).
 
     `angles` (2, 2, 5, C) is scratch memory.
     """
@@ -205,11 +173,9 @@ def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray, inside:
     beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
     _canonical(made, rows, rho, r, angles)
     _turn(made, angles)
-    inside[...] = _inside(made, angles).reshape(4, -1).T
     q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
     for i in beside.nonzero()[0]:
-        found = solver.solve(T[:, :, i].tolist())
-        q[i], inside[i] = found, [solver.inside(branch) for branch in found]
+        q[i] = solver.solve(T[:, :, i].tolist())
 
 
 def _canonical(
@@ -278,11 +244,3 @@ def _turn(made: _Arm, angles: FloatArray) -> None:
             )
             other = angle + 2.0 * np.pi * turns
             np.copyto(angle, other, where=(below | above) & (other >= lower) & (other <= upper))
-
-
-def _inside(made: _Arm, angles: FloatArray) -> BoolArray:
-    """Return True (2, 2, C) where all joint angles (2, 2, 5, C) are inside the limits."""
-    inside = angles >= made.lower
-    inside &= angles <= made.upper
-    one, two, three, four, five = inside.transpose(2, 0, 1, 3)
-    return np.asarray(one & two & three & four & five)

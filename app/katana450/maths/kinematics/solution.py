@@ -1,16 +1,18 @@
-"""A posture of an arm for a pose, with what it misses; its properties are computed when read."""
+"""The solutions of an inverse kinematics, with what they miss; all is computed when it is read."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Final, Protocol, overload
+from typing import Final, overload
 
 import numpy as np
+import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 
@@ -24,26 +26,35 @@ TURNS: Final = 1e-3
 
 Angles = tuple[float, ...]
 
+Slack = Callable[[npt.ArrayLike], tuple[float, float]]
+"""Returns the errors [m], [rad] of an exact solution that rounding in the arm's file explains."""
 
-class GeneralPosture:
-    """A solution of an arm's inverse kinematics; a `SolvedPosture` of the core.
 
-    `branch` names the branch; the solvers define the names.
+def no_slack(_T: npt.ArrayLike) -> tuple[float, float]:
+    """Return the errors of an arm whose file has no rounding: none."""
+    return 0.0, 0.0
+
+
+class Solution:
+    """One solution of an inverse kinematics; its properties are computed when they are first read.
+
+    The kinematics define the branches.
     """
 
     __slots__ = ("_T", "_chain", "_errors", "_q", "_slack", "angles", "branch")
 
-    angles: tuple[float, ...]
+    angles: Angles
     """The joint angles [rad] as plain floats."""
-    branch: str
+    branch: AnyBranch
+    """The branch of the solution."""
 
     def __init__(
         self,
         chain: Chain,
-        T: FloatArray,
-        angles: tuple[float, ...],
-        branch: str,
-        slack: float = 0.0,
+        T: npt.ArrayLike,
+        angles: Angles,
+        branch: AnyBranch,
+        slack: Slack = no_slack,
     ) -> None:
         self._chain = chain
         self._T = T
@@ -81,9 +92,10 @@ class GeneralPosture:
 
         Else it is the nearest.
         """
+        length, turn = self._slack(self._T)
         return (
-            self.position_error <= tolerances.SAME_POSITION + self._slack
-            and self.rotation_error <= tolerances.SAME_ROTATION + self._slack
+            self.position_error <= tolerances.SAME_POSITION + length
+            and self.rotation_error <= tolerances.SAME_ROTATION + turn
         )
 
     @property
@@ -97,82 +109,69 @@ class GeneralPosture:
 
     def _measured(self) -> tuple[float, float]:
         if self._errors is None:
-            reached = forward(self._chain, self.angles)
+            T, reached = np.array(self._T), forward(self._chain, self.angles)
             self._errors = (
-                math.dist(reached[:3, 3], self._T[:3, 3]),
-                so3.angle(reached[:3, :3], self._T[:3, :3]),
+                math.dist(reached[:3, 3], T[:3, 3]),
+                so3.angle(reached[:3, :3], T[:3, :3]),
             )
         return self._errors
 
     def __repr__(self) -> str:
         """Return a short description."""
-        return f"GeneralPosture(angles={self.angles}, branch={self.branch!r})"
+        return f"Solution(angles={self.angles}, branch={self.branch})"
 
 
-class Branched(Protocol):
-    """A solver of a chain with named branches."""
+class Solutions(Sequence[Solution]):
+    """The solutions of one pose in the order of the branches, each created when first read."""
 
-    @property
-    def chain(self) -> Chain:
-        """The chain."""
-
-    @property
-    def branches(self) -> tuple[str, ...]:
-        """Names of the branches, in the order of the solutions."""
-
-    @property
-    def slack(self) -> float:
-        """The error [m], [rad] of an exact posture that the rounding of a file explains."""
-
-
-class Postures(Sequence[GeneralPosture]):
-    """The postures of one pose in the order of the branches, each created when it is first read."""
-
-    __slots__ = ("_angles", "_joints", "_made", "_pose", "_solver")
+    __slots__ = ("_T", "_angles", "_branches", "_chain", "_joints", "_made", "_slack")
 
     def __init__(
         self,
-        solver: Branched,
-        pose: FloatArray,
+        chain: Chain,
+        T: npt.ArrayLike,
         angles: Sequence[Angles],
+        branches: Sequence[AnyBranch],
+        slack: Slack = no_slack,
         joints: Callable[[Angles], Angles] = tuple,
     ) -> None:
-        """Hold the ``angles`` of each branch of ``solver`` for ``pose`` (4, 4).
+        """Hold the ``angles`` of each of ``branches`` for the pose `T` (4, 4).
 
         ``joints`` returns the joint angles [rad] of angles.
         """
-        self._solver = solver
-        self._pose = pose
+        self._chain = chain
+        self._T = T
         self._angles = angles
+        self._branches = branches
+        self._slack = slack
         self._joints = joints
-        self._made: list[GeneralPosture | None] = [None] * len(angles)
+        self._made: list[Solution | None] = [None] * len(angles)
 
-    def _posture(self, k: int) -> GeneralPosture:
-        posture = self._made[k]
-        if posture is None:
-            solver, angles = self._solver, self._joints(self._angles[k])
-            posture = self._made[k] = GeneralPosture(
-                solver.chain, self._pose, angles, solver.branches[k], solver.slack
-            )
-        return posture
+    def _solution(self, k: int) -> Solution:
+        solution = self._made[k]
+        if solution is None:
+            angles, branch = self._joints(self._angles[k]), self._branches[k]
+            solution = Solution(self._chain, self._T, angles, branch, self._slack)
+            self._made[k] = solution
+        return solution
 
     def __len__(self) -> int:
         return len(self._angles)
 
     @overload
-    def __getitem__(self, index: int) -> GeneralPosture: ...
+    def __getitem__(self, index: int) -> Solution: ...
 
     @overload
-    def __getitem__(self, index: slice) -> tuple[GeneralPosture, ...]: ...
+    def __getitem__(self, index: slice) -> tuple[Solution, ...]: ...
 
-    def __getitem__(self, index: int | slice) -> GeneralPosture | tuple[GeneralPosture, ...]:
-        return tuple(self)[index] if isinstance(index, slice) else self._posture(index)
+    def __getitem__(self, index: int | slice) -> Solution | tuple[Solution, ...]:
+        return tuple(self)[index] if isinstance(index, slice) else self._solution(index)
 
-    def __iter__(self) -> Iterator[GeneralPosture]:
-        return map(self._posture, range(len(self._angles)))
+    def __iter__(self) -> Iterator[Solution]:
+        return map(self._solution, range(len(self._angles)))
 
     def __repr__(self) -> str:
-        """Return the postures as text."""
+        """Return the solutions as text."""
         return repr(tuple(self))
 
 
@@ -188,7 +187,7 @@ def scaled_jacobian(chain: Chain, q: Sequence[float] | FloatArray) -> FloatArray
 
 
 def singular_axes(chain: Chain, q: Sequence[float] | FloatArray) -> tuple[int, ...]:
-    """Return `GeneralPosture.singular` of the joint angles `q` (n,) [rad]."""
+    """Return `Solution.singular` of the joint angles `q` (n,) [rad]."""
     _, sizes, Vt = np.linalg.svd(scaled_jacobian(chain, q))
     rank = int((sizes > SINGULAR * sizes[0]).sum())
     if rank == min(6, chain.n):

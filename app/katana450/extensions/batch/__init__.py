@@ -1,1 +1,0 @@
-"""Inverse kinematics of many poses at once, for the library and other extensions."""
