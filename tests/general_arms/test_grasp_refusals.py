@@ -129,8 +129,8 @@ def test_skewed_arm_without_a_closed_form_is_refused_in_time(tmp_path: Path) -> 
 def test_fixed_jaw_on_the_other_side_is_not_out_of_reach(tmp_path: Path) -> None:
     """A hand that is mounted half a turn farther reaches its jaw's other side by a turn back."""
     plan = planned(tmp_path, so101_urdf(), ["gripper: open"], PART)
-    arm, session = plan.session.require_arm(), plan.session
-    hand = hand_of(session, plan.robot.require_arm().T_base_shoulder, arm.default_tool)
+    session = plan.session
+    hand = hand_of(session, plan.robot.require_arm().T_base_shoulder, plan.start)
     assert hand.plane is not None
     middle = np.array((0.23, 0.06, 0.03))
     at = hand.before(middle, Approach(0.5), 0.01)

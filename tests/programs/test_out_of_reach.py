@@ -33,11 +33,10 @@ def builder(stage: Stage) -> PlanBuilder:
     return PlanBuilder(stage.plan_context, stage.begin(), ScriptFrame.of(T, in_base=True))
 
 
-def said(builder: PlanBuilder, target: ToolTarget, chain: Chain | None = None) -> str:
-    """Return the message about ``target``, of an arm with other limits if ``chain`` is given."""
+def said(builder: PlanBuilder, target: ToolTarget) -> str:
+    """Return the message about ``target``."""
     assert builder.frame is not None
-    chain = builder.chain if chain is None else chain
-    return unreached(chain, builder.q, target, None, "tcp", builder.frame)
+    return unreached(builder.planning, builder.q, target, None, builder.frame)
 
 
 def nearest_by_search(chain: Chain, target: ToolTarget) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
@@ -30,9 +31,7 @@ from katana450.extensions.programs.approach import (
 )
 from katana450.extensions.programs.arm_plane import PLANAR_AXES, ROLLING_AXES, ArmPlane
 from katana450.extensions.programs.grasp_frame import GraspFrame, grasp_frame
-from katana450.extensions.programs.planning_choice import planning_of
-from katana450.extensions.programs.reaching import reaching
-from katana450.extensions.programs.tool_planning import ToolPlanning
+from katana450.extensions.programs.tool_planning import ToolPlanning, planning_of
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -136,7 +135,7 @@ class HandPlanning:
 
     @property
     def is_redundant(self) -> bool:
-        """Whether the arm takes a pose in a curve of postures."""
+        """True if the arm takes a pose in a curve of postures."""
         return self._chain.n > FREE_AXES
 
     def approaches(
@@ -231,7 +230,7 @@ class HandPlanning:
         """
         chain, kinematics = self._chain, self.planning.kinematics
         if not isinstance(kinematics, DrivenTool):
-            return () if reaching(chain, q, cast(ToolTarget, target), None) is None else (None,)
+            return () if self.planning.joints(q, target, None) is None else (None,)
         R = cast(ToolPose, target).R
         if self.plane is not None:
             turn = self.plane.turn(target.position, self.plane.beside_at(R, np.zeros(3)))
@@ -390,14 +389,14 @@ class HandPlanning:
         return np.asarray(so3.rotation_z(-self._turned(q)) @ forward(self._chain, q)[:3, :3])
 
 
-def hand_of(session: Session, T_base_shoulder: FloatArray, tool: str) -> HandPlanning:
-    """Return the hand of the arm of ``session`` with ``tool``.
+def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> HandPlanning:
+    """Return the hand of the arm of ``session`` with the tool of ``state``.
 
     ``T_base_shoulder``: (4, 4) pose of {S} in the base frame [m]. Raises InputError, with the
     reason, for an arm that cannot grasp.
     """
     arm, environment = session.require_arm(), session.environment
-    planning, axes = planning_of(arm.kinematics_to(tool)), arm.chain.n
+    planning, axes = planning_of(arm.kinematics_to(state.tool), state), arm.chain.n
     in_family, chain = not isinstance(planning.kinematics, DrivenTool), planning.kinematics.chain
     if in_family and GRASP in arm.tools:
         in_front = ArmPlane.of(chain, np.eye(4), session.ready)
@@ -419,7 +418,9 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, tool: str) -> HandPla
     hand = environment.hand
     frame: GraspFrame = grasp_frame(environment.world(()), hand, arm.gripper)
     assert hand is not None
-    T_palm_tool = hand.T_palm_tool @ se3.inverse(arm.tools[arm.default_tool]) @ arm.tools[tool]
+    T_palm_tool = (
+        hand.T_palm_tool @ se3.inverse(arm.tools[arm.default_tool]) @ arm.tools[state.tool]
+    )
     T_tool_grasp = frozen(se3.inverse(T_palm_tool) @ frame.T_palm_grasp)
     plane = ArmPlane.of(chain, T_tool_grasp, session.ready) if axes < FREE_AXES else None
     return HandPlanning(

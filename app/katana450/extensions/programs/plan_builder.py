@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
@@ -19,11 +20,10 @@ from katana450.errors import InputError
 from katana450.extensions.programs.actions import Action, FollowPlan, MoveFingers
 from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.hand_planning import HandPlanning, hand_of
-from katana450.extensions.programs.planning_choice import planning_of
-from katana450.extensions.programs.reaching import check_range
+from katana450.extensions.programs.out_of_reach import unreached
 from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.step_target import StepTarget
-from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
+from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning, planning_of
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -192,14 +192,14 @@ class PlanBuilder:
     @property
     def planning(self) -> ToolPlanning:
         """The planning of the present tool."""
-        return planning_of(self.plan_context.arm.kinematics_to(self.state.tool))
+        return planning_of(self.plan_context.arm.kinematics_to(self.state.tool), self.state)
 
     @property
     def hand(self) -> HandPlanning:
         """The hand with the present tool. Raises InputError, with the reason, without one."""
         tool, context = self.state.tool, self.plan_context
         if tool not in self._hands:
-            self._hands[tool] = hand_of(context.session, context.T_base_shoulder, tool)
+            self._hands[tool] = hand_of(context.session, context.T_base_shoulder, self.state)
         return self._hands[tool]
 
     @property
@@ -245,7 +245,7 @@ class PlanBuilder:
         for curve in curves:
             path = made.get(id(curve))
             if path is None or float(np.abs(path.start - q).max()) > JOIN_TOLERANCE:
-                path = planning.path(self.state, q, curve, planning.branches(q)[0])
+                path = planning.path(q, curve, planning.branches(q)[0])
                 made[id(curve)] = path
             paths.append(path)
             q = path.end
@@ -369,7 +369,7 @@ class PlanBuilder:
         if place.joints is not None:
             self.plan_context.session.check(SetJoints(place.joints))
             q = self.plan_context.arm.chain.check_q(place.joints)
-            check_range(self.chain, q)
+            _check_range(self.chain, q)
             return q
         return self.joints_of(self.target_at(place), place.branch)
 
@@ -388,7 +388,7 @@ class PlanBuilder:
         Raises InputError with the nearest places.
         """
         branch = None if branch is None else self.planning.branch(branch)
-        found = self.planning.joints(self.state, self.q, target, branch)
+        found = self.planning.joints(self.q, target, branch)
         if found is None:
             raise InputError("" if self._brief else self.unreached(target, branch))
         return found
@@ -397,9 +397,21 @@ class PlanBuilder:
         """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
         T = self.plan_context.T_base_shoulder
         frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
-        return self.planning.unreached(self.state, self.q, target, branch, frame)
+        return unreached(self.planning, self.q, target, branch, frame)
 
     def branches(self, wanted: AnyBranch | None) -> Sequence[AnyBranch]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""
         planning = self.planning
         return planning.branches(self.q) if wanted is None else (planning.branch(wanted),)
+
+
+def _check_range(chain: Chain, q: FloatArray) -> None:
+    """Raise InputError, with the range, if an axis at ``q`` (n,) [rad] is beyond its limits."""
+    if chain.within_limits(q):
+        return
+    number = int(np.maximum(chain.lower - q, q - chain.upper).argmax())
+    value, low, high = (math.degrees(bounds[number]) for bounds in (q, chain.lower, chain.upper))
+    raise InputError(
+        f"Axis {number + 1} would be at {value:.1f} deg, beyond its limit: its range is "
+        f"{low:.1f} to {high:.1f} deg."
+    )

@@ -106,6 +106,16 @@ class ToolLines:
         return ToolCoordinates(*self._line.at(sigma))
 
 
+def screw_points(p: FloatArray, twist: FloatArray) -> ToolLine | ToolArc:
+    """Return the path of the point ``p`` (3,) [m] along ``twist`` (6,), with pitch and roll 0."""
+    omega, v = twist[:3], twist[3:]
+    turn = math.hypot(*omega)
+    if turn == 0.0:
+        return ToolLine(ToolTarget(p, 0.0, 0.0), ToolTarget(p + v, 0.0, 0.0))
+    centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
+    return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
+
+
 @dataclass(frozen=True, eq=False)
 class ToolScrew:
     """A motion of the tool along a twist (omega, v) in {S} from its pose at `q`, for five axes.
@@ -158,13 +168,7 @@ class ToolScrew:
     @cached_property
     def _point_path(self) -> ToolLine | ToolArc:
         """The path of the tool point."""
-        p = forward(self.chain, self.q)[:3, 3]
-        omega, v = self.twist[:3], self.twist[3:]
-        turn = math.hypot(*omega)
-        if turn == 0.0:
-            return ToolLine(ToolTarget(p, 0.0, 0.0), ToolTarget(p + v, 0.0, 0.0))
-        centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
-        return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
+        return screw_points(forward(self.chain, self.q)[:3, 3], self.twist)
 
     @cached_property
     def _turning(self) -> tuple[list[float], list[float], float]:

@@ -132,7 +132,7 @@ class Lines:
         branch = builder.branches(None)[0]
         for number, each in enumerate(self.through, start=1):
             vias.append(builder.target_at(each, vias[-1]))
-            if planning.joints(builder.state, builder.q, vias[-1], branch) is None:
+            if planning.joints(builder.q, vias[-1], branch) is None:
                 raise InputError(f"Place {number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
@@ -193,7 +193,7 @@ class ArcGeometry:
 
         def path(tried: AnyBranch) -> Path:
             found = planning.roomiest(arc, tried) if self.is_roomiest else arc
-            return planning.path(builder.state, builder.q, found, tried)
+            return planning.path(builder.q, found, tried)
 
         tool_path = builder.first(builder.branches(branch), path)
         builder.move_to(tool_path.start, f"{name}: to its start")

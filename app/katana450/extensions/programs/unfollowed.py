@@ -10,7 +10,7 @@ import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.following import LostPathError
-from katana450.extensions.programs.out_of_reach import near_points
+from katana450.extensions.programs.out_of_reach import farthest, near_points
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -61,7 +61,7 @@ def unfollowed(
     if builder.given_up:
         # With another grasp. Only the refusal with the first one is shown.
         return refused
-    text = refused.text + builder.planning.farthest(builder.state, builder.q, curve, branch, frame)
+    text = refused.text + farthest(builder.planning, builder.q, curve, branch, frame)
     if works := list(remedies):
         text += f" It can be followed {' or '.join(works)}."
     return PathError(text, refused.point, parts=refused.parts)
