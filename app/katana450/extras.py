@@ -11,7 +11,7 @@ from typing import Any
 from katana450.errors import ConfigurationError
 
 PACKAGES = {
-    "datasets": "pyarrow",
+    "datasets": "pyarrow rosbags",
     "films": "imageio-ffmpeg",
     "foxglove": "foxglove-sdk",
     "gallery": "robot-descriptions",

@@ -135,7 +135,7 @@ def test_past_is_shown_in_one_window_until_stop(
     page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
     page.wait_until(lambda: not visible(page, LINK), "the present arm to be hidden")
     page.wait_until(
-        lambda: abs(shown_turn(page) - begin.row.q[0]) < 1e-6, "the first recorded posture"
+        lambda: abs(shown_turn(page) - begin.row.joints[0]) < 1e-6, "the first recorded posture"
     )
     assert not visible(page, "/target/move"), "the gizmo of the present can be dragged"
     page.page.get_by_text("arm is elsewhere").wait_for()
@@ -149,7 +149,8 @@ def test_past_is_shown_in_one_window_until_stop(
     assert float(slider.input_value()) == pytest.approx(1.0, abs=0.01)
     moment = run.at(run.spans[0].start + 1.0)
     assert moment is not None
-    page.wait_until(lambda: abs(shown_turn(page) - moment.row.q[0]) < 1e-6, "the posture 1 s later")
+    turned = moment.row.joints[0]
+    page.wait_until(lambda: abs(shown_turn(page) - turned) < 1e-6, "the posture 1 s later")
     titles = page.page.locator("#timeline .marks i").evaluate_all(
         "(all) => all.map((e) => e.title)"
     )
@@ -247,7 +248,7 @@ def test_selection_is_saved_opened_and_compared(
     second = part.at(at_place(part.spans, 1.0))
     assert second is not None
     page.wait_until(
-        lambda: abs(shown_turn(page, "/playback/1/arm") - second.row.q[0]) < 1e-3,
+        lambda: abs(shown_turn(page, "/playback/1/arm") - second.row.joints[0]) < 1e-3,
         "the second run at the same time",
     )
     page.keep(artefacts / "timeline-two-runs.png")
@@ -276,7 +277,7 @@ def test_link_opens_the_page_at_its_moment(
     assert moment is not None
     page = open_page(f"{server.url}/?moment=ring@{t:.3f}&x=", nodes=("/arm",))
     page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
-    page.wait_until(lambda: abs(shown_turn(page) - moment.row.q[0]) < 5e-3, "its posture")
+    page.wait_until(lambda: abs(shown_turn(page) - moment.row.joints[0]) < 5e-3, "its posture")
     page.page.get_by_role("button", name="Back to live").click()
     page.wait_until(lambda: visible(page, LINK), "the present")
 
@@ -336,6 +337,6 @@ def test_selected_motion_runs_again_as_a_program(
     run = PlaybackRun(lambda: recordings_in(folder))
     run.update()
     times = np.linspace(run.spans[-1].start, run.spans[-1].end, 200).tolist()
-    turns = [found.row.q[0] for t in times if (found := run.at(t)) is not None]
+    turns = [found.row.joints[0] for t in times if (found := run.at(t)) is not None]
     # It went back to the start, and through both turns.
     assert max(turns) > TURNS[0] - 0.01

@@ -72,7 +72,7 @@ def newest(run: PlaybackRun) -> list[float]:
     """Return the newest recorded joints [m, rad, rad]; zeros before the first."""
     run.update()
     moment = run.at(math.inf) if run.spans else None
-    return [0.0] * 3 if moment is None else moment.row.q
+    return [0.0] * 3 if moment is None else moment.row.joints
 
 
 def nodes(server: AppServer) -> list[str]:
@@ -118,7 +118,7 @@ def test_recorded_joints_are_shown_until_acting(
         moment = run.at(run.spans[0].start + fraction * length)
         assert moment is not None
         page.wait_until(
-            lambda q=moment.row.q: np.allclose(shown_joints(page, paths, zero), q, atol=2e-6),  # type: ignore[misc]
+            lambda q=moment.row.joints: np.allclose(shown_joints(page, paths, zero), q, atol=2e-6),  # type: ignore[misc]
             f"the joints at {fraction:.0%}",
         )
     page.wait_until(lambda: not visible(page, "/arm" + paths[0]), "the present to be hidden")

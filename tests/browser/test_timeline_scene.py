@@ -164,7 +164,7 @@ def test_marks_of_all_kinds_are_shown_and_clicked(
     # Other marks can lie over it.
     page.page.locator("#timeline .marks .contact").first.dispatch_event("click")
     page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
-    page.wait_until(lambda: abs(shown_turn(page) - moment.row.q[0]) < 1e-3, "the contact")
+    page.wait_until(lambda: abs(shown_turn(page) - moment.row.joints[0]) < 1e-3, "the contact")
     events = page.page.get_by_label("Events")
     assert any("pressed STOP" in each for each in events.locator("option").all_inner_texts())
 
@@ -236,7 +236,7 @@ def test_another_arm_is_played_back_and_runs_again(
         def recorded() -> bool:
             run.update()
             moment = run.at(math.inf) if run.spans else None
-            return moment is not None and np.allclose(moment.row.q, end, atol=1e-9)
+            return moment is not None and np.allclose(moment.row.joints, end, atol=1e-9)
 
         page.wait_until(recorded, "the motion in the recording", seconds=40.0)
         opened(page)
@@ -250,7 +250,7 @@ def test_another_arm_is_played_back_and_runs_again(
             R = np.linalg.inv(page.node_pose(f"{GHOST}/base_link")) @ page.node_pose(link)
             return float(np.arctan2(R[1, 0], R[0, 0]))
 
-        page.wait_until(lambda: abs(turn() - moment.row.q[0]) < 2e-2, "the recorded posture")
+        page.wait_until(lambda: abs(turn() - moment.row.joints[0]) < 2e-2, "the recorded posture")
         page.keep(artefacts / "timeline-ur5e.png")
         page.page.get_by_role("button", name="Run again the selected motion").click()
         page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)

@@ -9,7 +9,7 @@ from typing import Any
 
 from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.topics import COMMANDS, EPISODES
+from katana450.extensions.recording.messages import COMMANDS, EPISODES
 from tests.recording.recorded import Commands, random_commands, record
 
 BEGIN = 0.25

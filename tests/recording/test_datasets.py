@@ -218,7 +218,7 @@ def test_odd_input_is_refused(
         "no episodes with the outcome": (judged, *lerobot),
         "their robot differs": (run, other, *lerobot),
         "7 ticks are missing": (run, gap, *lerobot),
-        "The number of an episode is": (wrong, *lerobot),
+        r"Expected `int`, got `str` - at `$.number`": (wrong, *lerobot),
         "fewer than 2 frames": (short, *lerobot),
         "Episode 1 of": (untold, *plain),
         "Episode 3 of": (far, *lerobot),

@@ -19,7 +19,7 @@ from katana450.extensions.recording.datasets.parquet_table import write_parquet
 from katana450.extensions.recording.datasets.recorded_states import RecordedStates
 from katana450.extensions.recording.datasets.ros_bag import write_bag
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, EPISODES, EVENTS, STATE
+from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS, EPISODES, EVENTS, STATE
 from tests.conftest import LONG
 from tests.recording.dataset_files import episode, write_copy
 from tests.recording.recorded import described, record
@@ -114,7 +114,8 @@ def test_time_that_is_no_number_is_refused(
 
     path = write_copy(run, tmp_path / "changed.mcap", change=change)
     assert main(["record", "verify", str(path)]) == 1
-    assert "is not the time of a" in capsys.readouterr().err
+    expected = "Expected `float`" if topic == COMMANDS else "is not the time of a state"
+    assert expected in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["settings", "urdf", "urdf_sha256", "utc_offset_ns", "robot"])

@@ -24,8 +24,8 @@ from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.episodes.link import EpisodeListener, request_episode
 from katana450.extensions.recording.episodes.routes import EpisodeRoutes
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.messages import EPISODES
 from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.topics import EPISODES
 from katana450.platform_support import pipe_address
 from katana450.server.web.http_api import RouteContext
 from tests.recording.episode_bench import ADA, Bench

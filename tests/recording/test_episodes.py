@@ -12,10 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from msgspec import structs
 
 import katana450
 from katana450.cli.main import main
 from katana450.errors import InputError
+from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import (
     Episode,
@@ -36,7 +38,7 @@ from katana450.extensions.recording.files.checking import session_for, verify_re
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.live import ring as ring_module
-from katana450.extensions.recording.topics import EPISODES, STATE
+from katana450.extensions.recording.messages import EPISODES, STATE
 from tests.recording.episode_bench import ADA, Bench, motion
 from tests.recording.recorded import header
 
@@ -82,7 +84,7 @@ def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_p
     content = path.read_bytes()
     for outcome in (EpisodeOutcome.SUCCESS, EpisodeOutcome.FAILURE):
         after = attempt(recorded, note=outcome.value)
-        after = Episode(**{**after.__dict__, "outcome": outcome})
+        after = structs.replace(after, outcome=outcome)
         with_episode(path, after, "judged")
         assert episode_in(path) == after
     with RecordingFile.open(path) as file:
@@ -121,24 +123,28 @@ episodes = st.builds(
 @settings(max_examples=30)
 @given(st.lists(episodes, max_size=12))
 def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
-    messages = [json.dumps(message_of(each, 0.0, "judged")) for each in found]
+    messages = [json_text(message_of(each, 0.0, "judged")) for each in found]
     last = {each.number: each for each in found}
     assert episodes_of(messages) == tuple(last[number] for number in sorted(last))
+
+
+DESCRIBED = '{"number": 1, "task": "", "note": "", "by": {}, "end": null, "outcome": %s}'
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("[", "is no JSON"),
-        ("[]", "no JSON object"),
-        ('{"number": 0}', "not a whole number"),
-        ('{"number": 1, "outcome": "won"}', "not one of running"),
-        ('{"number": 1, "outcome": "success", "start": "x"}', "not a number of seconds"),
-        ('{"number": 1, "outcome": "success", "start": 1e400}', "not a number of seconds"),
-        ('{"number": 1, "outcome": "success", "start": 1}', "no end"),
-        ('{"number": 1, "outcome": "success", "start": 2, "end": 1}', "before its start"),
-        ('{"number": 1, "outcome": "running", "start": 2, "task": 3}', "not a text"),
-        ("[" * 100_000, "is no JSON"),
+        ("[", "description of an episode is wrong"),
+        ("[]", "Expected `object`"),
+        ('{"number": 0}', r"Expected `int` >= 1 - at `\$.number`"),
+        (DESCRIBED % '"won", "start": 0', "Invalid enum value 'won'"),
+        (DESCRIBED % '"success", "start": "x"', r"Expected `float`, got `str` - at `\$.start`"),
+        (DESCRIBED % '"success", "start": 1e400', "Number out of range"),
+        (DESCRIBED % '"success", "start": 1e30', r"Expected `float` < .* - at `\$.start`"),
+        (DESCRIBED % '"success", "start": 1', "no end"),
+        (DESCRIBED % '"success", "start": 2, "end": 1', "before its start"),
+        (DESCRIBED % '"running", "start": 2, "task": 3', r"Expected `str`, got `int`"),
+        ("[" * 100_000, "description of an episode is wrong"),
     ],
 )
 def test_wrong_description_is_refused(text: str, why: str) -> None:

@@ -19,7 +19,7 @@ import katana450
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.topics import COMMANDS
+from katana450.extensions.recording.messages import COMMANDS
 from tests.conftest import LONG
 from tests.recording.recorded import header, record, run
 

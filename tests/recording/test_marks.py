@@ -6,8 +6,8 @@ from typing import Any
 
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.playback.marks import Mark, add_marks
-from katana450.extensions.recording.topics import EVENTS
 
 
 def event(t: int, **form: Any) -> Message:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.records import Chunk
+from msgspec import structs
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
@@ -36,7 +37,7 @@ from katana450.extensions.recording.playback import run as run_module
 from katana450.extensions.recording.playback.chunks import ChunkIndex
 from katana450.extensions.recording.playback.difference import difference
 from katana450.extensions.recording.playback.routes import PlaybackRoutes
-from katana450.extensions.recording.playback.rows import StateRow, still_flying
+from katana450.extensions.recording.playback.rows import still_flying
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import (
     Span,
@@ -51,7 +52,7 @@ from katana450.maths.water.flow import VesselMove, Water, WaterFlow
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
-from tests.recording.recorded import ADA, described, header, record, run
+from tests.recording.recorded import ADA, described, header, record, run, state_message
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +69,7 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
     for each in random.Random(1).sample(records, 40):
         moment = run.at(each.t + shift + 1e-6)
         assert moment is not None
-        assert moment.row.q == each.state.q.tolist()
+        assert moment.row.joints == each.state.q.tolist()
         assert moment.row.gripper == each.state.gripper
         poses = {found.name: found.T for found in moment.objects}
         for wanted in each.state.objects:
@@ -77,14 +78,14 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
         assert {"cup", "basin"} <= poses.keys()
         (row,) = run.rows_at([each.t + shift + 1e-6])
         assert row is not None
-        assert row.q == moment.row.q
+        assert row.joints == moment.row.joints
         if each.state.poured is not None and moment.water is not None:
             kept = each.state.poured.water.cup.kept
             assert moment.water.cup.volume == pytest.approx(kept, abs=1e3)
     # Before the start, the first state is shown.
     first = run.at(0.0)
     assert first is not None
-    assert first.row.q == records[0].state.q.tolist()
+    assert first.row.joints == records[0].state.q.tolist()
 
 
 def test_file_that_grows_is_read_as_far_as_it_is_written(
@@ -284,8 +285,8 @@ def test_axis_leaves_out_the_rests() -> None:
 
 
 def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
-    first = StateRow(0.0, [0.0, 0.1], [0.0, 0.1], position=[0.3, 0.0, 0.1])
-    second = replace_row(first, q=[np.radians(3.0), 0.1], position=[0.3, 0.004, 0.103])
+    first = state_message([0.0, 0.1], position=(0.3, 0.0, 0.1))
+    second = structs.replace(first, q=[np.radians(3.0), 0.1], position=(0.3, 0.004, 0.103))
     times, turning = [0.0, 1.0, 2.0], (False, False)
     found = difference(times, [first, first, None], [first, second, second], turning)
     assert found.t == [0.0, 1.0]
@@ -293,24 +294,20 @@ def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
     assert found.tool == pytest.approx([0.0, 5.0])
     assert found.slides == []
     with pytest.raises(InputError, match="2 and 1 joints"):
-        difference([0.0], [first], [replace_row(first, q=[0.0])], turning)
+        difference([0.0], [first], [structs.replace(first, q=[0.0])], turning)
     # Two runs of another robot than that of the server.
     with pytest.raises(InputError, match="2 and 2 joints, the robot 3"):
         difference([0.0], [first], [second], (False,) * 3)
 
 
 def test_difference_of_joints_that_slide_is_a_length() -> None:
-    first = StateRow(0.0, [0.0, 0.1], [0.0, 0.1])
-    second = replace_row(first, q=[np.radians(3.0), 0.107])
+    first = state_message([0.0, 0.1])
+    second = structs.replace(first, q=[np.radians(3.0), 0.107])
     found = difference([0.0], [first], [second], (False, True))
     assert found.joints == pytest.approx([3.0])
     assert found.slides == pytest.approx([7.0])
     assert found.tool == []
     assert difference([0.0], [first], [second], (True, True)).joints == []
-
-
-def replace_row(row: StateRow, **changes: object) -> StateRow:
-    return StateRow(**{name: getattr(row, name) for name in row.__struct_fields__} | changes)
 
 
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])

@@ -17,7 +17,7 @@ import pytest
 from katana450.extensions.recording.files import verifying
 from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.topics import COMMANDS
+from katana450.extensions.recording.messages import COMMANDS
 from katana450.portable_rounding import portable_rounding, rounds_portably
 from tests.conftest import LONG
 

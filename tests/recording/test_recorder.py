@@ -31,9 +31,9 @@ from katana450.extensions.recording.live.record_end import RecordEnd, lost_recor
 from katana450.extensions.recording.live.record_wire import RecordDeserializer
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.live.route import recording_routes
+from katana450.extensions.recording.messages import COMMANDS, EVENTS, STATE
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.store import RecordingStore
-from katana450.extensions.recording.topics import COMMANDS, EVENTS, STATE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext

@@ -35,8 +35,7 @@ from katana450.extensions.recording.files.recording_writer import RecordingWrite
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.live import recorder
-from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.topics import (
+from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
     EVENTS,
@@ -45,6 +44,7 @@ from katana450.extensions.recording.topics import (
     TF,
     TOPICS,
 )
+from katana450.extensions.recording.places import recordings_in
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.platform_support import claim_file
@@ -209,8 +209,8 @@ def test_state_at_any_moment_has_all_objects(
                 if each is cut and number > 200:
                     continue
                 assert found is not None
-                assert found["q"] == state.q.tolist()
-                assert {one["name"] for one in found["objects"]} == {o.name for o in state.objects}
+                assert found.joints == state.q.tolist()
+                assert {one.name for one in found.objects} == {o.name for o in state.objects}
     assert state_at(file, file.start - 1.0) is None
 
 

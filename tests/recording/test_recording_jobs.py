@@ -27,8 +27,8 @@ from katana450.extensions import progress
 from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live.job_routes import JobRoutes
+from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
-from katana450.extensions.recording.topics import COMMANDS, STATE
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer

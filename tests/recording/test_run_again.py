@@ -27,11 +27,11 @@ from katana450.extensions.recording.files.checking import session_for, verify_re
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.run_again.again_command import part_and_script
 from katana450.extensions.recording.run_again.again_script import again_script
 from katana450.extensions.recording.run_again.path_difference import path_difference
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart, read_part
-from katana450.extensions.recording.topics import COMMANDS, STATE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH

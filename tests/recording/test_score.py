@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import katana450
 from katana450.arm.control import commands as cmd
@@ -35,12 +36,12 @@ from katana450.extensions.recording.episodes.episode_file import (
 )
 from katana450.extensions.recording.files.appending import append_message
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.messages import EPISODES
 from katana450.extensions.recording.scoring.leaderboard import Leaderboard, shown
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored, scored
 from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
 from katana450.extensions.recording.state_message import nanoseconds
-from katana450.extensions.recording.topics import EPISODES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.programs.lagging_driver import LaggingDriver
@@ -216,7 +217,7 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
     whole = score_file(path).values["tool_path_mm"] or 0.0
     assert whole == pytest.approx(score_file(line).values["tool_path_mm"])
     middle = 0.4 * (end - begin)
-    with_episode(path, replace(episode, end=begin + middle), "trimmed")
+    with_episode(path, structs.replace(episode, end=begin + middle), "trimmed")
     trimmed = score_file(path).values["tool_path_mm"] or 0.0
     assert 0.0 < trimmed < 0.9 * whole
     assert score_file(path, 0.0, middle).values["tool_path_mm"] == trimmed
@@ -228,12 +229,12 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
     assert main(["record", "again", str(path), "--out", str(script)]) == 0
     assert script.read_text(encoding="utf-8") == run.script()
     # A recording that contains an episode is not the file of that episode.
-    with_episode(path, replace(episode, start=begin + 0.1, end=end - 0.1), "trimmed")
+    with_episode(path, structs.replace(episode, start=begin + 0.1, end=end - 0.1), "trimmed")
     with RecordingFile.open(path) as file:
         assert shown_part(file, None, None) == pytest.approx((0.1, end - begin - 0.1))
     longer = tmp_path / "longer.mcap"
     shutil.copy(line, longer)
-    text = json_text(message_of(replace(episode, start=begin + 0.1), end, "ended"))
+    text = json_text(message_of(structs.replace(episode, start=begin + 0.1), end, "ended"))
     append_message(longer, Message(EPISODES, 0, nanoseconds(end), text))
     with RecordingFile.open(longer) as file:
         assert shown_part(file, None, None) == (0.0, math.inf)

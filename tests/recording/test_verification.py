@@ -34,8 +34,8 @@ from katana450.extensions.recording.files.record_command import same_setpoints
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS
 from katana450.extensions.recording.replay import Difference, Verification
-from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.recording.dataset_files import write_copy

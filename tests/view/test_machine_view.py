@@ -27,7 +27,7 @@ from katana450.extensions.joint_view.machine_view import MachineView
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.recording.playback.drawing import RunDrawing
 from katana450.extensions.recording.playback.folder import CONTEXTS
-from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
+from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.hub import Hub
@@ -40,6 +40,7 @@ from katana450.server.view.view import ViewOptions
 from katana450.server.viser_bridge.labels import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
+from tests.recording.recorded import state_message
 from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
 from tests.view.gestures import RecordedGestures
@@ -188,7 +189,7 @@ def test_recorded_joints_are_drawn(server: viser.ViserServer, tmp_path: Path, te
     joints, random = robot.joint_group, np.random.default_rng(2)
     for _ in range(3):
         q = random.uniform(joints.lower, joints.upper)
-        row = StateRow(0.0, q.tolist(), q.tolist())
+        row = state_message(q.tolist())
         drawing.show(RecordedMoment(row, (), None), session, None)
         for link, T in robot.frames(robot.joint_values(q, 0.0)).items():
             drawn = shown(server, names[link].replace("/arm", "/playback/0/arm", 1))

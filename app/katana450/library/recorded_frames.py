@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
+import msgspec
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
@@ -16,9 +15,14 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
-from katana450.extensions.recording.topics import CHECKPOINTS, PLANS, SOLIDS
-from katana450.maths.geometry import so3
-from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    PLANS,
+    SOLIDS,
+    ObjectPose,
+    StateMessage,
+)
+from katana450.maths.geometry.arrays import finite_array, frozen
 from katana450.maths.motion.limiter import JointMotion
 
 MIN_STEP = 0.016
@@ -42,39 +46,35 @@ class RecordedFrames:
             first, last = file.start + start, min(file.start + end, file.end)
             self._forms, self._standing = _forms(file)
             begin = state_at(file, first)
-            found = [] if begin is None else [{**begin, "t": first}]
-            found += [row for row in rows(file, first, last) if not found or row["t"] > first]
-        if not found or "position" not in found[0]:
+            found = [] if begin is None else [msgspec.structs.replace(begin, t=first)]
+            found += [row for row in rows(file, first, last) if not found or row.t > first]
+        if not found or any(row.position is None for row in found):
             raise InputError(f"{path} has no states of an arm with a tool in that part.")
-        poses: dict[str, FloatArray] = {}
-        self._frames: list[tuple[dict[str, Any], dict[str, FloatArray]]] = []
+        poses: dict[str, ObjectPose] = {}
+        self._frames: list[tuple[StateMessage, dict[str, ObjectPose]]] = []
         due = -math.inf
-        try:
-            for number, row in enumerate(found):
-                poses = _moved(poses, row)
-                if row["t"] >= due or number == len(found) - 1:
-                    self._frames.append((row, poses))
-                    due = row["t"] + MIN_STEP
-            self.points = frozen([row["position"] for row, _ in self._frames])
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"{path} is damaged: a state lacks {error}.") from error
-        self.t = frozen([row["t"] - first for row, _ in self._frames])
+        for number, row in enumerate(found):
+            row.move_objects(poses)
+            if row.t >= due or number == len(found) - 1:
+                self._frames.append((row, dict(poses)))
+                due = row.t + MIN_STEP
+        self.points = frozen([row.position for row, _ in self._frames])  # type: ignore[arg-type]
+        self.t = frozen([row.t - first for row, _ in self._frames])
         self._path = path
         self._n = len(robot.session.ready)
 
     def state(self, number: int) -> State:
         """Return the state of the frame ``number``, to be drawn. Raises InputError."""
         row, poses = self._frames[number]
-        q = finite_array(row["q"], (self._n,), f"The joints in {self._path}")
+        q = finite_array(row.joints, (self._n,), f"The joints in {self._path}")
         objects = tuple(
-            replace(self._forms[name], T=T, held=False, fixed=False)
-            for name, T in poses.items()
+            replace(self._forms[name], T=frozen(pose.T), held=False, fixed=False)
+            for name, pose in poses.items()
             if name in self._forms
         )
-        fingers = float(row["gripper"])
         return replace(
-            self._standing, q=q, motion=JointMotion.rest(q), goal=q, gripper=fingers,
-            gripper_setpoint=fingers, objects=objects, poured=None, grip=None,
+            self._standing, q=q, motion=JointMotion.rest(q), goal=q, gripper=row.gripper,
+            gripper_setpoint=row.gripper, objects=objects, poured=None, grip=None,
         )  # fmt: skip
 
 
@@ -90,18 +90,3 @@ def _forms(file: RecordingFile) -> tuple[dict[str, SceneObject], State]:
     if standing is None:
         raise InputError(f"{file.path} has no complete state.")
     return forms, standing
-
-
-def _moved(poses: dict[str, FloatArray], row: dict[str, Any]) -> dict[str, FloatArray]:
-    """Return ``poses`` with the changes of the state ``row``."""
-    changed, removed = row.get("objects", ()), row.get("removed", ())
-    if not changed and not removed:
-        return poses
-    found = {name: T for name, T in poses.items() if name not in removed}
-    for each in changed:
-        x, y, z, w = each["orientation"]
-        T = np.eye(4)
-        T[:3, :3] = so3.from_quaternion((w, x, y, z))
-        T[:3, 3] = each["position"]
-        found[each["name"]] = frozen(T)
-    return found

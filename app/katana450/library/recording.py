@@ -21,13 +21,14 @@ from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
 from katana450.extensions.recording.files.checking import (
     TickReader,
+    content_of,
     session_for,
-    state_numbers,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.verifying import verified
+from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
 from katana450.extensions.recording.replay import Verification
 from katana450.extensions.recording.run_again.again_command import (
     check_same_arm,
@@ -35,8 +36,6 @@ from katana450.extensions.recording.run_again.again_command import (
 )
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
-from katana450.extensions.recording.tick_message import TickMessage
-from katana450.extensions.recording.topics import COMMANDS, EVENTS, PLANS, SOLIDS
 from katana450.maths.geometry.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -167,7 +166,7 @@ class Recording:
     def events(self) -> tuple[Mapping[str, Any], ...]:
         """All events, each with its time ``t`` [s] and its ``kind``. Raises InputError."""
         with RecordingFile.open(self.path) as file:
-            return tuple(state_numbers(message) for message in file.messages(EVENTS))
+            return tuple(content_of(message, dict) for message in file.messages(EVENTS))
 
     @cached_property
     def programs(self) -> tuple[RecordedProgram, ...]:

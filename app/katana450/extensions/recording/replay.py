@@ -17,7 +17,7 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import failed, stepped
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.digest import Digester
-from katana450.extensions.recording.tick_message import TickInput
+from katana450.extensions.recording.ticks import TickInput
 from katana450.maths.geometry.arrays import FloatArray
 
 

@@ -7,7 +7,6 @@ a file.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,21 @@ from katana450.arm.control.scene_objects import Environment, SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.recording.messages import (
+    UPRIGHT,
+    JointMessage,
+    JointStatesMessage,
+    ObjectPose,
+    QuaternionMessage,
+    StateMessage,
+    TargetMessage,
+    TimeMessage,
+    TransformMessage,
+    TransformsMessage,
+    VectorMessage,
+    VesselWaterMessage,
+    WaterMessage,
+)
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
@@ -25,6 +39,7 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import MILLILITRE
+from katana450.maths.water.vectors import Vector
 
 DIGITS, SHOWN_DIGITS, RATE_DIGITS = 6, 5, 4
 """Decimals [m, rad, 1] of poses, of what follows from other numbers or is only displayed, and of
@@ -32,7 +47,7 @@ rates [rad/s, m/s] and the lean of water."""
 
 NANO = 1_000_000_000
 
-Pose = tuple[list[float], list[float]]
+Pose = tuple[Vector, tuple[float, float, float, float]]
 """Position (3,) [m] and unit quaternion x, y, z, w of a frame."""
 
 
@@ -46,11 +61,16 @@ def _rounded(values: FloatArray, digits: int) -> list[float]:
     return [round(each, digits) + 0.0 for each in values.tolist()]
 
 
+def _point(values: Iterable[float], digits: int) -> Vector:
+    x, y, z = (round(float(value), digits) + 0.0 for value in values)
+    return x, y, z
+
+
 def pose_of(T: FloatArray, digits: int = DIGITS) -> Pose:
     """Return the pose ``T`` (4, 4), rounded to ``digits`` decimals."""
     w, x, y, z = so3.to_quaternion(T[:3, :3]).tolist()
-    turned = [round(each, digits) + 0.0 for each in (x, y, z, w)]
-    return _rounded(T[:3, 3], digits), turned
+    orientation = tuple(round(part, digits) + 0.0 for part in (x, y, z, w))
+    return _point(T[:3, 3], digits), orientation
 
 
 class StateMessages:
@@ -63,7 +83,7 @@ class StateMessages:
         """
         self._robot, self._environment = robot, environment
         self._root = robot.links[0].name
-        self._poses: dict[str, tuple[Pose, bool]] = {}
+        self._poses: dict[str, ObjectPose] = {}
         self._objects: tuple[SceneObject, ...] | None = None
         self._tools: dict[int, tuple[State, FloatArray]] = {}
 
@@ -76,42 +96,30 @@ class StateMessages:
         poses = arm.T_base_shoulder @ forward_batch(arm.chain_to(states[0].tool), q)
         self._tools = {id(state): (state, T) for state, T in zip(states, poses, strict=True)}
 
-    def state(self, state: State) -> dict[str, Any]:
+    def state(self, state: State) -> StateMessage:
         """Return the message of ``state`` on the topic of states."""
-        setpoint = state.setpoint
-        message: dict[str, Any] = {"t": state.t}
-        if state.q is not setpoint and state.q.tobytes() != setpoint.tobytes():
-            message["q"] = state.q.tolist()
-        # Numbers that change stand together, so that what stays the same is packed better.
-        message["setpoint"] = setpoint.tolist()
-        message["qd"] = _rounded(state.motion.qd, RATE_DIGITS)
-        T = self.tool_pose(state)
-        if T is not None:
+        setpoint, T = state.setpoint, self.tool_pose(state)
+        same = state.q is setpoint or state.q.tobytes() == setpoint.tobytes()
+        objects, removed = self._changed_objects(state)
+        return StateMessage(
+            t=state.t,
+            q=[] if same else state.q.tolist(),
+            setpoint=setpoint.tolist(),
+            qd=_rounded(state.motion.qd, RATE_DIGITS),
             # Its orientation follows from the joints, and displays get it by their topic.
-            message["position"] = _rounded(T[:3, 3], SHOWN_DIGITS)
-        message |= {
-            "target": _target(state),
-            "findings": [finding_text(each) for each in state.findings],
-            "gripper": state.gripper,
-            "gripper_setpoint": state.gripper_setpoint,
-            "mode": type(state.intent).__name__,
-            "status": state.status.value,
-            "speed": state.speed,
-        }
-        if T is not None:
-            message["tool"] = state.tool
-        message.update(self._changed_objects(state))
-        if state.poured is not None:
-            water = state.poured.water
-            volumes = {
-                "cup": water.cup.kept,
-                "basin": water.basin,
-                "air": water.air,
-                "spilled": water.spilled,
-            }
-            message["water"] = {name: each / MILLILITRE for name, each in volumes.items()}
-            message["water"].update(_motion_of(water))
-        return message
+            position=None if T is None else _point(T[:3, 3], SHOWN_DIGITS),
+            target=_target(state),
+            findings=[finding_text(finding) for finding in state.findings],
+            gripper=state.gripper,
+            gripper_setpoint=state.gripper_setpoint,
+            mode=type(state.intent).__name__,
+            status=state.status.value,
+            speed=state.speed,
+            tool="" if T is None else state.tool,
+            objects=objects,
+            removed=removed,
+            water=None if state.poured is None else _water(state.poured.water),
+        )
 
     def tool_pose(self, state: State) -> FloatArray | None:
         """Return the pose (4, 4) of the tool in the base frame; None without a tool."""
@@ -126,106 +134,101 @@ class StateMessages:
             self._tools = {id(state): known}
         return known[1]
 
-    def _changed_objects(self, state: State) -> dict[str, Any]:
-        carried = any(each.carried for each in state.objects)
+    def _changed_objects(self, state: State) -> tuple[list[ObjectPose], list[str]]:
+        """Return the objects that have changed, and the names of those that are gone."""
+        carried = any(item.carried for item in state.objects)
         if state.objects is self._objects and not carried:
-            return {}
+            return [], []
         self._objects = state.objects
-        poses = dict(self._object_poses(state))
-        changed = [
-            {"name": name, "position": pose[0], "orientation": pose[1], "held": held}
-            for name, (pose, held) in poses.items()
-            if self._poses.get(name) != (pose, held)
-        ]
-        removed = sorted(self._poses.keys() - poses.keys())
-        self._poses = poses
-        found: dict[str, Any] = {"objects": changed} if changed else {}
-        return found | ({"removed": removed} if removed else {})
+        before, self._poses = self._poses, {pose.name: pose for pose in self._object_poses(state)}
+        changed = [pose for name, pose in self._poses.items() if before.get(name) != pose]
+        return changed, sorted(before.keys() - self._poses.keys())
 
-    def _object_poses(self, state: State) -> Iterator[tuple[str, tuple[Pose, bool]]]:
-        for each in state.objects:
-            known = self._poses.get(each.name)
-            if not each.carried:
-                yield each.name, (pose_of(each.T), False)
+    def _object_poses(self, state: State) -> Iterator[ObjectPose]:
+        for item in state.objects:
+            known = self._poses.get(item.name)
+            if not item.carried:
+                yield ObjectPose(item.name, *pose_of(item.T))
             elif self._environment is not None:
                 # It follows from the joints, and changes in every tick.
-                T = self._environment.pose(each, state.x)
-                yield each.name, (pose_of(T, SHOWN_DIGITS), each.held)
+                T = self._environment.pose(item, state.x)
+                yield ObjectPose(item.name, *pose_of(T, SHOWN_DIGITS), item.held)
             elif known is not None:
-                yield each.name, known
+                yield known
 
     def describe_all(self) -> None:
         """Describe all objects with the next state, also those that have not changed."""
         self._poses, self._objects = {}, None
 
-    def joint_states(self, state: State) -> dict[str, Any]:
+    def joint_states(self, state: State) -> JointStatesMessage:
         """Return the message of the joints by their names in the URDF."""
         values = self._robot.joint_values(state.q, state.gripper)
         joints = [
-            {"name": name, "position": round(value, SHOWN_DIGITS) + 0.0}
-            for name, value in values.items()
+            JointMessage(name, round(value, SHOWN_DIGITS) + 0.0) for name, value in values.items()
         ]
-        return {"timestamp": _time(state.t), "joints": joints}
+        return JointStatesMessage(_time(state.t), joints)
 
-    def transforms(self, state: State, names: Iterable[str] | None = None) -> dict[str, Any]:
-        """Return the message of the frames of the tool and of the objects ``names``, or of all."""
+    def transforms(self, state: State, names: Iterable[str]) -> TransformsMessage:
+        """Return the message of the frames of the tool and of the objects ``names``."""
         T = self.tool_pose(state)
-        poses = [] if T is None else [(state.tool, pose_of(T))]
-        chosen = self._poses if names is None else names
-        poses += [(f"object/{name}", self._poses[name][0]) for name in chosen]
-        return {"transforms": [self._transform(state.t, *each) for each in poses]}
+        poses = [] if T is None else [(state.tool, *pose_of(T))]
+        for name in names:
+            pose = self._poses[name]
+            poses.append((f"object/{name}", pose.position, pose.orientation))
+        return TransformsMessage(
+            [
+                TransformMessage(
+                    _time(state.t),
+                    self._root,
+                    name,
+                    VectorMessage(*(round(x, SHOWN_DIGITS) for x in position)),
+                    QuaternionMessage(*(round(x, SHOWN_DIGITS) for x in orientation)),
+                )
+                for name, position, orientation in poses
+            ]
+        )
 
-    def _transform(self, t: float, name: str, pose: Pose) -> dict[str, Any]:
-        position, orientation = ([round(each, SHOWN_DIGITS) for each in part] for part in pose)
-        return {
-            "timestamp": _time(t),
-            "parent_frame_id": self._root,
-            "child_frame_id": name,
-            "translation": dict(zip("xyz", position, strict=True)),
-            "rotation": dict(zip("xyzw", orientation, strict=True)),
-        }
 
-
-def _motion_of(water: Water) -> dict[str, Any]:
-    """Return the surface in the vessels, and the water that left them in this tick, if any.
+def _water(water: Water) -> WaterMessage:
+    """Return the volumes, the surfaces in the vessels, and the water that left them in this tick.
 
     Parcels fly freely, so each is described once.
     """
-    found = _lean(water.cup)
-    if water.others:
-        found["vessels"] = [
-            {"name": each.name, "volume": each.kept / MILLILITRE, **_lean(each)}
-            for each in water.others
-        ]
+    message = WaterMessage(
+        water.cup.kept / MILLILITRE,
+        water.basin / MILLILITRE,
+        water.air / MILLILITRE,
+        water.spilled / MILLILITRE,
+        _lean(water.cup),
+    )
+    message.vessels = [
+        VesselWaterMessage(vessel.name, vessel.kept / MILLILITRE, _lean(vessel))
+        for vessel in water.others
+    ]
     if water.parcels and water.parcels[-1].age == 0.0:
         new = water.parcels[-1]
-        places = [[round(x, DIGITS) + 0.0 for x in each] for each in (new.start, new.velocity)]
-        found["left"] = [new.volume / MILLILITRE, *places, round(new.span, DIGITS)]
-    return found
+        start, velocity = _point(new.start, DIGITS), _point(new.velocity, DIGITS)
+        message.left = new.volume / MILLILITRE, start, velocity, round(new.span, DIGITS)
+    return message
 
 
-def _lean(water: VesselWater) -> dict[str, Any]:
-    """Return the lean of the surface in a vessel, unless it is level."""
-    if water.slosh == Slosh():
-        return {}
-    return {"lean": [round(each, RATE_DIGITS) + 0.0 for each in water.slosh.up]}
+def _lean(water: VesselWater) -> Vector:
+    """Return the lean of the surface in a vessel."""
+    return UPRIGHT if water.slosh == Slosh() else _point(water.slosh.up, RATE_DIGITS)
 
 
-def _target(state: State) -> dict[str, Any]:
+def _target(state: State) -> TargetMessage:
     match state.target:
         case JointTarget(q=q):
-            return {"q": _rounded(q, DIGITS)}
-        case PoseTarget(T=T):
-            return {"T": [_rounded(row, DIGITS) for row in T]}
+            return TargetMessage(q=_rounded(q, DIGITS))
+        case PoseTarget(T=T) | ToolPose(T=T):
+            return TargetMessage(T=[_rounded(row, DIGITS) for row in T])
         case ToolTarget(position=position, pitch=pitch, roll=roll):
             # As in the command, which makes the file smaller.
-            return {"position": position.tolist(), "pitch": pitch, "roll": roll}
-        case ToolPose(T=T):
-            return {"T": [_rounded(row, DIGITS) for row in T]}
+            return TargetMessage(position=position.tolist(), pitch=pitch, roll=roll)
         case target:
-            return {"position": target.position.tolist()}
+            return TargetMessage(position=target.position.tolist())
 
 
-def _time(t: float) -> dict[str, int]:
-    sec, nsec = divmod(nanoseconds(t), NANO)
-    return {"sec": sec, "nsec": nsec}
+def _time(t: float) -> TimeMessage:
+    return TimeMessage(*divmod(nanoseconds(t), NANO))

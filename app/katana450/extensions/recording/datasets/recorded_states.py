@@ -16,9 +16,15 @@ from katana450.extensions.recording.datasets.sampling import MAX_STEP, sampled
 from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    COMMANDS,
+    PLANS,
+    SOLIDS,
+    STATE,
+    TickMessage,
+)
 from katana450.extensions.recording.replay import after, check_fits
-from katana450.extensions.recording.tick_message import TickMessage
-from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS, STATE
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 MOMENT = 1e-6

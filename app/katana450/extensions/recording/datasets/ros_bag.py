@@ -1,40 +1,33 @@
-"""Recordings as bags of ROS 2: an MCAP file with CDR messages, and its description."""
+"""Recordings as bags of ROS 2: a folder that the library ``rosbags`` writes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 import numpy as np
-import yaml
-from mcap.writer import CompressionType, Writer
 
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
-from katana450.cli.version import version
 from katana450.errors import InputError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.new_folder import new_folder
 from katana450.extensions.recording.datasets.recorded_robot import attached_urdf, recorded_robot
-from katana450.extensions.recording.datasets.ros_messages import (
-    JOINT_STATE,
-    TEXT,
-    TF_MESSAGE,
-    Transform,
-    definition,
-    joint_state,
-    text_message,
-    transforms,
-)
-from katana450.extensions.recording.files.checking import state_numbers
+from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
 from katana450.extensions.recording.files.table import LEAST
-from katana450.extensions.recording.state_message import NANO, pose_of
-from katana450.extensions.recording.topics import CHECKPOINTS, EVENTS, STATE
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    EVENTS,
+    STATE,
+    ObjectPose,
+    StateMessage,
+)
+from katana450.extensions.recording.state_message import NANO, Pose, pose_of
+from katana450.extras import library
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
 JOINT_STATES: Final = "/joint_states"
@@ -43,6 +36,10 @@ TF: Final = "/tf"
 TF_STATIC: Final = "/tf_static"
 DESCRIPTION: Final = "/robot_description"
 BAG_EVENTS: Final = "/katana450/events"
+
+JOINT_STATE: Final = "sensor_msgs/msg/JointState"
+TF_MESSAGE: Final = "tf2_msgs/msg/TFMessage"
+TEXT: Final = "std_msgs/msg/String"
 
 TOPICS: Final = {
     JOINT_STATES: JOINT_STATE,
@@ -63,24 +60,14 @@ TF_PERIOD = 50_000_000
 MAX_TIME = 2**31 * NANO
 """[ns] First time that a message of ROS 2 cannot hold."""
 
-BAG_VERSION = 5
-"""Version of the description, which every ROS 2 since Humble reads."""
+BAG_VERSION = 8
+"""Version of the description: the newest whose quality of service ROS 2 Humble reads too."""
 
-FOREVER: Final = {"sec": 9223372036, "nsec": 854775807}
-LATCHED_QOS: Final = [
-    {
-        "history": 1,
-        "depth": 1,
-        "reliability": 1,
-        "durability": 1,
-        "deadline": FOREVER,
-        "lifespan": FOREVER,
-        "liveliness": 1,
-        "liveliness_lease_duration": FOREVER,
-        "avoid_ros_namespace_conventions": False,
-    }
-]
-"""Quality of service of these topics: keep the last, reliable, transient local."""
+NONE = np.zeros(0)
+"""Numbers that are not known."""
+
+Transform = tuple[str, str, Pose]
+"""Names of a parent and its child frame, and the pose of the child in the parent."""
 
 
 def write_bag(
@@ -88,51 +75,51 @@ def write_bag(
 ) -> int:
     """Write the part of ``file`` from ``start`` to ``end`` [s] as the bag ``out``, a new folder.
 
-    Returns the number of messages. Times are those of UTC. Raises InputError.
+    The scripts that ran are files in it. Returns the number of messages. Times are those of UTC.
+    Raises InputError, and MissingExtraError without rosbags.
     """
+    rosbag2 = library("rosbags.rosbag2", "datasets", "Bags of ROS 2")
     robot = recorded_robot(file)
     with new_folder(out) as folder:
-        name = f"{out.name}_0.mcap"
-        with (folder / name).open("wb") as target:
-            bag = _Bag(target, file, robot)
+        # The files have the name of the folder in which they are written.
+        inner = folder / out.name
+        writer = rosbag2.Writer(
+            inner, version=BAG_VERSION, storage_plugin=rosbag2.StoragePlugin.MCAP
+        )
+        writer.set_compression(rosbag2.CompressionMode.STORAGE, rosbag2.CompressionFormat.ZSTD)
+        with writer:
+            bag = _Bag(writer, file, robot)
             bag.add_part(start, end)
-            bag.add_scripts(start, end)
-            bag.close()
-        if not bag.counts[JOINT_STATES]:
-            raise InputError(f"{file.path} has no states in that time.")
-        description = yaml.safe_dump(bag.description(name), sort_keys=False)
-        (folder / "metadata.yaml").write_text(description, encoding="utf-8")
+            if not bag.counts[JOINT_STATES]:
+                raise InputError(f"{file.path} has no states in that time.")
+        for path in inner.iterdir():
+            path.rename(folder / path.name)
+        inner.rmdir()
+        for script in scripts_in([file], start, end)[0]:
+            if script.name.startswith(FOLDER):
+                (folder / FOLDER).mkdir(exist_ok=True)
+                (folder / FOLDER / Path(script.name).name).write_bytes(script.data)
     return sum(bag.counts.values())
-
-
-@dataclass
-class _Span:
-    """First and last time of the messages [ns]; ``shown``: time of the last moving frames."""
-
-    first: int | None = None
-    last: int = 0
-    shown: int | None = None
-    objects: dict[str, Transform] = field(default_factory=dict)
 
 
 class _Bag:
     """A bag that is being written."""
 
-    def __init__(self, target: BinaryIO, file: RecordingFile, robot: Robot) -> None:
-        self._file, self._robot = file, robot
+    def __init__(self, writer: Any, file: RecordingFile, robot: Robot) -> None:
+        typesys = library("rosbags.typesys", "datasets", "Bags of ROS 2")
+        self._file, self._robot, self._writer = file, robot, writer
+        self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
         self._offset = _utc_offset(file)
         self._root = robot.links[0].name
-        self._span = _Span()
+        self._objects: dict[str, ObjectPose] = {}
+        self._shown: int | None = None
         self.counts = dict.fromkeys(TOPICS, 0)
-        self._writer = Writer(target, compression=CompressionType.ZSTD)
-        self._writer.start("ros2", f"katana450 {version()}")
-        schemas = {
-            kind: self._writer.register_schema(kind, "ros2msg", definition(kind))
-            for kind in dict.fromkeys(TOPICS.values())
-        }
-        self._channels = {
-            topic: self._writer.register_channel(
-                topic, "cdr", schemas[kind], {"offered_qos_profiles": _qos(topic)}
+        self._connections = {
+            topic: writer.add_connection(
+                topic,
+                kind,
+                typestore=self._store,
+                offered_qos_profiles=_latched() if topic in LATCHED else [],
             )
             for topic, kind in TOPICS.items()
         }
@@ -147,65 +134,13 @@ class _Bag:
             if not begun:
                 begun = True
                 urdf = attached_urdf(self._file).data.decode(errors="replace")
-                self._add(DESCRIPTION, t, text_message(urdf))
-                self._add(TF_STATIC, t, transforms(t, list(self._fixed())))
+                self._add(DESCRIPTION, t, data=urdf)
+                self._add(TF_STATIC, t, transforms=self._transforms(t, self._fixed()))
             report((message.t - self._file.start) / max(self._file.end - self._file.start, LEAST))
             if message.topic == EVENTS:
-                self._add(BAG_EVENTS, t, text_message(message.data.decode(errors="replace")))
+                self._add(BAG_EVENTS, t, data=message.data.decode(errors="replace"))
             else:
-                self._add_state(t, state_numbers(message))
-
-    def add_scripts(self, start: float, end: float) -> None:
-        """Attach the scripts that ran from ``start`` to ``end`` [s]."""
-        for each in scripts_in([self._file], start, end)[0]:
-            if each.name.startswith(FOLDER):
-                t = min(max(each.log_time + self._offset, 0), MAX_TIME)
-                self._writer.add_attachment(t, t, each.name, each.media_type, each.data)
-
-    def close(self) -> None:
-        """Write the index and the end of the file."""
-        self._writer.finish()
-
-    def description(self, name: str) -> dict[str, Any]:
-        """Return the content of ``metadata.yaml``; ``name``: that of the MCAP file."""
-        first = self._span.first or 0
-        duration = {"nanoseconds": self._span.last - first}
-        starting = {"nanoseconds_since_epoch": first}
-        total = sum(self.counts.values())
-        topics = [
-            {
-                "topic_metadata": {
-                    "name": topic,
-                    "type": kind,
-                    "serialization_format": "cdr",
-                    "offered_qos_profiles": _qos(topic),
-                },
-                "message_count": self.counts[topic],
-            }
-            for topic, kind in TOPICS.items()
-            if self.counts[topic]
-        ]
-        return {
-            "rosbag2_bagfile_information": {
-                "version": BAG_VERSION,
-                "storage_identifier": "mcap",
-                "duration": duration,
-                "starting_time": starting,
-                "message_count": total,
-                "topics_with_message_count": topics,
-                "compression_format": "",
-                "compression_mode": "",
-                "relative_file_paths": [name],
-                "files": [
-                    {
-                        "path": name,
-                        "starting_time": starting,
-                        "duration": duration,
-                        "message_count": total,
-                    }
-                ],
-            }
-        }
+                self._add_state(t, content_of(message, StateMessage))
 
     def _messages(self, start: float, end: float) -> Iterator[Message]:
         """Yield states and events of the part; the first state is the one at ``start``."""
@@ -213,7 +148,7 @@ class _Bag:
         begin = max(start, file.start)
         first = file.last_before(CHECKPOINTS, begin)
         for message in file.messages(STATE, end=begin, start=begin if first is None else first.t):
-            self._place_objects(state_numbers(message))
+            content_of(message, StateMessage).move_objects(self._objects)
         before = file.last_before(STATE, begin)
         if before is not None:
             yield before._replace(log_time=round(begin * NANO))
@@ -222,70 +157,81 @@ class _Bag:
             if before is None or message.topic == EVENTS or message.log_time > before.log_time:
                 yield message
 
-    def _add(self, topic: str, t: int, data: bytes) -> None:
-        self._writer.add_message(self._channels[topic], t, data, t, self.counts[topic])
+    def _add(self, topic: str, t: int, **fields: Any) -> None:
+        kind = TOPICS[topic]
+        message = self._store.types[kind](**fields)
+        data = self._store.serialize_cdr(message, kind)
+        self._writer.write(self._connections[topic], t, data)
         self.counts[topic] += 1
-        span = self._span
-        span.first = t if span.first is None else min(span.first, t)
-        span.last = max(span.last, t)
 
-    def _add_state(self, t: int, numbers: dict[str, Any]) -> None:
-        q, gripper = self._values(numbers, "q"), self._value(numbers, "gripper")
-        values = self._robot.joint_values(q, gripper)
-        self._add(JOINT_STATES, t, joint_state(t, values))
-        setpoint = self._values(numbers, "setpoint")
-        arm = self._robot.arm
-        names = self._robot.driven if arm is None else arm.chain.names
+    def _header(self, t: int, frame: str = "") -> Any:
+        types = self._store.types
+        stamp = types["builtin_interfaces/msg/Time"](*divmod(t, NANO))
+        return types["std_msgs/msg/Header"](stamp, frame)
+
+    def _add_joints(
+        self, topic: str, t: int, positions: Mapping[str, float], rates: FloatArray
+    ) -> None:
+        self._add(
+            topic,
+            t,
+            header=self._header(t),
+            name=list(positions),
+            position=np.array(list(positions.values())),
+            velocity=rates,
+            effort=NONE,
+        )
+
+    def _add_state(self, t: int, state: StateMessage) -> None:
+        robot, arm = self._robot, self._robot.arm
+        names = robot.driven if arm is None else arm.chain.names
+        q, setpoint, qd = (
+            finite_array(numbers, (len(names),), f"The joints in {self._file.path}")
+            for numbers in (state.joints, state.setpoint, state.qd)
+        )
+        values = robot.joint_values(q, state.gripper)
+        self._add_joints(JOINT_STATES, t, values, NONE)
         target = dict(zip(names, setpoint.tolist(), strict=True))
-        qd = self._values(numbers, "qd").tolist()
         if arm is not None:
             driven = [name for name, follows in arm.fingers.items() if follows == (1.0, 0.0)]
             # The rate of the fingers is not recorded, and a message has all rates or none.
-            qd = [] if driven else qd
-            target.update({name: self._value(numbers, "gripper_setpoint") for name in driven[:1]})
-        self._add(SETPOINTS, t, joint_state(t, target, qd))
-        self._place_objects(numbers)
-        shown = self._span.shown
-        if shown is None or t - shown >= TF_PERIOD:
-            self._span.shown = t
-            moving = [self._link(link, values) for link in self._robot.links if link.joint]
-            self._add(TF, t, transforms(t, [*moving, *self._span.objects.values()]))
+            qd = NONE if driven else qd
+            target.update(dict.fromkeys(driven[:1], state.gripper_setpoint))
+        self._add_joints(SETPOINTS, t, target, qd)
+        state.move_objects(self._objects)
+        if self._shown is None or t - self._shown >= TF_PERIOD:
+            self._shown = t
+            moving = [self._link(link, values) for link in robot.links if link.joint is not None]
+            objects = [
+                (self._root, f"object/{name}", (pose.position, pose.orientation))
+                for name, pose in self._objects.items()
+            ]
+            self._add(TF, t, transforms=self._transforms(t, [*moving, *objects]))
 
-    def _place_objects(self, numbers: dict[str, Any]) -> None:
-        objects = self._span.objects
-        try:
-            for each in numbers.get("objects", ()):
-                name = str(each["name"])
-                position = finite_array(each["position"], (3,), "The position of an object")
-                rotation = finite_array(each["orientation"], (4,), "The orientation of an object")
-                objects[name] = Transform(
-                    self._root, f"object/{name}", position.tolist(), rotation.tolist()
-                )
-            for name in numbers.get("removed", ()):
-                objects.pop(name, None)
-        except (TypeError, KeyError) as error:
-            raise InputError(f"{self._file.path} is damaged: the objects are wrong.") from error
-
-    def _values(self, numbers: dict[str, Any], name: str) -> FloatArray:
-        robot = self._robot
-        count = len(robot.driven if robot.arm is None else robot.arm.chain.names)
-        return finite_array(numbers.get(name), (count,), f"{name} of {self._file.path}")  # type: ignore[arg-type]
-
-    def _value(self, numbers: dict[str, Any], name: str) -> float:
-        value = finite_array([numbers.get(name)], (1,), f"{name} of {self._file.path}")  # type: ignore[arg-type]
-        return float(value[0])
+    def _transforms(self, t: int, poses: Iterable[Transform]) -> list[Any]:
+        types = self._store.types
+        return [
+            types["geometry_msgs/msg/TransformStamped"](
+                self._header(t, parent),
+                child,
+                types["geometry_msgs/msg/Transform"](
+                    types["geometry_msgs/msg/Vector3"](*position),
+                    types["geometry_msgs/msg/Quaternion"](*rotation),
+                ),
+            )
+            for parent, child, (position, rotation) in poses
+        ]
 
     def _fixed(self) -> Iterator[Transform]:
         for link in self._robot.links:
             if link.joint is None and link.parent is not None:
                 yield self._link(link, {})
 
-    def _link(self, link: Link, values: dict[str, float]) -> Transform:
+    def _link(self, link: Link, values: Mapping[str, float]) -> Transform:
         T = link.T_parent_link
         if link.joint is not None:
             T = T @ link.joint.motion(values[link.joint.name])
-        position, rotation = pose_of(np.asarray(T))
-        return Transform(link.parent or self._root, link.name, position, rotation)
+        return link.parent or self._root, link.name, pose_of(np.asarray(T))
 
 
 def _utc_offset(file: RecordingFile) -> int:
@@ -295,5 +241,20 @@ def _utc_offset(file: RecordingFile) -> int:
     return int(text) if text.isdigit() and len(text) < 20 else 0
 
 
-def _qos(topic: str) -> str:
-    return yaml.safe_dump(LATCHED_QOS, sort_keys=False) if topic in LATCHED else ""
+def _latched() -> list[Any]:
+    """Return the quality of service: keep the last, reliable, for late subscribers too."""
+    kinds = library("rosbags.interfaces", "datasets", "Bags of ROS 2")
+    forever = kinds.QosTime(9223372036, 854775807)
+    return [
+        kinds.Qos(
+            history=kinds.QosHistory.KEEP_LAST,
+            depth=1,
+            reliability=kinds.QosReliability.RELIABLE,
+            durability=kinds.QosDurability.TRANSIENT_LOCAL,
+            deadline=forever,
+            lifespan=forever,
+            liveliness=kinds.QosLiveliness.AUTOMATIC,
+            liveliness_lease_duration=forever,
+            avoid_ros_namespace_conventions=False,
+        )
+    ]

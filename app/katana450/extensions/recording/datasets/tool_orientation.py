@@ -23,9 +23,9 @@ def orientations(file: RecordingFile, start: float, end: float) -> FloatArray:
     found = list(rows(file, start, end))
     if arm is None:
         raise InputError(f"{file.path} has no orientation: its robot has joints only.")
-    tools = [str(each.get("tool")) for each in found]
+    tools = [each.tool for each in found]
     shape = (len(found), arm.chain.n)
-    joints = [each.get("q", ()) for each in found]
+    joints = [each.joints for each in found]
     q = finite_array(joints, shape, f"The joints in {file.path}")
     quaternions = np.empty((len(found), 4))
     for tool in dict.fromkeys(tools):

@@ -5,11 +5,12 @@ Every message describes its episode completely, so the last one of each number c
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from enum import Enum
-from typing import Any
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
 
 from katana450.errors import InputError
 
@@ -17,6 +18,11 @@ MAX_TASK_LENGTH, MAX_NOTE_LENGTH = 200, 500
 """Maximum lengths of the texts of an episode."""
 
 MAX_NUMBER = 10**9
+
+MAX_TIME = 1e12
+"""[s] Bound of the times, so that none is infinite."""
+
+Moment = Annotated[float, Meta(gt=-MAX_TIME, lt=MAX_TIME)]
 
 
 class EpisodeOutcome(Enum):
@@ -36,8 +42,7 @@ JUDGED = (EpisodeOutcome.SUCCESS, EpisodeOutcome.FAILURE)
 """Outcomes that a person has given."""
 
 
-@dataclass(frozen=True)
-class EpisodeGiver:
+class EpisodeGiver(msgspec.Struct, frozen=True):
     """The person or program that began an episode.
 
     Attributes:
@@ -46,13 +51,12 @@ class EpisodeGiver:
         key: pseudonym, the same as in the commands of the recording.
     """
 
-    name: str
-    role: str
-    key: str
+    name: str = ""
+    role: str = ""
+    key: str = ""
 
 
-@dataclass(frozen=True)
-class Episode:
+class Episode(msgspec.Struct, frozen=True):
     """A part of a recording that shows one attempt at a task.
 
     Attributes:
@@ -66,14 +70,24 @@ class Episode:
         missing_ticks: number of its ticks that could not be recorded.
     """
 
-    number: int
+    number: Annotated[int, Meta(ge=1, le=MAX_NUMBER)]
     task: str
-    start: float
-    end: float | None
+    start: Moment
+    end: Moment | None
     outcome: EpisodeOutcome
     note: str
     by: EpisodeGiver
-    missing_ticks: int = 0
+    # Descriptions of earlier versions lack it.
+    missing_ticks: Annotated[int, Meta(ge=0)] = 0
+
+    def __post_init__(self) -> None:
+        name = f"Episode {self.number}"
+        if self.end is None and self.outcome is not EpisodeOutcome.RUNNING:
+            raise InputError(f"{name} has the outcome {self.outcome.value} and no end.")
+        if self.end is not None and self.end < self.start:
+            raise InputError(
+                f"{name} ends at {self.end:g} s, before its start at {self.start:g} s."
+            )
 
     @property
     def length(self) -> float:
@@ -81,73 +95,29 @@ class Episode:
         return 0.0 if self.end is None else self.end - self.start
 
 
-def message_of(episode: Episode, t: float, kind: str) -> dict[str, Any]:
-    """Return the message that describes ``episode``.
+class EpisodeMessage(Episode, frozen=True, kw_only=True):
+    """Description of an episode; the last one of each number counts.
 
-    Args:
-        episode: the episode.
+    Attributes:
         t: time of the message [s] on the clock of the recording.
-        kind: what is reported: begun, ended, judged, noted, trimmed, discarded, restored or
-            unfinished.
+        kind: begun, ended, judged, noted, trimmed, discarded, restored or unfinished.
     """
-    by = episode.by
-    return {
-        "t": t,
-        "kind": kind,
-        "number": episode.number,
-        "task": episode.task,
-        "start": episode.start,
-        "end": episode.end,
-        "outcome": episode.outcome.value,
-        "note": episode.note,
-        "by": {"name": by.name, "role": by.role, "key": by.key},
-        "missing_ticks": episode.missing_ticks,
-    }
+
+    t: float
+    kind: str
+
+
+def message_of(episode: Episode, t: float, kind: str) -> EpisodeMessage:
+    """Return the message at ``t`` [s] that describes ``episode``. ``kind``: what is reported."""
+    return EpisodeMessage(**msgspec.structs.asdict(episode), t=t, kind=kind)
 
 
 def episode_of(data: bytes | str) -> Episode:
     """Return the episode that the JSON text ``data`` describes. Raises InputError."""
     try:
-        found = json.loads(data)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"The description of an episode is no JSON: {error}.") from error
-    if not isinstance(found, dict):
-        raise InputError("The description of an episode is no JSON object.")
-    by = found.get("by")
-    by = by if isinstance(by, dict) else {}
-    number = found.get("number")
-    if not isinstance(number, int) or isinstance(number, bool) or not 1 <= number <= MAX_NUMBER:
-        raise InputError(f"The number of an episode is {number!r}, not a whole number from 1.")
-    try:
-        outcome = EpisodeOutcome(found.get("outcome"))
-    except ValueError as error:
-        known = ", ".join(each.value for each in EpisodeOutcome)
-        raise InputError(
-            f"The outcome of episode {number} is {found.get('outcome')!r}, not one of {known}."
-        ) from error
-    start = _time(found, "start", number)
-    end = None if found.get("end") is None else _time(found, "end", number)
-    if end is None and outcome is not EpisodeOutcome.RUNNING:
-        raise InputError(f"Episode {number} has the outcome {outcome.value} and no end.")
-    if end is not None and end < start:
-        raise InputError(f"Episode {number} ends at {end:g} s, before its start at {start:g} s.")
-    # Descriptions of earlier versions lack it.
-    missing = found.get("missing_ticks", 0)
-    if not isinstance(missing, int) or isinstance(missing, bool) or missing < 0:
-        raise InputError(f"The missing ticks of episode {number} are {missing!r}, not a number.")
-    giver = EpisodeGiver(
-        _text(by, "name", number), _text(by, "role", number), _text(by, "key", number)
-    )
-    return Episode(
-        number,
-        _text(found, "task", number),
-        start,
-        end,
-        outcome,
-        _text(found, "note", number),
-        giver,
-        missing,
-    )
+        return msgspec.json.decode(data, type=Episode)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+        raise InputError(f"The description of an episode is wrong: {error}.") from error
 
 
 def episodes_of(messages: Iterable[bytes | str]) -> tuple[Episode, ...]:
@@ -155,23 +125,5 @@ def episodes_of(messages: Iterable[bytes | str]) -> tuple[Episode, ...]:
 
     messages: JSON texts in the order of the recording; the last one of each number counts.
     """
-    found: dict[int, Episode] = {}
-    for each in messages:
-        episode = episode_of(each)
-        found[episode.number] = episode
-    return tuple(found[number] for number in sorted(found))
-
-
-def _time(found: Mapping[str, Any], name: str, number: int) -> float:
-    value = found.get(name)
-    # A whole number of any size is valid JSON, so it is bounded before it becomes a float.
-    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < 1e12:
-        raise InputError(f"The {name} of episode {number} is {value!r}, not a number of seconds.")
-    return float(value)
-
-
-def _text(found: Mapping[str, Any], name: str, number: int) -> str:
-    value = found.get(name, "")
-    if not isinstance(value, str):
-        raise InputError(f"The {name} of episode {number} is {value!r}, not a text.")
-    return value
+    episodes = {episode.number: episode for episode in map(episode_of, messages)}
+    return tuple(episodes[number] for number in sorted(episodes))

@@ -17,8 +17,8 @@ from katana450.extensions.recording.episodes.episode import (
 from katana450.extensions.recording.files.appending import append_message
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.messages import EPISODES
 from katana450.extensions.recording.state_message import nanoseconds
-from katana450.extensions.recording.topics import EPISODES
 
 SAME = 1e-3
 """[s] Largest difference of times that are the same."""

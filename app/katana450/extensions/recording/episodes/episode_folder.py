@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import msgspec
+from msgspec.structs import replace
+
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import json_text
-from katana450.extensions.recording.episodes.episode import Episode, episode_of, message_of
+from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_file import only_episode, with_episode
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.places import SUFFIX
@@ -52,8 +53,7 @@ class KeptEpisode:
     discarded: bool
 
 
-@dataclass(frozen=True)
-class EpisodeMarker:
+class EpisodeMarker(msgspec.Struct, frozen=True):
     """An episode that runs, or ran when the process that records ended.
 
     Attributes:
@@ -210,17 +210,8 @@ class EpisodeFolder:
 
     def mark(self, marker: EpisodeMarker) -> None:
         """Write the marker of an episode that runs. Raises InputError."""
-        episode = marker.episode
-        text = json_text(
-            {
-                "episode": message_of(episode, episode.start, "begun"),
-                "ring": str(marker.ring),
-                "first": marker.first,
-                "run": marker.run,
-                "replaces": marker.replaces,
-            }
-        )
-        write_files({self._marker(episode.number): writer_of(text)}, mode=0o600)
+        text = msgspec.json.encode(marker, enc_hook=str)
+        write_files({self._marker(marker.episode.number): writer_of(text)}, mode=0o600)
 
     def unmark(self, number: int) -> None:
         """Remove the marker of episode ``number``."""
@@ -266,11 +257,9 @@ def _marker_in(path: Path) -> EpisodeMarker:
     if path.stat().st_size > MAX_MARKER_BYTES:
         raise InputError(f"{path} is too large for the marker of an episode.")
     try:
-        found = json.loads(path.read_bytes())
-        episode = episode_of(json.dumps(found["episode"]))
-        ring, first, run = (str(found[name]) for name in ("ring", "first", "run"))
-        return EpisodeMarker(
-            episode, Path(ring), first, run, tuple(map(int, found.get("replaces", ())))
+        # The only field that JSON has no type for is the path.
+        return msgspec.json.decode(
+            path.read_bytes(), type=EpisodeMarker, dec_hook=lambda _, text: Path(text)
         )
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeError, TypeError, RecursionError) as error:
         raise InputError(f"{path} does not describe a running episode: {error}.") from error

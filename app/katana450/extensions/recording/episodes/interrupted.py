@@ -6,8 +6,9 @@ import logging
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
+
+from msgspec.structs import replace
 
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome
@@ -16,8 +17,8 @@ from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.messages import STATE
 from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.topics import STATE
 
 log = logging.getLogger(__name__)
 

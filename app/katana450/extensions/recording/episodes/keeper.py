@@ -15,6 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import (
     Episode,
@@ -176,7 +178,7 @@ class EpisodeKeeper:
                 self._note_change()
 
     def _handle(self, request: EpisodeRequest, by: EpisodeGiver, t: float) -> dict[str, Any]:
-        kind = request.__struct_config__.tag
+        kind = str(request.__struct_config__.tag)
         match request:
             case StartEpisode(task=task):
                 episode = self._start(self._task if task is None else task, by, t)
@@ -202,7 +204,8 @@ class EpisodeKeeper:
                 episode = self._trim(number, start, end)
             case _:
                 raise AssertionError(f"{type(request).__name__} is not handled.")
-        return {**message_of(episode, t, ""), "kind": kind}
+        message: dict[str, Any] = msgspec.to_builtins(message_of(episode, t, kind))
+        return message
 
     def _change(self, number: int, kind: str, **changes: Any) -> Episode:
         """Write a new description of a kept episode into its file, and into the recording."""

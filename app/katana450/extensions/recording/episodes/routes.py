@@ -10,6 +10,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
@@ -20,7 +21,6 @@ from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import (
     MAX_NUMBER,
     EpisodeGiver,
-    message_of,
 )
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
 from katana450.extensions.recording.episodes.episode_requests import (
@@ -154,11 +154,7 @@ def described(kept: KeptEpisode) -> dict[str, Any]:
     episode = kept.episode
     end = kept.end if episode.end is None else episode.end
     return {
-        **{
-            name: value
-            for name, value in message_of(episode, kept.end, "").items()
-            if name in ("number", "task", "outcome", "note", "by", "missing_ticks")
-        },
+        **msgspec.to_builtins(episode),
         "start": round(episode.start - kept.start, 3),
         "end": round(end - kept.start, 3),
         "recorded": round(kept.end - kept.start, 3),

@@ -6,9 +6,10 @@ import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from msgspec.structs import replace
 
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, message_of

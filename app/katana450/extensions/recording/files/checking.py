@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -19,27 +19,25 @@ from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, json_form
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.forms import FormError
-from katana450.extensions.recording.replay import Checker, Verification
-from katana450.extensions.recording.shared_values import SharedText
-from katana450.extensions.recording.tick_message import TickInput, TickMessage, tick_input
-from katana450.extensions.recording.topics import (
+from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
     PLANS,
     SHARED_TOPICS,
     SOLIDS,
     STATE,
+    CheckpointMessage,
+    SharedMessage,
+    StateMessage,
+    TickMessage,
 )
+from katana450.extensions.recording.replay import Checker, Verification
+from katana450.extensions.recording.shared_values import SharedText
+from katana450.extensions.recording.ticks import TickInput, tick_input
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
-
-class SharedMessage(msgspec.Struct):
-    """Message with a shared value, whose text is kept as it is, because its key is a hash."""
-
-    key: str
-    value: msgspec.Raw
-
+T = TypeVar("T")
 
 KINDS = {topic: kind for kind, topic in SHARED_TOPICS.items()}
 
@@ -53,7 +51,7 @@ class TickReader:
     def add_shared(self, message: Message) -> None:
         """Remember the plan or solid in ``message``. Raises InputError."""
         with _placed(message):
-            found = msgspec.json.decode(message.data, type=SharedMessage)
+            found: SharedMessage = json_form(message.data, SharedMessage)
             self._codec.shared.add(SharedText(KINDS[message.topic], found.key, bytes(found.value)))
 
     def tick(self, message: Message) -> TickInput | TickMessage:
@@ -62,28 +60,27 @@ class TickReader:
             tick: TickMessage = json_form(message.data, TickMessage)
             return tick if tick.missing is not None else tick_input(self._codec, tick)
 
+    def field(self, message: Message, name: str, default: Any) -> Any:
+        """Return the field ``name`` of the state in ``message``. Raises InputError."""
+        with _placed(message):
+            form = json_form(message.data, CheckpointMessage).state
+            if not isinstance(form, dict):
+                raise FormError("it is not a state")
+            return self._codec.field(State, name, form[name]) if name in form else default
+
     def checkpoint(self, message: Message) -> State:
         """Return the state in ``message``. Raises InputError."""
         with _placed(message):
-            form = json_form(message.data)
-            if not isinstance(form, dict):
-                raise FormError("it is not an object")
-            state: State = self._codec.decoded(State, form.get("state"))
+            found: CheckpointMessage = json_form(message.data, CheckpointMessage)
+            state: State = self._codec.decoded(State, found.state)
             return state
 
 
-def state_numbers(message: Message) -> dict[str, Any]:
-    """Return the content of a message of a state or an event, a state with its joints ``q``.
-
-    Raises InputError.
-    """
+def content_of(message: Message, kind: type[T]) -> T:
+    """Return the content of ``message``, which is of ``kind``. Raises InputError."""
     with _placed(message):
-        form = json_form(message.data)
-        if not isinstance(form, dict):
-            raise FormError("it is not an object")
-        if "setpoint" in form:
-            form.setdefault("q", form["setpoint"])
-        return form
+        content: T = json_form(message.data, kind)
+        return content
 
 
 @contextmanager
@@ -109,7 +106,7 @@ def verify_recording(
         if message.topic in KINDS:
             reader.add_shared(message)
         elif message.topic == STATE:
-            checker.setpoint(_setpoint(message))
+            checker.setpoint(np.array(content_of(message, StateMessage).setpoint))
         elif message.topic == CHECKPOINTS:
             if checker.state is None:
                 checker.checkpoint(reader.checkpoint(message))
@@ -122,15 +119,6 @@ def verify_recording(
     return checker.result
 
 
-def _setpoint(message: Message) -> np.ndarray[Any, np.dtype[np.float64]]:
-    found = state_numbers(message).get("setpoint")
-    with _placed(message):
-        try:
-            return np.array(found, dtype=np.float64).reshape(-1)
-        except (TypeError, ValueError, OverflowError):
-            raise FormError("the setpoint is not a row of numbers") from None
-
-
 def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[float, TickMessage]]:
     """Yield the gaps from ``start`` to ``end`` [s], each with its time [s].
 
@@ -139,8 +127,7 @@ def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[flo
     for message in file.messages(COMMANDS, start=start, end=end):
         if b'"missing"' not in message.data:
             continue
-        with _placed(message):
-            gap: TickMessage = json_form(message.data, TickMessage)
+        gap = content_of(message, TickMessage)
         if gap.missing is not None:
             yield message.t, gap
 

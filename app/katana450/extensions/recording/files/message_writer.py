@@ -33,7 +33,7 @@ from katana450.extensions.recording.files.mcap_records import (
     write_end,
     write_records,
 )
-from katana450.extensions.recording.topics import TOPICS
+from katana450.extensions.recording.messages import TOPICS
 
 CHUNK_BYTES = 1 << 20
 """Size before compression after which a chunk ends. ``flush`` ends one sooner."""

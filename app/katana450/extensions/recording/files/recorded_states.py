@@ -11,9 +11,14 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    COMMANDS,
+    PLANS,
+    SOLIDS,
+    TickMessage,
+)
 from katana450.extensions.recording.replay import after, check_fits
-from katana450.extensions.recording.tick_message import TickMessage
-from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS
 from katana450.maths.motion.limiter import JointMotion
 
 

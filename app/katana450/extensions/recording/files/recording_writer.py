@@ -14,6 +14,7 @@ from katana450.arm.control.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.codec import Codec, json_text
 from katana450.extensions.recording.digest import Digester
+from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.script_runs import (
@@ -22,10 +23,7 @@ from katana450.extensions.recording.files.script_runs import (
     program_event,
 )
 from katana450.extensions.recording.forms import FormError
-from katana450.extensions.recording.pseudonyms import Pseudonyms
-from katana450.extensions.recording.state_message import StateMessages, nanoseconds
-from katana450.extensions.recording.tick_message import TickMessage, tick_message
-from katana450.extensions.recording.topics import (
+from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
     EPISODES,
@@ -34,7 +32,12 @@ from katana450.extensions.recording.topics import (
     SHARED_TOPICS,
     STATE,
     TF,
+    CheckpointMessage,
+    TickMessage,
 )
+from katana450.extensions.recording.pseudonyms import Pseudonyms
+from katana450.extensions.recording.state_message import StateMessages, nanoseconds
+from katana450.extensions.recording.ticks import tick_message
 
 CHECKPOINT_PERIOD = 10.0
 """[s] Time between two complete states: a simulation from one to any moment takes a second."""
@@ -127,7 +130,7 @@ class RecordingWriter:
             self._writer.attach(script)
             self.event(t, PROGRAM, program_event(name, script, since, began=began))
 
-    def episode(self, t: float, message: Mapping[str, Any]) -> None:
+    def episode(self, t: float, message: EpisodeMessage) -> None:
         """Record the description of an episode at ``t`` [s]; see ``episodes.episode``."""
         self._add(EPISODES, t, message)
 
@@ -153,8 +156,8 @@ class RecordingWriter:
         message = self._messages.state(state)
         self._add(STATE, t, message)
         self._written.shown = False
-        self._written.moved.update(each["name"] for each in message.get("objects", ()))
-        self._written.moved.difference_update(message.get("removed", ()))
+        self._written.moved.update(pose.name for pose in message.objects)
+        self._written.moved.difference_update(message.removed)
 
     def _add_shown(self, t: float, state: State) -> None:
         """Write the messages that displays read."""
@@ -170,5 +173,5 @@ class RecordingWriter:
             # A value without a form, whose tick was written as missing. A later state may do.
             return
         self._add_shared(t)
-        self._add(CHECKPOINTS, t, {"t": t, "state": form})
+        self._add(CHECKPOINTS, t, CheckpointMessage(t, form))
         self._written.checkpoint_t = t

@@ -29,8 +29,13 @@ from katana450.extensions.recording.files.recording_file import (
     unpacked,
 )
 from katana450.extensions.recording.files.trimming import KEY
-from katana450.extensions.recording.tick_message import TickMessage
-from katana450.extensions.recording.topics import CHECKPOINTS, COMMANDS, PLANS, SOLIDS
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    COMMANDS,
+    PLANS,
+    SOLIDS,
+    TickMessage,
+)
 from katana450.platform_support import claim_file
 
 RECORD_HEAD = struct.Struct("<BQ")

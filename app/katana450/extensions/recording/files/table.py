@@ -7,24 +7,30 @@ import io
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.progress import report
-from katana450.extensions.recording.files.checking import state_numbers
+from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.topics import CHECKPOINTS, STATE
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    STATE,
+    ObjectPose,
+    StateMessage,
+)
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
-NUMBERS = ("t", "gripper", "gripper_setpoint", "speed", "q", "qd", "setpoint")
+SINGLE, ROWS = ("t", "gripper", "gripper_setpoint", "speed"), ("qd", "setpoint")
+"""Names of the columns with one number for a state, and with one for each joint."""
+
 LEAST = 1e-3
 """[s] Least length of a part of which progress is reported."""
 
 POSITION = "position"
-"""Names of the columns of every robot, and of that of a robot with a tool only."""
+"""Name of the column of a robot with a tool only."""
 
 
 def rows(
@@ -32,40 +38,32 @@ def rows(
     start: float = -math.inf,
     end: float = math.inf,
     done: Callable[[float], None] | None = None,
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[StateMessage]:
     """Yield the states that were written from ``start`` to ``end`` [s].
 
     ``done`` is called with the fraction that was read. Raises InputError.
     """
     first, last = max(start, file.start), min(end, file.end)
     for message in file.messages(STATE, start=start, end=end):
-        row = state_numbers(message)
         if done is not None:
             done((message.t - first) / max(last - first, LEAST))
-        if not isinstance(row.get("t"), int | float):
-            raise InputError(
-                f"{file.path} is damaged: the state at t = {message.t:.3f} s has no time."
-            )
-        yield row
+        yield content_of(message, StateMessage)
 
 
-def state_at(file: RecordingFile, t: float) -> dict[str, Any] | None:
+def state_at(file: RecordingFile, t: float) -> StateMessage | None:
     """Return the last state at or before ``t`` [s], with all its objects; None if there is none.
 
     Only objects that changed are in the message of a state; the others are those since the last
     complete state. Raises InputError for a damaged recording.
     """
     checkpoint = file.last_before(CHECKPOINTS, t)
-    found: dict[str, Any] | None = None
-    objects: dict[str, Any] = {}
-    try:
-        for found in rows(file, -math.inf if checkpoint is None else checkpoint.t, t):
-            objects.update({each["name"]: each for each in found.pop("objects", ())})
-            for name in found.pop("removed", ()):
-                objects.pop(name, None)
-    except (TypeError, KeyError) as error:
-        raise InputError(f"{file.path} is damaged: the objects of a state are wrong.") from error
-    return None if found is None else {**found, "objects": list(objects.values())}
+    state: StateMessage | None = None
+    objects: dict[str, ObjectPose] = {}
+    for state in rows(file, -math.inf if checkpoint is None else checkpoint.t, t):
+        state.move_objects(objects)
+    if state is not None:
+        state.objects, state.removed = list(objects.values()), []
+    return state
 
 
 def columns(
@@ -83,17 +81,19 @@ def columns(
     found = list(rows(file, start, end, done))
     if not found:
         raise InputError(f"{file.path} has no states in that time.")
-    names = [*NUMBERS, *([POSITION] if POSITION in found[0] else [])]
-    table = {}
-    for name in names:
-        first = found[0].get(name)
-        width = len(first) if isinstance(first, list) else None
-        shape = (len(found),) if width is None else (len(found), width)
-        values = [row.get(name) for row in found]
-        if any(value is None for value in values):
-            raise InputError(f"{file.path} is damaged: it has a state without {name}.")
-        table[name] = finite_array(values, shape, f"{name} of {file.path}")  # type: ignore[arg-type]
-    return table
+    columns = {name: [getattr(row, name) for row in found] for name in SINGLE}
+    columns |= {name: [getattr(row, name) for row in found] for name in ROWS}
+    columns["q"] = [row.joints for row in found]
+    if found[0].position is not None:
+        columns[POSITION] = [row.position for row in found]
+    return {
+        name: finite_array(
+            values,
+            (len(found),) if name in SINGLE else (len(found), len(values[0])),
+            f"{name} of {file.path}",
+        )
+        for name, values in columns.items()
+    }
 
 
 def setpoint_table(

@@ -19,8 +19,7 @@ from katana450.extensions.recording.files.recording_file import (
     nanoseconds_of,
 )
 from katana450.extensions.recording.files.script_runs import begun_before, scripts_in
-from katana450.extensions.recording.state_message import nanoseconds
-from katana450.extensions.recording.topics import (
+from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
     EPISODES,
@@ -31,6 +30,7 @@ from katana450.extensions.recording.topics import (
     STATE,
     TF,
 )
+from katana450.extensions.recording.state_message import nanoseconds
 
 KEY = re.compile(rb'"([0-9a-f]{32})"')
 """Pattern of the keys of shared values in messages."""

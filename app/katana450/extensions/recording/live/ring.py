@@ -17,6 +17,7 @@ from katana450.arm.control.event_log import entries_between
 from katana450.arm.control.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
@@ -163,7 +164,7 @@ class Ring:
         except OSError as error:
             self._fail(error)
 
-    def describe(self, t: float, episode: Mapping[str, Any]) -> None:
+    def describe(self, t: float, episode: EpisodeMessage) -> None:
         """Write and sync the message ``episode`` about an episode at ``t`` [s]."""
         if not self._opened():
             return

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.recording.playback.rows import StateRow
+from katana450.extensions.recording.messages import StateMessage
 
 MAX_POINTS = 200
 """Number of points of a plot."""
@@ -38,8 +38,8 @@ def times_of(length: float) -> list[float]:
 
 def difference(
     times: Sequence[float],
-    first: Sequence[StateRow | None],
-    second: Sequence[StateRow | None],
+    first: Sequence[StateMessage | None],
+    second: Sequence[StateMessage | None],
     slides: Sequence[bool],
 ) -> RunDifference:
     """Return the differences of the states of two runs at ``times`` [s].
@@ -52,11 +52,10 @@ def difference(
     for t, a, b in zip(times, first, second, strict=True):
         if a is None or b is None:
             continue
-        if not len(a.q) == len(b.q) == len(sliding):
-            raise InputError(
-                f"The runs have {len(a.q)} and {len(b.q)} joints, the robot {len(sliding)}."
-            )
-        away = np.abs(np.subtract(a.q, b.q))
+        counts = len(a.joints), len(b.joints), len(sliding)
+        if len(set(counts)) > 1:
+            raise InputError("The runs have {} and {} joints, the robot {}.".format(*counts))
+        away = np.abs(np.subtract(a.joints, b.joints))
         found.t.append(t)
         if not sliding.all():
             found.joints.append(float(np.degrees(away[~sliding].max())))

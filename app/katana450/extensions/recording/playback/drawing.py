@@ -41,7 +41,7 @@ class RunDrawing:
     def show(self, moment: RecordedMoment, session: Session, other: RecordedMoment | None) -> None:
         """Show ``moment``, without the objects that stand as in ``other``."""
         row = moment.row
-        self._arm.move(self._robot.joint_values(np.array(row.q), row.gripper))
+        self._arm.move(self._robot.joint_values(np.array(row.joints), row.gripper))
         self._arm.show(True, self._colour)
         there = {} if other is None else {each.name: each.T for each in other.objects}
         moved = [
@@ -89,10 +89,10 @@ class PlaybackWindows:
 
     def check(self, moment: RecordedMoment) -> None:
         """Raise InputError if ``moment`` is one of a robot with other joints."""
-        joints = len(self._session().ready)
-        if len(moment.row.q) != joints:
+        joints, recorded = len(self._session().ready), len(moment.row.joints)
+        if recorded != joints:
             raise InputError(
-                f"The recording is one of a robot with {len(moment.row.q)} joints, not {joints}."
+                f"The recording is one of a robot with {recorded} joints, not {joints}."
             )
 
     @property

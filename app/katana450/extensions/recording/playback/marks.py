@@ -11,7 +11,7 @@ from katana450.extensions.recording.codec import json_form
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.live import run_events
-from katana450.extensions.recording.topics import EPISODES
+from katana450.extensions.recording.messages import EPISODES
 
 MAX_TEXT = 120
 """Maximum number of letters of the text of a mark."""

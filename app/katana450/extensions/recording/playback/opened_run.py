@@ -18,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from katana450.errors import InputError
+from katana450.extensions.recording.messages import StateMessage
 from katana450.extensions.recording.playback.decoder import LENGTH
 from katana450.extensions.recording.playback.marks import Mark
-from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
+from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.spans import Span
 from katana450.platform_support import without_interrupts
 
@@ -68,9 +69,9 @@ class OpenedRun:
         found: RecordedMoment | None = self._ask("at", t)
         return found
 
-    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
+    def rows_at(self, times: Sequence[float]) -> list[StateMessage | None]:
         """See ``PlaybackRun.rows_at``."""
-        found: list[StateRow | None] = self._ask("rows_at", list(times))
+        found: list[StateMessage | None] = self._ask("rows_at", list(times))
         return found
 
     def close(self) -> None:

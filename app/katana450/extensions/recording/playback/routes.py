@@ -18,10 +18,11 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
+from katana450.extensions.recording.messages import StateMessage
 from katana450.extensions.recording.playback.difference import difference, times_of
 from katana450.extensions.recording.playback.drawing import PlaybackWindows
 from katana450.extensions.recording.playback.folder import CONTEXTS
-from katana450.extensions.recording.playback.rows import RecordedMoment, StateRow
+from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.spans import at_place, length_of, place_of
 from katana450.extensions.recording.playback.store import (
     MAX_FILE_BYTES,
@@ -259,7 +260,7 @@ async def _received(request: Request, path: Path, timeout: asyncio.Timeout) -> N
         await asyncio.to_thread(file.close)
 
 
-def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateRow | None]:
+def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateMessage | None]:
     spans = run.spans
     return run.rows_at([at_place(spans, place + t) for t in times])
 
@@ -271,7 +272,7 @@ def _said(moment: RecordedMoment | None) -> dict[str, Any] | None:
     row = moment.row
     return {
         "t": row.t,
-        "q": row.q,
+        "q": row.joints,
         "gripper": row.gripper,
         "position": row.position,
         "status": row.status,

@@ -7,18 +7,16 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-import msgspec
-
 from katana450.arm.control.pouring import CUP, MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import Codec, json_form
-from katana450.extensions.recording.files.checking import KINDS, SharedMessage
+from katana450.extensions.recording.files.checking import TickReader, content_of
 from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
-from katana450.extensions.recording.forms import FormError
-from katana450.extensions.recording.shared_values import SharedText
-from katana450.maths.geometry import se3, so3
+from katana450.extensions.recording.messages import (
+    ObjectPose,
+    StateMessage,
+    VesselWaterMessage,
+)
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import VesselWater, Water
@@ -26,61 +24,6 @@ from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
-from katana450.maths.water.vectors import Vector
-
-
-class ObjectRow(msgspec.Struct):
-    """Pose of an object: position [m] and quaternion x, y, z, w in the base frame."""
-
-    name: str
-    position: tuple[float, float, float]
-    orientation: tuple[float, float, float, float]
-    held: bool = False
-
-    @property
-    def T(self) -> FloatArray:
-        """The pose (4, 4) in the base frame."""
-        x, y, z, w = self.orientation
-        return se3.from_rotation_translation(so3.from_quaternion((w, x, y, z)), self.position)
-
-
-class VesselRow(msgspec.Struct):
-    """Volume [ml] and lean of the water in a vessel."""
-
-    name: str
-    volume: float
-    lean: tuple[float, float, float] = (0.0, 0.0, 1.0)
-
-    def at(self, T: FloatArray) -> VesselWater:
-        """Return the water in the vessel in its pose ``T`` (4, 4)."""
-        slosh = Slosh(self.lean[:2], weight=self.lean[2])
-        return VesselWater(self.name, round(self.volume * MILLILITRE), frozen(T), slosh)
-
-
-class WaterRow(msgspec.Struct):
-    """Volumes [ml]."""
-
-    cup: float
-    basin: float
-    air: float = 0.0
-    spilled: float = 0.0
-    lean: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    vessels: list[VesselRow] = []
-    left: tuple[float, Vector, Vector, float] | None = None
-
-
-class StateRow(msgspec.Struct):
-    """The part of a recorded state that is played back; units as in docs/recording.md."""
-
-    t: float
-    setpoint: list[float]
-    q: list[float] = []
-    gripper: float = 0.0
-    status: str = ""
-    position: list[float] | None = None
-    objects: list[ObjectRow] = []
-    removed: list[str] = []
-    water: WaterRow | None = None
 
 
 @dataclass(frozen=True)
@@ -108,7 +51,7 @@ class RecordedMoment:
         water: the water, in which parcels that have landed may still fly; None without a cup.
     """
 
-    row: StateRow
+    row: StateMessage
     objects: tuple[SceneObject, ...]
     water: Water | None
 
@@ -124,10 +67,10 @@ class Block:
         """
         self._states = list(messages)
         self._times = [each.log_time for each in self._states]
-        self._poses: list[Mapping[str, ObjectRow]] = []
+        self._poses: list[Mapping[str, ObjectPose]] = []
         self._described: dict[str, SceneObject] = {}
         self._water: Water | None = None
-        poses: dict[str, ObjectRow] = {}
+        poses: dict[str, ObjectPose] = {}
         self._parcels: list[tuple[float, Parcel]] = []
         for message in self._states:
             if LEFT in message.data:
@@ -139,9 +82,8 @@ class Block:
             # Most states name no object, and are decoded when they are shown.
             if any(each in message.data for each in CHANGES):
                 row = state_row(message)
-                poses = poses | {each.name: each for each in row.objects}
-                for name in row.removed:
-                    poses.pop(name, None)
+                poses = dict(poses)
+                row.move_objects(poses)
                 if len(poses) > MAX_POSES:
                     raise InputError(f"The recording has more than {MAX_POSES} objects at a time.")
             self._poses.append(poses)
@@ -176,12 +118,12 @@ class Block:
         )
         return RecordedMoment(row, objects, self._water_of(row, poses))
 
-    def _water_of(self, row: StateRow, poses: Mapping[str, ObjectRow]) -> Water | None:
+    def _water_of(self, row: StateMessage, poses: Mapping[str, ObjectPose]) -> Water | None:
         if row.water is None or self._water is None or CUP not in poses:
             return None
-        rows = (VesselRow(CUP, row.water.cup, row.water.lean), *row.water.vessels)
+        vessels = (VesselWaterMessage(CUP, row.water.cup, row.water.lean), *row.water.vessels)
         return Water(
-            tuple(each.at(poses[each.name].T) for each in rows if each.name in poses),
+            tuple(_vessel(each, poses[each.name].T) for each in vessels if each.name in poses),
             basin=round(row.water.basin * MILLILITRE),
             parcels=tuple(
                 each._replace(age=row.t - t)
@@ -212,46 +154,30 @@ def still_flying(water: Water, environment: WaterEnvironment) -> Water:
     return replace(water, parcels=tuple(flying))
 
 
-def state_row(message: Message) -> StateRow:
+def state_row(message: Message) -> StateMessage:
     """Return the state in ``message``. Raises InputError."""
-    try:
-        row = msgspec.json.decode(message.data, type=StateRow)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise InputError(
-            f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
-        ) from error
-    # Joints without a report of the driver are where they should be.
-    row.q = row.q or row.setpoint
-    return row
+    return content_of(message, StateMessage)
+
+
+def _vessel(water: VesselWaterMessage, T: FloatArray) -> VesselWater:
+    """Return the water in a vessel in its pose ``T`` (4, 4)."""
+    slosh = Slosh(water.lean[:2], weight=water.lean[2])
+    return VesselWater(water.name, round(water.volume * MILLILITRE), frozen(T), slosh)
 
 
 class Describer:
     """Reads the objects and the water of complete states. For one file."""
 
     def __init__(self) -> None:
-        self._codec = Codec()
+        self._reader = TickReader()
 
     def add_solid(self, message: Message) -> None:
         """Remember the solid in ``message``, to which objects refer. Raises InputError."""
-        try:
-            found = msgspec.json.decode(message.data, type=SharedMessage)
-            text = SharedText(KINDS[message.topic], found.key, bytes(found.value))
-            self._codec.shared.add(text)
-        except (FormError, msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-            raise InputError(
-                f"The recording is damaged in the solid at t = {message.t:.3f} s: {error}."
-            ) from error
+        self._reader.add_shared(message)
 
     def description(self, message: Message) -> Description:
         """Return that of the complete state in ``message``. Raises InputError."""
-        try:
-            form = json_form(message.data)["state"]
-            codec, found = self._codec, form.get("objects", [])
-            objects: tuple[SceneObject, ...] = codec.field(State, "objects", found)
-            poured: MotionWithWater | None = codec.field(State, "poured", form.get("poured"))
-        except (FormError, TypeError, KeyError, AttributeError) as error:
-            raise InputError(
-                f"The recording is damaged in the state at t = {message.t:.3f} s: {error}."
-            ) from error
+        objects: tuple[SceneObject, ...] = self._reader.field(message, "objects", ())
+        poured: MotionWithWater | None = self._reader.field(message, "poured", None)
         named = {each.name: each for each in objects}
         return Description(message.t, named, None if poured is None else poured.water)

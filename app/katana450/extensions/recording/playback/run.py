@@ -11,6 +11,14 @@ from typing import NamedTuple
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.messages import (
+    CHECKPOINTS,
+    EPISODES,
+    EVENTS,
+    SOLIDS,
+    STATE,
+    StateMessage,
+)
 from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 from katana450.extensions.recording.playback.rows import (
@@ -18,17 +26,9 @@ from katana450.extensions.recording.playback.rows import (
     Describer,
     Description,
     RecordedMoment,
-    StateRow,
     state_row,
 )
 from katana450.extensions.recording.playback.spans import Span, spans_of
-from katana450.extensions.recording.topics import (
-    CHECKPOINTS,
-    EPISODES,
-    EVENTS,
-    SOLIDS,
-    STATE,
-)
 
 MAX_BLOCKS = 24
 """Number of decoded blocks that are kept, 4 min of motion; each has about 1 MB."""
@@ -159,14 +159,14 @@ class PlaybackRun:
                 first = block
             return None if first is None else first.at(first.start)
 
-    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
+    def rows_at(self, times: Sequence[float]) -> list[StateMessage | None]:
         """Return joints and tool at each of ``times`` [s], without objects; None before the first.
 
         This reads a second of the file at most for each, and keeps nothing.
         """
         return [self._row_at(t) for t in times]
 
-    def _row_at(self, t: float) -> StateRow | None:
+    def _row_at(self, t: float) -> StateMessage | None:
         with self._lock:
             t -= self._offset
             for file in reversed(self._files):

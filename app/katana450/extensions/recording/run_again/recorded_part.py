@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from katana450.arm.control.state import Status
 from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
+from katana450.extensions.recording.messages import StateMessage
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
 
 WAITING = (Status.PAUSED.value, Status.STOPPED.value)
@@ -88,7 +89,7 @@ def read_part(
         )
     check_whole(file, first, last)
     found = list(_states(file, first, last))
-    if not found or "position" not in found[0]:
+    if not found or found[0].position is None:
         raise InputError(f"{file.path} is not a recording of an arm with a tool.")
     part = _part(file, found, name)
     if bool(part.rests.all()):
@@ -107,29 +108,24 @@ def check_whole(file: RecordingFile, first: float, last: float) -> None:
         )
 
 
-def _states(file: RecordingFile, first: float, last: float) -> Iterator[dict[str, Any]]:
+def _states(file: RecordingFile, first: float, last: float) -> Iterator[StateMessage]:
     """Yield the states from ``first`` to ``last`` [s], the first with all its objects."""
     before = state_at(file, first)
     if before is not None:
-        yield {**before, "t": first}
+        yield replace(before, t=first)
     for row in rows(file, first, last):
-        if before is None or row["t"] > first:
+        if before is None or row.t > first:
             yield row
 
 
-def _part(file: RecordingFile, found: list[dict[str, Any]], name: str) -> RecordedPart:
+def _part(file: RecordingFile, found: list[StateMessage], name: str) -> RecordedPart:
     count = len(found)
-    try:
-        t = finite_array([row["t"] for row in found], (count,), "The times")
-        width = len(found[0]["setpoint"])
-        setpoint = finite_array([row["setpoint"] for row in found], (count, width), "The setpoints")
-        fingers = finite_array(
-            [row["gripper_setpoint"] for row in found], (count,), "The setpoints of the fingers"
-        )
-        waiting = np.array([row["status"] in WAITING for row in found])
-        held, tools = tuple(_held(found)), tuple(str(row["tool"]) for row in found)
-    except (KeyError, TypeError, InputError) as error:
-        raise InputError(f"{file.path} is damaged: a state lacks {error}.") from error
+    t = np.array([row.t for row in found])
+    shape = count, len(found[0].setpoint)
+    setpoint = finite_array([row.setpoint for row in found], shape, f"setpoint of {file.path}")
+    fingers = np.array([row.gripper_setpoint for row in found])
+    waiting = np.array([row.status in WAITING for row in found])
+    held, tools = tuple(_held(found)), tuple(row.tool for row in found)
     # The last of several states at nearly one time is kept, and always the first one.
     kept = np.append(np.diff(t) >= MIN_STEP, True)
     kept[0] = True
@@ -159,15 +155,15 @@ def _with_rests(t: FloatArray, numbers: IntArray) -> tuple[FloatArray, IntArray]
     )
 
 
-def _held(found: list[dict[str, Any]]) -> Iterator[str]:
+def _held(found: list[StateMessage]) -> Iterator[str]:
     """Yield the name of the object that the fingers hold in each state; "" for none."""
     held = ""
     for row in found:
-        for each in row.get("objects", ()):
-            if each["held"]:
-                held = str(each["name"])
-            elif each["name"] == held:
+        for pose in row.objects:
+            if pose.held:
+                held = pose.name
+            elif pose.name == held:
                 held = ""
-        if held in row.get("removed", ()):
+        if held in row.removed:
             held = ""
         yield held

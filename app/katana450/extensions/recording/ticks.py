@@ -1,4 +1,4 @@
-"""Messages of ticks: what the control loop was given, and the digest of the state after it.
+"""Ticks and their messages: what the control loop was given, and the digest of the state after it.
 
 What a simulation finds by itself is left out: the time of the state before, unless the arm rested,
 and the answer of the driver, unless it differs from the setpoint.
@@ -6,12 +6,7 @@ and the answer of the driver, unless it differs from the setpoint.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Any
-
-import msgspec
-from msgspec import Meta
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.arm_report import ArmReport
@@ -21,48 +16,8 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import FormError
+from katana450.extensions.recording.messages import GivenCommand, SentAnswer, TickMessage
 from katana450.maths.geometry.arrays import FloatArray
-
-MAX_COMMANDS = 10_000
-
-
-class GivenCommand(msgspec.Struct, forbid_unknown_fields=True):
-    """The forms of a command and of its giver."""
-
-    command: Any
-    actor: Any
-
-
-class SentAnswer(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """The forms of the answer of a driver."""
-
-    q: Any
-    gripper: Any
-    report: Any = None
-
-
-class TickMessage(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """One tick of the control loop, or the note that some are missing.
-
-    Attributes:
-        t: time of the tick [s].
-        t_before: time of the state that it steps from [s]; None for that of the tick before.
-        commands: its commands as the loop took them, with who gave each.
-        sent: the answer of the driver; None if it is the setpoint.
-        failed: whether an internal error made the arm hold.
-        digest: digest of the state after it.
-        missing: why this tick, and ``ticks`` before the next, cannot be simulated.
-        ticks: number of missing ticks.
-    """
-
-    t: float
-    t_before: float | None = None
-    commands: Annotated[tuple[GivenCommand, ...], Meta(max_length=MAX_COMMANDS)] = ()
-    sent: SentAnswer | None = None
-    failed: bool = False
-    digest: str = ""
-    missing: str | None = None
-    ticks: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +67,6 @@ def _is_at_setpoint(state: State) -> bool:
 
 def tick_input(codec: Codec, message: TickMessage) -> TickInput:
     """Return the tick of ``message``. Raises FormError."""
-    t, t_before = message.t, message.t_before
-    # Compiled code of the simulation reads beyond its memory at a time that is not a number.
-    if not (math.isfinite(t) and (t_before is None or math.isfinite(t_before))):
-        raise FormError(f"{t} is not the time of a tick", ("t",))
     submissions, sent = [], None
     for place, given in enumerate(message.commands):
         try:
@@ -132,4 +83,7 @@ def tick_input(codec: Codec, message: TickMessage) -> TickInput:
             )
         except FormError as error:
             raise error.within("sent") from None
-    return TickInput(t, t_before, tuple(submissions), sent, message.failed, message.digest)
+    # Its times are finite, as all numbers of JSON: compiled code of the simulation needs that.
+    return TickInput(
+        message.t, message.t_before, tuple(submissions), sent, message.failed, message.digest
+    )
