@@ -27,12 +27,11 @@ if TYPE_CHECKING:
         KatanaError,
         RobotDescriptionError,
     )
+    from katana450.extensions.general_arms.nearest import NearestPose
     from katana450.extensions.reachability.map import ReachabilityMap
     from katana450.library.arm import Arm
-    from katana450.library.general_arm import GeneralArm
     from katana450.library.loading import load
     from katana450.library.motion_plan import MotionPlan
-    from katana450.library.nearest import NearestPose
     from katana450.library.recording import Recording, open
     from katana450.library.script_writer import ScriptWriter, program
     from katana450.library.solutions import IKSolutions
@@ -47,7 +46,6 @@ __all__ = [
     "Branch",
     "Client",
     "ConfigurationError",
-    "GeneralArm",
     "IKSolutions",
     "InputError",
     "KatanaError",
@@ -72,12 +70,11 @@ _MODULES = {
     "Branch": "maths.kinematics.branch",
     "Client": "client",
     "ConfigurationError": "errors",
-    "GeneralArm": "library.general_arm",
     "IKSolutions": "library.solutions",
     "InputError": "errors",
     "KatanaError": "errors",
     "MotionPlan": "library.motion_plan",
-    "NearestPose": "library.nearest",
+    "NearestPose": "extensions.general_arms.nearest",
     "ReachabilityMap": "extensions.reachability.map",
     "Recording": "library.recording",
     "RobotDescriptionError": "errors",

@@ -39,7 +39,7 @@ PAGES = (
 
 # Titles of the pages of the reference, with the public names on each.
 REFERENCE = {
-    "Arms": ("load", "Arm", "GeneralArm"),
+    "Arms": ("load", "Arm"),
     "Kinematics": ("IKSolutions", "Solution", "Branch", "NearestPose"),
     "Plans": ("MotionPlan", "Trajectory", "Viewer"),
     "Reachability": ("ReachabilityMap",),

@@ -12,7 +12,6 @@ import katana450
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import sentence
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.described_arm import described_arm
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.tool_motion import tool_and_jacobian
 from katana450.maths.geometry import screws, so3
@@ -52,7 +51,7 @@ def test_every_pose_is_solved(rough: Path) -> None:
 
 
 def test_drags_move_the_tool(rough: Path) -> None:
-    session = session_of(described_arm(rough).chain)
+    session = session_of(katana450.load(rough).chain)
     rng = np.random.default_rng(2)
     for size in (0.03, 0.04, 0.05):
         start = begun(session)

@@ -69,11 +69,12 @@ def test_singular_posture_names_its_axes(urdf: Urdf) -> None:
 def test_nearest_has_its_reason(urdf: Urdf) -> None:
     line = {"p": [3.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}
     (found,) = ask("ik", [line], "--urdf", str(urdf("px100")), "--nearest")
-    assert len(found["solutions"]) == 1
+    assert found["solutions"]
     assert found["residual_mm"] > 2000.0
     assert "mm out of reach" in found["nearest"]["reason"]
     assert found["nearest"]["position_mm"] > 2000.0
     assert isinstance(found["nearest"]["limits"], list)
+    assert found["nearest"]["held_by"] == ["links"]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import katana450
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import sentence
 from katana450.arm.control.plans import plan_to
@@ -17,7 +18,6 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, Verdict
 from katana450.arm.control.tool_targets import with_branch
 from katana450.errors import InputError
-from katana450.extensions.general_arms.described_arm import described_arm
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.maths.geometry import se3, so3
@@ -57,8 +57,8 @@ def test_ready_posture_is_inside_the_limits_and_regular(chain: Chain) -> None:
 def test_ready_posture_stands_up_in_front_of_the_base(
     name: str, urdf: Callable[[str], Path]
 ) -> None:
-    arm = described_arm(urdf(name))
-    shoulder = arm.T_base_shoulder
+    arm = katana450.load(urdf(name))
+    shoulder = arm.T_base_frame
     chain = arm.chain
     q = DrivenTool(chain).ready((), shoulder)
     T = shoulder @ forward(chain, q)

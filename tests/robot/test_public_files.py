@@ -10,7 +10,6 @@ import pytest
 from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.loader import load
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.general_arms.described_arm import described_arm
 from tests.robot.hands import rail
 
 ARM = Path(__file__).resolve().parent / "arms" / "pincherx_150.urdf"
@@ -92,4 +91,3 @@ def test_an_arm_without_speeds_turns_slowly_and_says_so(tmp_path: Path, speed: s
     expected[0] = SLOW_TURN
     np.testing.assert_array_equal(arm.chain.speed, expected)
     assert any("no speed in its file; it gets 1 rad/s" in note for note in robot.joint_notes)
-    assert any("no speed in its file" in note for note in described_arm(path).notes)

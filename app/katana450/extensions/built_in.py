@@ -138,7 +138,7 @@ EXTENSIONS = (
                 "JSON lines from stdin to stdout, joints to poses: "
                 '{"q": [angles, rad], "tool": "tcp"} per line',
                 f"{HERE}.kinematics.options:add_fk_options",
-                f"{HERE}.kinematics.lines_of:fk",
+                f"{HERE}.kinematics.json_lines:fk",
             ),
             CliCommand(
                 "ik",
@@ -146,7 +146,7 @@ EXTENSIONS = (
                 '{"T": [[4x4, m]], "tool": "tcp"} per line, or "p" with "wxyz", "xyzw", "rpy", or '
                 '"pitch" and "roll"',
                 f"{HERE}.kinematics.options:add_ik_options",
-                f"{HERE}.kinematics.lines_of:ik",
+                f"{HERE}.kinematics.json_lines:ik",
             ),
         ),
     ),
@@ -225,7 +225,7 @@ EXTENSIONS = (
     Extension("ellipsoid", view_layer=f"{HERE}.ellipsoid.layer:EllipsoidLayer"),
     Extension(
         "general_arms",
-        find_arm=f"{HERE}.general_arms.found_arm:found_arm",
+        find_arm=f"{HERE}.general_arms.found_arm:driven_arm",
         gizmo=f"{HERE}.general_arms.pose_gizmo:gizmo_for",
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,38 +15,61 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.caching import cached_property
-from katana450.errors import InputError
-from katana450.extensions.reachability.map import ReachabilityMap, Survey
-from katana450.extensions.reachability.reachability import Reachability
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
+from katana450.extensions.programs.places import ROOMIEST
+from katana450.extensions.reachability.map import ReachabilityMap
+from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.library.motion_plan import MotionPlan
-from katana450.library.nearest import NearestPose, nearest
 from katana450.library.planner import Planner
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics import priority as kinematics_priority
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
-from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.kinematics import Kinematics
+from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.library.viewer import Viewer
 
 Priority = Literal["pose", "pitch", "position"]
 
+PRIORITIES = {
+    "pose": kinematics_priority.Priority.POSE,
+    "pitch": kinematics_priority.Priority.PITCH,
+    "position": kinematics_priority.Priority.POSITION,
+}
+
+FIVE_FREEDOMS: Final = 5
+"""Number of freedoms of a tool that has the pitch of the plane of its arm."""
+
+NEEDED: Final = (
+    "it needs three or more turning axes, whose tool is named if the file has other joints than "
+    "those of fingers"
+)
+"""End of the sentence that refuses a plan: the condition that the arm does not meet."""
+
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """A 5-axis arm with its tool, made by `katana450.load`.
+    """An arm with its tool, made by `katana450.load`.
 
     It is immutable. Only one thread at a time may plan with it.
 
     Lengths are in m, angles in rad, times in s. ``T`` is a pose (4, 4): it maps coordinates of the
-    tool into the frame chosen in `load`. ``q`` are the n = 5 joint angles. An argument that has the
+    tool into the frame chosen in `load`. ``q`` are the n joint angles. An argument that has the
     wrong shape, is not finite or is no rotation raises InputError. Every error of the library is a
     `katana450.KatanaError`.
+
+    Arms of two or more turning axes have kinematics. Plans, views and maps of reachability need
+    three or more axes, and no other joints than those of fingers unless `load` names the tool; else
+    they raise RobotDescriptionError.
 
     Attributes:
         robot: contents of the URDF, as the app uses it.
@@ -54,6 +77,7 @@ class Arm:
         notes: sentences on assumptions about the file.
         pose_frame: the frame of poses and points.
         objects: objects that plans keep clear of.
+        mounted: the part of the robot that carries the tool.
     """
 
     robot: Robot
@@ -61,6 +85,7 @@ class Arm:
     notes: tuple[str, ...]
     pose_frame: PoseFrame
     objects: tuple[SceneObject, ...]
+    mounted: MountedArm
 
     @property
     def name(self) -> str:
@@ -80,7 +105,7 @@ class Arm:
     @property
     def tool(self) -> str:
         """Link to which poses refer."""
-        return self._mounted.default_tool
+        return self.mounted.default_tool
 
     @property
     def frame(self) -> str:
@@ -105,25 +130,38 @@ class Arm:
     @property
     def ready(self) -> FloatArray:
         """(n,) posture with room to move [rad]; plans begin there by default."""
-        return self.session.ready
+        can_plan = self.robot.arm is self.mounted
+        return self.session.ready if can_plan else self.chain.clamp(np.zeros(self.n))
 
     @property
-    def _mounted(self) -> MountedArm:
-        return self.robot.require_arm()
+    def method(self) -> str:
+        """The method by which poses are solved, in words: a closed form, or numerical and why."""
+        return self._kinematics.method
+
+    @property
+    def _planned(self) -> MountedArm:
+        """The arm, for what needs a session. Raises RobotDescriptionError if there is none."""
+        if self.robot.arm is not self.mounted:
+            raise RobotDescriptionError(
+                f"For {self.name}, a plan or a map is not possible: {NEEDED}. This arm has "
+                f"{self.n} axes ({self.method}). `fk`, `ik`, `nearest` and `jacobian` work; "
+                "`katana450 serve` drives it."
+            )
+        return self.mounted
 
     @cached_property
     def chain(self) -> Chain:
         """Home configuration M, screw axes S and limits, in the frame {S}."""
-        return self._mounted.chain_to(self.tool)
+        return self.mounted.chain_to(self.tool)
 
     @cached_property
     def _kinematics(self) -> Kinematics:
-        return FiveAxisKinematics(self.chain)
+        return kinematics_of(self.chain)
 
     @property
     def T_base_frame(self) -> FloatArray:
         """(4, 4) maps coordinates of the frame of poses into the base [m]."""
-        return self._mounted.T_base_shoulder @ se3.inverse(self.pose_frame.T_frame_shoulder)
+        return self.mounted.T_base_shoulder @ se3.inverse(self.pose_frame.T_frame_shoulder)
 
     def __repr__(self) -> str:
         """Return a short description."""
@@ -149,7 +187,11 @@ class Arm:
         return self.pose_frame.from_shoulder(T)
 
     def ik(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> IKSolutions:
-        """Return all four solutions for the pose (4, 4), or for poses (N, 4, 4), in closed form.
+        """Return a solution for each branch of the pose (4, 4), or of poses (N, 4, 4).
+
+        In closed form four and five axes have 4 branches, six and seven axes 8. Seven axes take the
+        swivel of each branch with the most room to the limits, or nearest to the hint. A numerical
+        solution is one posture inside the limits.
 
         Each solution states whether it is inside the joint limits, and its distance from the pose,
         because five axes cannot take every pose. `nearest` returns the best that the arm can do.
@@ -162,7 +204,7 @@ class Arm:
         Raises:
             InputError: another shape, NaN, a matrix that is no pose, or a pose in millimetres.
 
-        Source: the paper's eq. (12) to (29).
+        Source, for five axes: the paper's eq. (12) to (29).
 
         >>> T = arm.fk([0.3, -1.0, 1.4, 0.3, 0.2])
         >>> for solution in arm.ik(T).feasible:
@@ -189,9 +231,9 @@ class Arm:
             priority: which part of the pose is kept when five axes cannot satisfy all of it.
                 "pose": position, then the whole orientation. "pitch": pitch, then position, then
                 roll. "position": position, then pitch, then roll. In the last two the arm
-                determines the yaw.
+                determines the yaw. Other arms than those of five axes have "pose" alone.
             branch: "front-up", "front-down", "back-up" or "back-down" to stay on it; None for the
-                one that comes nearest.
+                one that comes nearest, the only choice of arms with other axes.
             q_hint: (n,) angles [rad]; of equally good postures the nearest to it is returned.
             within_limits: whether to keep every joint inside its limits.
 
@@ -206,15 +248,18 @@ class Arm:
         >>> arm.nearest(arm.fk(arm.ready)).reason
         ''
         """
-        return nearest(
-            self.chain,
-            self.pose_frame,
-            T,
-            priority=priority,
+        if priority not in PRIORITIES:
+            known = ", ".join(PRIORITIES)
+            raise InputError(f"There is no priority {priority!r}; choose from {known}.")
+        best = nearest_pose(
+            self._kinematics,
+            self.pose_frame.to_shoulder(T),
+            priority=PRIORITIES[priority],
             branch=branch,
             q_hint=q_hint,
             within_limits=within_limits,
         )
+        return replace(best, T=self.pose_frame.from_shoulder(best.T))
 
     def nearest_poses(
         self, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = None, **options: Any
@@ -326,7 +371,7 @@ class Arm:
         """
         return MotionPlan(self, self._planner.line(to, by, start, (pitch, roll, yaw)))
 
-    def circle(
+    def circle(  # noqa: PLR0913
         self,
         centre: npt.ArrayLike,
         radius: float,
@@ -334,6 +379,7 @@ class Arm:
         normal: npt.ArrayLike = (1.0, 0.0, 0.0),
         pitch: float | Literal["roomiest"] | None = "roomiest",
         roll: float | None = None,
+        yaw: float | None = None,
         turns: float = 1.0,
         branch: Branch | str | None = None,
         start: npt.ArrayLike | None = None,
@@ -344,9 +390,10 @@ class Arm:
             centre: (3,) [m].
             radius: [m].
             normal: (3,) direction of its axis; of any length but 0.
-            pitch: of the tool [rad]; "roomiest" keeps the joints farthest from their limits, None
-                keeps the present one.
+            pitch: of the tool [rad]; "roomiest" keeps the joints of a five-axis arm farthest from
+                their limits, None keeps the present one, as "roomiest" does for other arms.
             roll: of the tool [rad]; None keeps the present one.
+            yaw: of the tool [rad], of an arm with six or more axes; None keeps the present one.
             turns: number of turns, negative for the opposite direction, at most 20.
             branch: as in `nearest`; None for the first on which the circle is possible.
             start: (n,) joint angles [rad] where the plan begins; it then leads to the circle. None
@@ -361,42 +408,46 @@ class Arm:
         >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
         True
         """
-        core = self._planner.circle(centre, radius, normal, start, (pitch, roll), turns, branch)
+        if pitch == ROOMIEST and self._planned.kinematics.freedoms != FIVE_FREEDOMS:
+            pitch = None
+        angles = pitch, roll, yaw
+        core = self._planner.circle(centre, radius, normal, start, angles, turns, branch)
         return MotionPlan(self, core)
 
     def reachability(
         self,
-        voxel: float = 0.05,
+        voxel: float | None = None,
         *,
         table: float = 0.0,
-        pitches: int = 36,
-        rolls: int = 24,
+        pitches: int | None = None,
+        rolls: int | None = None,
     ) -> ReachabilityMap:
         """Map where the tool can be, and which fraction of orientations it can have there.
 
         The map respects joint limits and keeps elbow, wrist and tool point above the table. It
-        ignores collisions.
+        ignores collisions. What is None suits the arm: its map then takes seconds to minutes.
 
         Args:
             voxel: edge of a voxel [m]; half the edge takes eight times as long.
             table: height of the table in the base frame [m].
-            pitches: number of pitches to try.
-            rolls: number of rolls to try.
+            pitches: number of pitches to try. From six axes on they are directions, spread evenly.
+            rolls: number of rolls to try for each pitch or direction. Four axes have none.
 
         Returns:
             a map with ``points`` (N, 3) [m], always in the base frame, and ``fraction`` (N,), the
-            fraction of orientations.
+            fraction of orientations. Of arms with four axes, and from six on, its ``at_home`` tells
+            where the tool can have the orientation that it has in ``ready``.
 
         Raises:
-            InputError: the numbers are invalid.
+            InputError: the numbers are invalid, or the map would take too long.
             RobotDescriptionError: axis 1 of the arm is not upright.
 
         >>> map = arm.reachability(0.1, pitches=12, rolls=8)
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
-        reach = Reachability(self.chain, self._mounted.T_base_shoulder, table, pitches, rolls)
-        survey = Survey(reach, voxel)
+        home, T = self._planned.ready(Settings.ready), self.mounted.T_base_shoulder
+        survey = survey_of(self.chain, T, home, MapOptions(table, voxel, pitches, rolls))
         return survey.map(survey.count(chunk) for chunk in survey.chunks())
 
     def show(
@@ -431,9 +482,9 @@ class Arm:
     def standing(self, q: npt.ArrayLike) -> State:
         """Return the state of the arm at rest at ``q`` (n,) [rad], with its scene objects."""
         angles = self.chain.check_q(q)
-        state = self.session.begin(angles, self._mounted.gripper.clamp(0.0), 0.0)
+        state = self.session.begin(angles, self._planned.gripper.clamp(0.0), 0.0)
         return replace(state, objects=self.objects)
 
     @cached_property
     def _planner(self) -> Planner:
-        return Planner(self, self.session, self._mounted.T_base_shoulder, self.pose_frame)
+        return Planner(self, self.session, self._planned.T_base_shoulder, self.pose_frame)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from katana450.assembly.robot_session import describe_robot
-from katana450.errors import RobotDescriptionError
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.assembly.robot_files import read_robot
+from katana450.assembly.robot_session import find_robot
+from katana450.errors import InputError, RobotDescriptionError
+from katana450.extensions.general_arms.found_arm import solved_arm
 from katana450.extensions.importers.initial_scene import load_initial_scene
-from katana450.library.arm import Arm
-from katana450.library.general_arm import general_arm
+from katana450.library.arm import NEEDED, Arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -26,10 +29,8 @@ def load(
 ) -> Arm:
     """Load an arm from a URDF file.
 
-    Five-axis arms with a pan axis, three parallel axes and a roll axis can do everything that an
-    `Arm` can. Other arms can do so too, with the kinematics that suit them:
-    in closed form for the arms listed in docs/library.md, else numerically. ``notes`` of the arm
-    says which.
+    Its poses are solved in closed form for the arms listed in docs/library.md, else numerically;
+    ``method`` of the arm says which.
 
     Args:
         urdf: the file; None for the Katana450.
@@ -52,21 +53,29 @@ def load(
     katana450.errors.RobotDescriptionError: ...
     """
     path = URDF_PATH if urdf is None else Path(urdf)
+    scene_path = None if scene is None else Path(scene)
     try:
-        robot, session, notes = describe_robot(Settings(), path, tool)
-    except RobotDescriptionError as error:
-        try:
-            found = general_arm(path, tool, frame, None if scene is None else Path(scene))
-        except RobotDescriptionError:
-            found = None
-        if found is None:
-            raise error from None
-        return found
-    stored, _ = load_initial_scene(session, None if scene is None else Path(scene), ())
+        robot, session, notes = find_robot(Settings(), path, tool)
+    except RobotDescriptionError:
+        if tool is None:
+            raise
+        # The tool cannot be driven, but its poses can perhaps be solved.
+        robot, session, notes = find_robot(Settings(), path, None)
+        robot = replace(robot, arm=None)
+    mounted = robot.arm or read_robot(path, tool, solved_arm).require_arm()
+    objects: tuple[SceneObject, ...] = ()
+    if robot.arm is not None:
+        objects = load_initial_scene(session, scene_path, ())[0].scene.objects
+    elif scene is not None:
+        raise InputError(
+            f"A scene is for plans, and for {robot.name} there are none: {NEEDED}. Load this arm "
+            "without it."
+        )
     return Arm(
         robot=robot,
+        mounted=mounted,
         session=session,
-        notes=notes,
-        pose_frame=PoseFrame.of(robot.require_arm().T_base_shoulder, frame),
-        objects=stored.scene.objects,
+        notes=notes if robot.arm is not None else (*mounted.notes, *robot.notes),
+        pose_frame=PoseFrame.of(mounted.T_base_shoulder, frame),
+        objects=objects,
     )

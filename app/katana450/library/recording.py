@@ -332,8 +332,9 @@ class Recording:
             robot = session_for(file, None if urdf is None else Path(urdf))
             part = shown_part(file, start, end)
         frames = RecordedFrames(self.path, robot, *part)
-        frame = PoseFrame.of(robot.robot.require_arm().T_base_shoulder, "base")
-        viewer = Viewer(Arm(*robot, pose_frame=frame, objects=()), port, host)
+        mounted = robot.robot.require_arm()
+        frame = PoseFrame.of(mounted.T_base_shoulder, "base")
+        viewer = Viewer(Arm(*robot, pose_frame=frame, objects=(), mounted=mounted), port, host)
         viewer.replay(frames, speed)
         return viewer
 

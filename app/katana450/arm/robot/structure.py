@@ -269,7 +269,7 @@ def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[UrdfJoint]:
             raise RobotDescriptionError(
                 f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
             )
-    if count is not None and len(axes) != count:
+    if not axes or (count is not None and len(axes) != count):
         raise RobotDescriptionError(
             f"Link {tool!r} is carried by {len(axes)} turning joints "
             f"({', '.join(joint.name for joint in axes)}); "

@@ -20,11 +20,10 @@ from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.descent import Descent
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.losses import losses_of
-from katana450.extensions.general_arms.nearest import nearest_posture
+from katana450.extensions.general_arms.nearest import nearest_posture, projected
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
-from katana450.extensions.general_arms.projected import projected
 from katana450.extensions.general_arms.ready_posture import ready_posture
 from katana450.extensions.general_arms.regularity import WALL, Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose

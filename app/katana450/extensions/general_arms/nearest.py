@@ -3,23 +3,34 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
+from katana450.arm.control.findings import of_projection
 from katana450.arm.control.messages import REASONS
-from katana450.arm.control.state import Finding, Reason
+from katana450.errors import InputError
 from katana450.extensions.general_arms.links import links_of
+from katana450.extensions.general_arms.losses import losses_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.maths.geometry import screws, se3, so3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
-from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.pose_units import check_metres
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import (
+    ANGLE_WORTH_TELLING,
+    POSITION_WORTH_TELLING,
+    Projection,
+    project,
+)
 from katana450.maths.kinematics.solution import Solution, scaled_jacobian
 
 POSITION_FIRST = 100.0
@@ -42,67 +53,119 @@ CLEARLY = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class BestPosture:
-    """The posture that comes nearest to a target; all errors are measured.
+class NearestPose(Projection):
+    """The feasible pose nearest to a target, and the remaining errors; all of them are measured.
+
+    Yaw, pitch and roll are those of a five-axis arm, which cannot take every orientation. They are
+    0 for other arms.
 
     Attributes:
-        q: (n,) joint angles [rad].
-        T: (4, 4) the pose that they take [m].
-        branch: name of its branch, or "numerical".
+        T: (4, 4) the feasible pose, in the frame of the arm object [m].
+        q: (n,) joint angles that take it [rad].
+        branch: the branch of ``q``.
         position_error: distance from the target [m].
         rotation_error: angle from the target [rad].
+        yaw_error: angle between the target's roll axis and the arm's plane, which a 5-axis arm
+            cannot leave [rad].
+        pitch_error: angle between the two roll axes within that plane [rad].
+        roll_error: missing roll where the pitch has priority [rad].
         limits: indices, from 0, of the axes whose limit keeps the arm from coming nearer.
-        reason: why it comes no nearer, in words; empty if the target is met.
+        axis1: whether axis 1 keeps the arm from coming nearer.
+        reach: whether the links are too short to come nearer.
+        reason: the same in words; empty if the target is met within the precision of the arm.
     """
 
-    q: FloatArray
-    T: FloatArray
-    branch: str
-    position_error: float
-    rotation_error: float
-    limits: tuple[int, ...]
     reason: str
+
+
+def nearest_pose(
+    kinematics: Kinematics,
+    T: npt.ArrayLike,
+    *,
+    priority: Priority = Priority.POSE,
+    branch: AnyBranch | None = None,
+    q_hint: npt.ArrayLike | None = None,
+    within_limits: bool = True,
+    yaw_counts: bool = True,
+) -> NearestPose:
+    """Return the pose nearest to `T` (4, 4) = T_S_tool [m] that the arm can take, with the reason.
+
+    Of equally good postures it is the one nearest to `q_hint` (n,) [rad]. Arms outside the
+    five-axis family have the priority POSE, and choose their branch. `yaw_counts`: whether the
+    reason mentions a missing yaw.
+
+    Raises InputError for an invalid argument, and for a pose whose unit is in doubt.
+    """
+    chain, target = kinematics.chain, se3.validated(T)
+    check_metres(chain, target[:3, 3].tolist())
+    if isinstance(kinematics, FiveAxisKinematics):
+        best = project(
+            chain,
+            target,
+            branch=None if branch is None else Branch.parse(str(branch)),
+            within_limits=within_limits,
+            q_hint=q_hint,
+            priority=priority,
+        )
+        given = yaw_counts and priority is Priority.POSE
+        findings = of_projection(chain, best, priority, yaw_was_given=given)
+    elif priority is not Priority.POSE or branch is not None:
+        raise InputError(
+            "Other priorities than 'pose', and one branch, are for five-axis arms. The kinematics "
+            f"of this arm are {kinematics.method}; its inverse kinematics return its branches."
+        )
+    else:
+        best = nearest_posture(kinematics, target, q_hint=q_hint, within_limits=within_limits)
+        findings = tuple(losses_of(chain, best, priority, at_edge=False))
+    reason = "; ".join(REASONS[finding.reason](finding) for finding in findings)
+    return NearestPose(
+        **{each.name: getattr(best, each.name) for each in fields(best)}, reason=reason
+    )
 
 
 def nearest_posture(
     kinematics: Kinematics,
-    T: npt.ArrayLike,
+    T: FloatArray,
     *,
     q_hint: npt.ArrayLike | None = None,
     within_limits: bool = True,
-) -> BestPosture:
-    """Return the posture nearest to the pose `T` (4, 4) = T_S_tool [m].
+) -> Projection:
+    """Return the posture nearest to the pose `T` (4, 4) of an arm outside the five-axis family.
 
     Of postures that take the pose, the one nearest to `q_hint` (n,) [rad] is returned, or without
     hint the one with the most room to the limits. If none takes it, the position counts first, then
-    the orientation. Raises InputError for an invalid `T` or `q_hint`.
+    the orientation. Raises InputError for an invalid `q_hint`.
     """
-    chain, target = kinematics.chain, se3.validated(T)
-    found = kinematics.inverse(T, q_hint)
-    usable = [each for each in found if each.within_limits or not within_limits]
+    chain = kinematics.chain
+    solutions = kinematics.inverse(T, q_hint)
+    usable = [each for each in solutions if each.within_limits or not within_limits]
     exact = [each for each in usable if each.exact]
     if exact:
         hint = None if q_hint is None else chain.check_q(q_hint)
         best = min(exact, key=lambda each: _cost(chain, each.q, hint))
-        return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
-    if within_limits:
-        search = _search(chain)
-        starts = [chain.clamp(each.q) for each in found]
-        if q_hint is not None:
-            starts.insert(0, chain.clamp(q_hint))
-        for weight in (POSITION_FIRST, POSITION_ALONE):
-            q = search.nearest(target, starts, weight)
-            posture = Solution(chain, target, tuple(q), "numerical")
-            usable = [*usable, posture]
-            if posture.position_error <= POSITION_WORTH_TELLING:
-                break
-            starts = [q, *starts]
-    best = min(usable, key=_errors)
-    return _described(chain, target, best.q, str(best.branch), is_free=not within_limits)
+    else:
+        if within_limits:
+            usable += _searched(chain, T, solutions, q_hint)
+        best = min(usable, key=lambda each: (round(each.position_error, 6), each.rotation_error))
+    return projected(chain, best.q, T, best.branch, Priority.POSE, bounded=within_limits)
 
 
-def _errors(posture: Solution) -> tuple[float, float]:
-    return round(posture.position_error, 6), posture.rotation_error
+def _searched(
+    chain: Chain, T: FloatArray, solutions: Iterable[Solution], q_hint: npt.ArrayLike | None
+) -> list[Solution]:
+    """Return postures inside the limits that searches from ``solutions`` and the hint lead to."""
+    search = _search(chain)
+    starts = [chain.clamp(each.q) for each in solutions]
+    if q_hint is not None:
+        starts.insert(0, chain.clamp(q_hint))
+    ends: list[Solution] = []
+    for weight in (POSITION_FIRST, POSITION_ALONE):
+        q = search.nearest(T, starts, weight)
+        ends.append(Solution(chain, T, tuple(q), search.branches[0]))
+        if ends[-1].position_error <= POSITION_WORTH_TELLING:
+            break
+        starts = [q, *starts]
+    return ends
 
 
 def _cost(chain: Chain, q: FloatArray, hint: FloatArray | None) -> float:
@@ -112,28 +175,40 @@ def _cost(chain: Chain, q: FloatArray, hint: FloatArray | None) -> float:
     return -float(room.min())
 
 
-def _described(
-    chain: Chain, target: FloatArray, q: FloatArray, branch: str, *, is_free: bool
-) -> BestPosture:
+def projected(
+    chain: Chain,
+    q: FloatArray,
+    T: FloatArray,
+    branch: AnyBranch,
+    priority: Priority,
+    *,
+    bounded: bool = True,
+) -> Projection:
+    """Return the projection of the pose `T` (4, 4) that the joint angles `q` (n,) [rad] give.
+
+    ``bounded``: whether the limits of the joints count.
+    """
     reached = forward(chain, q)
-    position = math.dist(reached[:3, 3], target[:3, 3])
-    rotation = so3.angle(reached[:3, :3], target[:3, :3])
-    missed = position > POSITION_WORTH_TELLING or rotation > ANGLE_WORTH_TELLING
-    limits = held_by(chain, q, reached, target) if missed and not is_free else ()
-    words = []
-    if position > POSITION_WORTH_TELLING:
-        words.append(REASONS[Reason.OUT_OF_REACH](Finding(Reason.OUT_OF_REACH, position)))
-    if rotation > ANGLE_WORTH_TELLING:
-        words.append(f"its rotation is {math.degrees(rotation):.3g}° off")
-    for axis in limits:
-        end = min(chain.lower[axis], chain.upper[axis], key=lambda end: abs(end - q[axis]))
-        words.append(REASONS[Reason.AXIS_LIMIT](Finding(Reason.AXIS_LIMIT, float(end), axis)))
-    if missed and not limits:
-        if position > POSITION_WORTH_TELLING:
-            words.append(REASONS[Reason.LINKS](Finding(Reason.LINKS)))
-        elif chain.n < 6:
-            words.append(f"{chain.n} axes cannot take every pose")
-    return BestPosture(q, reached, branch, position, rotation, limits, "; ".join(words))
+    position = math.dist(reached[:3, 3], T[:3, 3])
+    rotation = so3.angle(reached[:3, :3], T[:3, :3])
+    turned_off = priority is not Priority.POSITION and rotation > ANGLE_WORTH_TELLING
+    missed = position > POSITION_WORTH_TELLING or turned_off
+    limits = held_by(chain, np.asarray(q), reached, T) if missed and bounded else ()
+    return Projection(
+        T=frozen(reached),
+        q=frozen(q),
+        branch=branch,
+        position_error=position,
+        rotation_error=rotation,
+        yaw_error=0.0,
+        pitch_error=0.0,
+        roll_error=0.0,
+        limits=limits,
+        axis1=False,
+        reach=position > POSITION_WORTH_TELLING
+        and not limits
+        and is_out_of_reach(chain, np.asarray(q), reached, T),
+    )
 
 
 def held_by(

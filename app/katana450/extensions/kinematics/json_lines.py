@@ -5,25 +5,26 @@ from __future__ import annotations
 import io
 import json
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from katana450.arm.control.findings import of_projection
-from katana450.arm.control.messages import REASONS
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import InputError
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.found_arm import solved_arm
+from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
 from katana450.extensions.kinematics.numbers import numbers, shown
 from katana450.extensions.kinematics.pose_requests import KEYS, requested_pose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import family_arm
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.projection import project
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
 
@@ -48,87 +49,128 @@ class JsonKinematics:
             in_base_frame: whether poses are in the base frame on the table, else in {S}.
             priority: the part of a pose that is kept when five axes cannot satisfy all of it.
             with_nearest: whether answers include the nearest posture inside the limits.
+
+        Raises:
+            RobotDescriptionError: the file has no arm.
+            InputError: the arm does not have ``priority``.
         """
         self._priority = priority
         self._with_nearest = with_nearest
-        self._arm = read_robot(urdf, tool).require_arm()
+        self._arm = read_robot(urdf, tool, solved_arm).require_arm()
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
+        self._is_member = family_arm(self._arm.chain) is not None
+        if priority is not Priority.POSE and not self._is_member:
+            raise InputError(
+                "--priority is for five-axis arms with a pan axis, three parallel axes and a roll "
+                f"axis; the kinematics of this arm are {kinematics_of(self._arm.chain).method}. "
+                "Leave this option out."
+            )
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer ``{"q": [n rad], "tool"}`` with ``{"T": 4x4}`` [m]."""
-        chain = self._chain(request, {"q", "tool"})
+        chain = self._chain(request, frozenset({"q"}))
         q = chain.check_q(numbers(request, "q", 1))
         return {"T": (self._T_frame_shoulder @ forward(chain, q)).tolist()}
 
     def ik(self, request: Mapping[str, Any]) -> dict[str, Any]:
-        """Answer a pose with all solutions for the nearest pose of five axes.
+        """Answer a pose with the solutions of all branches that take it, or the nearest pose.
 
         The forms of a pose are those of ``requested_pose``, with an optional ``"tool"``. A pose
         printed with four decimals or more is replaced by the nearest rotation;
-        ``rotation_misfit`` is the deviation of its numbers from a rotation.
+        ``rotation_misfit`` is the deviation of its numbers from a rotation. ``"q"`` [n rad] decides
+        what the pose leaves free.
 
-        The residuals are the distance of that pose from the request, without regard to joint
-        limits. ``within_limits`` of each solution is True if the arm can go there. ``nearest`` is
-        the best posture inside the limits, of equally good ones the nearest to ``q`` ([n rad]),
-        with what it loses and what keeps it from more.
+        The residuals are the distance of the solutions from the request, without regard to joint
+        limits. ``within_limits`` of each solution is True if the arm can go there, and ``singular``
+        are the axes, counted from 1, that can turn together there without moving the tool.
+        ``nearest`` is the best posture inside the limits, of equally good ones the nearest to
+        ``"q"``, with what it loses and what keeps it from more.
         """
-        keys = {*KEYS, "tool", "q"} if self._with_nearest else {*KEYS, "tool"}
-        chain = self._chain(request, keys)
+        # Pitch and roll are those of five axes.
+        poses = KEYS if self._is_member else KEYS - {"pitch", "roll"}
+        chain = self._chain(request, poses | {"q"})
+        kinematics = kinematics_of(chain)
         hint = chain.check_q(numbers(request, "q", 1)) if "q" in request else None
-        T_shoulder, misfit = requested_pose(request, chain, self._T_frame_shoulder)
-        nearest = project(chain, T_shoulder, within_limits=False, priority=self._priority).T
-        # If the axes do not cross, some branches do not reach every pose.
-        solutions = [solution for solution in inverse(chain, nearest) if solution.exact]
+        T, misfit = requested_pose(request, chain, self._T_frame_shoulder)
+        solutions = [each for each in kinematics.inverse(T, hint) if each.exact]
+        if not solutions:
+            best = nearest_pose(
+                kinematics, T, priority=self._priority, q_hint=hint, within_limits=False
+            )
+            # If the axes do not cross, some branches do not reach every pose.
+            solutions = [each for each in kinematics.inverse(best.T, best.q) if each.exact]
         reached = [forward(chain, solution.q) for solution in solutions]
-        return {
+        answer = {
             "solutions": [
                 {
                     "q": solution.q.tolist(),
                     "within_limits": solution.within_limits,
                     "branch": str(solution.branch),
+                    "singular": [axis + 1 for axis in solution.singular],
                 }
                 for solution in solutions
             ],
-            "residual_mm": 1e3 * max(_distance(T_shoulder, T_q) for T_q in reached),
-            "residual_rad": max(so3.angle(T_shoulder[:3, :3], T_q[:3, :3]) for T_q in reached),
+            "residual_mm": 1e3 * max(_distance(T, T_q) for T_q in reached),
+            "residual_rad": max(so3.angle(T[:3, :3], T_q[:3, :3]) for T_q in reached),
             "rotation_misfit": misfit,
-        } | (self._nearest(chain, T_shoulder, hint, request) if self._with_nearest else {})
+        }
+        if self._with_nearest:
+            # Pitch and roll leave the yaw to the arm.
+            best = nearest_pose(
+                kinematics,
+                T,
+                priority=self._priority,
+                q_hint=hint,
+                yaw_counts="pitch" not in request,
+            )
+            answer["nearest"] = self._described(best)
+        return answer
 
-    def _nearest(
-        self, chain: Chain, T: FloatArray, hint: FloatArray | None, request: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Return the nearest posture to ``T`` (4, 4) in {S} inside the limits, and its losses.
-
-        Of equally good postures the nearest to ``hint`` is taken. Axes count from 1.
-        """
-        # Pitch and roll leave the yaw to the arm.
-        yaw_counts = self._priority is Priority.POSE and "pitch" not in request
-        best = project(chain, T, priority=self._priority, q_hint=hint)
-        findings = of_projection(chain, best, self._priority, yaw_was_given=yaw_counts)
-        links = (["axis 1"] if best.axis1 else []) + (["links"] if best.reach else [])
+    def _described(self, best: NearestPose) -> dict[str, Any]:
+        """Return the nearest posture and its losses. Axes count from 1."""
+        turns = {
+            "yaw_rad": best.yaw_error,
+            "pitch_rad": best.pitch_error,
+            "roll_rad": best.roll_error,
+        }
         return {
-            "nearest": {
-                "q": best.q.tolist(),
-                "branch": str(best.branch),
-                "position_mm": 1e3 * best.position_error,
-                "rotation_rad": best.rotation_error,
-                "yaw_rad": best.yaw_error,
-                "pitch_rad": best.pitch_error,
-                "roll_rad": best.roll_error,
-                "limits": [axis + 1 for axis in best.limits],
-                "held_by": links,
-                "reason": "; ".join(REASONS[each.reason](each) for each in findings),
-            }
+            "q": best.q.tolist(),
+            "branch": str(best.branch),
+            "position_mm": 1e3 * best.position_error,
+            "rotation_rad": best.rotation_error,
+            **(turns if self._is_member else {}),
+            "limits": [axis + 1 for axis in best.limits],
+            "held_by": (["axis 1"] if best.axis1 else []) + (["links"] if best.reach else []),
+            "reason": best.reason,
         }
 
-    def _chain(self, request: Mapping[str, Any], keys: set[str]) -> Chain:
-        unknown = set(request) - keys
+    def _chain(self, request: Mapping[str, Any], keys: frozenset[str]) -> Chain:
+        known = keys | {"tool"}
+        unknown = set(request) - known
         if unknown:
-            raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(keys)}.")
+            raise InputError(f"There is no key {sorted(unknown)[0]!r}; known: {sorted(known)}.")
         tool = request.get("tool", self._arm.default_tool)
         if not isinstance(tool, str):
             raise InputError(f"'tool' is {shown(tool)}; there is no tool with that name.")
         return self._arm.chain_to(tool)
+
+
+def fk(options: Namespace) -> int:
+    """Answer the lines of ``katana450 fk``, and return the exit status."""
+    in_base = options.frame == "base"
+    return answer_lines(JsonKinematics(options.urdf, options.tool, in_base_frame=in_base).fk)
+
+
+def ik(options: Namespace) -> int:
+    """Answer the lines of ``katana450 ik``, and return the exit status."""
+    kinematics = JsonKinematics(
+        options.urdf,
+        options.tool,
+        in_base_frame=options.frame == "base",
+        priority=Priority[options.priority.upper()],
+        with_nearest=options.nearest,
+    )
+    return answer_lines(kinematics.ik)
 
 
 def answer_lines(answer: Answer, source: TextIO | None = None, sink: TextIO | None = None) -> int:
