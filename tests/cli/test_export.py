@@ -24,7 +24,6 @@ LONGEST = 3.0
         ("glb", "katana450.glb"),
         ("urdf", "katana450_description.zip"),
         ("mjcf", "katana450_mjcf.zip"),
-        ("usd", "katana450.usda"),
     ],
 )
 def test_every_format_is_written_quickly(
@@ -49,7 +48,7 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
     [
         (("c", "--trajectory", "m.csv"), "c has no motion"),
         (("urdf", "--pose", "0,0"), "urdf has no pose"),
-        (("usd", "--trajectory", "m.csv"), "Use --trajectory with vrml, x3d, glb, html"),
+        (("mjcf", "--trajectory", "m.csv"), "Use --trajectory with vrml, x3d, glb, html"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
         (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.exchange.tools import PINOCCHIO, PYBULLET, USD
+from tests.exchange.tools import PINOCCHIO, PYBULLET
 
 TESTS = Path(__file__).parents[1]
 
@@ -17,7 +17,6 @@ PAGE = (TESTS.parent / "docs" / "exchange.md").read_text(encoding="utf-8")
 USED = {
     "PyBullet": PYBULLET.name.partition("==")[2],
     "pinocchio": PINOCCHIO.name.partition("==")[2],
-    "usd-core": USD.name.partition("==")[2],
     "MuJoCo": version("mujoco-core"),
     "yourdfpy": version("yourdfpy"),
     "xacro": version("xacro"),

@@ -102,9 +102,6 @@ PINOCCHIO = Package(
 )
 """A library of rigid body dynamics that reads URDF."""
 
-USD = Package("usd-core==26.11", "pxr/Usd/__init__.py")
-"""The library of Universal Scene Description."""
-
 OPENAPI_VALIDATOR = Package(
     "openapi-spec-validator==0.9.0", "openapi_spec_validator/__init__.py", alone=False
 )
@@ -116,7 +113,7 @@ ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 FOXGLOVE = Package("foxglove-sdk==0.30.3", "foxglove/__init__.py")
 """The server for Foxglove of the extra `foxglove`, 54 MB."""
 
-WHEELS = (PYBULLET, VTK, PINOCCHIO, USD, OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
+WHEELS = (PYBULLET, VTK, PINOCCHIO, OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")

@@ -93,12 +93,6 @@ def _mjcf(job: ExportJob) -> Mapping[str, bytes]:
     return mjcf_files(read_robot(job.options.urdf, None, find_arm), job.options.urdf)
 
 
-def _usd(job: ExportJob) -> Mapping[str, bytes]:
-    from katana450.extensions.export.usd import usd_files
-
-    return usd_files(job.robot, job.options.urdf, job.values)
-
-
 FORMATS: Mapping[str, ExportFormat] = {
     "vrml": ExportFormat(
         "a VRML97 world and one file per part, for LabVIEW, Simulink and X3D browsers",
@@ -124,9 +118,6 @@ FORMATS: Mapping[str, ExportFormat] = {
     ),
     "mjcf": ExportFormat(
         "a zip of a MuJoCo model with actuators, sites, keyframes and its meshes", _mjcf
-    ),
-    "usd": ExportFormat(
-        "a USD scene with bodies, joints and collision shapes (UsdPhysics)", _usd, posed=True
     ),
     "html": ExportFormat(
         "a page that plays a run, with a time slider; it needs no server",
