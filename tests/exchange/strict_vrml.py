@@ -9,10 +9,13 @@ from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import (
     FIELDS,
     KEYWORDS,
+    LISTS,
+    WIDTHS,
     Node,
     Route,
     Type,
     Use,
+    Value,
     World,
 )
 from katana450.extensions.export.vrml_text import HEADER
@@ -44,8 +47,6 @@ def read_world(text: str) -> World:
 class StrictReader(Reader):
     """A reader of the nodes of exports, with routes and references as they are written."""
 
-    fields = FIELDS
-
     def __init__(self, text: str, name: str) -> None:
         super().__init__(text, name)
         self._routes: list[Route] = []
@@ -65,7 +66,27 @@ class StrictReader(Reader):
             raise self._error(f"{name!r} is defined twice")
         if name in KEYWORDS:
             raise self._error(f"{name!r} is not a name")
-        return super()._body(kind, name, depth)
+        node = super()._body(kind, name, depth)
+        for field, value in node.fields:
+            self._check(node.kind, field, value)
+        return node
+
+    def _check(self, kind: str, field: str, value: Value) -> None:
+        """Refuse a field that exports do not write, and numbers that do not have its type."""
+        if field not in FIELDS[kind]:
+            raise self._error(f"{kind} has no field {field!r}")
+        type_ = FIELDS[kind][field]
+        numbers = value if isinstance(value, tuple) else (value,)
+        if type_ is Type.BOOL and not isinstance(value, bool):
+            raise self._error(f"{field} is not TRUE or FALSE")
+        if type_ not in WIDTHS:
+            return
+        if not all(isinstance(number, float | int) for number in numbers):
+            raise self._error(f"{field} is not of numbers")
+        if len(numbers) % WIDTHS[type_] or (type_ not in LISTS and len(numbers) != WIDTHS[type_]):
+            raise self._error(f"{field} does not form rows of {WIDTHS[type_]}")
+        if type_ in (Type.INT, Type.INT_LIST) and any(int(number) != number for number in numbers):  # type: ignore[arg-type]
+            raise self._error(f"{field} is not of whole numbers")
 
     def _used(self, name: str) -> Use:
         super()._used(name)

@@ -1,22 +1,18 @@
-"""Parser of VRML97 worlds: nodes with their reused nodes in place, and instances of prototypes.
+"""Parser of VRML97 worlds: nodes with their reused nodes in place, and prototypes expanded.
 
-Source: ISO/IEC 14772-1:1997, annex A, grammar. Nodes that it does not know are left out.
+Source: ISO/IEC 14772-1:1997, annex A, grammar; 4.8, prototypes. The form of a value shows its type,
+so that the fields of unknown nodes are parsed too. Those of the nodes that are read are checked
+when they are used.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Mapping
+from typing import NamedTuple
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import LISTS, WIDTHS, Node, Type, Use, Value
-from katana450.extensions.importers.vrml_prototypes import IS, Instance, Prototype
-from katana450.extensions.importers.vrml_standard import STANDARD, TEXTURES
-
-T = TypeVar("T")
-N = TypeVar("N", int, float)
+from katana450.extensions.export.vrml_node import Node, Use, Value
 
 MAX_QUOTED_CHARACTERS = 160
 """Maximum length of a quotation from a file in an error message."""
@@ -24,8 +20,11 @@ MAX_QUOTED_CHARACTERS = 160
 MAX_DEPTH = 150
 """Maximum nesting of nodes, within the limit of Python's stack."""
 
-CLOSERS = {"{": "}", "[": "]"}
-"""The closing token of each opening token."""
+MAX_EXPANDED = 100_000
+"""Maximum number of nodes that the prototypes of a file make."""
+
+IS = "IS"
+"""The word before the name of the field of a prototype whose value a field gets."""
 
 EVENT_ACCESS = ("eventIn", "eventOut")
 """Words before a part of an interface that has no value."""
@@ -36,41 +35,77 @@ FIELD_ACCESS = ("field", "exposedField")
 STATEMENTS = ("PROTO", "EXTERNPROTO", "ROUTE")
 """First words of statements, which may also stand among the fields of a node."""
 
-TYPES = {kind.value: kind for kind in Type}
-"""Types by their names in an interface."""
+_BOUNDS = " bboxCenter bboxSize"
+_SURFACE = "solid ccw convex creaseAngle "
+_SOLID = "solid height side bottom "
+
+FIELD_NAMES: Mapping[str, frozenset[str]] = {
+    kind: frozenset(names.split())
+    for kind, names in {
+        "Group": "children" + _BOUNDS,
+        "Collision": "children collide proxy" + _BOUNDS,
+        "Anchor": "children description parameter url" + _BOUNDS,
+        "Billboard": "children axisOfRotation" + _BOUNDS,
+        "Transform": "children translation center rotation scale scaleOrientation" + _BOUNDS,
+        "Switch": "whichChoice choice",
+        "LOD": "level range center",
+        "Inline": "url" + _BOUNDS,
+        "Shape": "appearance geometry",
+        "Appearance": "material texture textureTransform",
+        "Material": "diffuseColor specularColor emissiveColor ambientIntensity shininess "
+        "transparency",
+        "IndexedFaceSet": _SURFACE + "coord coordIndex color colorIndex colorPerVertex normal "
+        "normalIndex normalPerVertex texCoord texCoordIndex",
+        "Extrusion": _SURFACE + "beginCap endCap crossSection orientation scale spine",
+        # Later programs write `solid` of solids too.
+        "Box": "size solid",
+        "Cone": _SOLID + "bottomRadius",
+        "Cylinder": _SOLID + "radius top",
+        "Sphere": "radius solid",
+        "Coordinate": "point",
+        "Color": "color",
+    }.items()
+}
+"""Names of the fields of each kind of node that is read, as far as a file can set them."""
 
 # Possessive quantifiers, so that a mismatch in an untrusted file fails without backtracking.
 _TOKEN = re.compile(
     r'[\s,]*+(?:#[^\n\r]*+[\s,]*+)*+("(?:[^"\\]|\\.)*+"|[\[\]{}]|[^\s,"#\[\]{}]+|$)', re.DOTALL
 )
 # Normals are often no numbers; vertices that are used are checked later.
-_NUMBER = re.compile(
-    r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?i:nan|inf(?:inity)?))"
-)
-_INTEGER = re.compile(r"[+-]?(?:[0-9]{1,10}|0[xX][0-9a-fA-F]{1,8})")
-NUMBERS, INTEGERS = (
-    re.compile(rf"\s*(?:{one}\s+)*+(?:{one})?+") for one in (_NUMBER.pattern, "[+-]?[0-9]{1,10}")
-)
+_DECIMAL = r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|(?i:nan|inf(?:inity)?))"
+_NUMBER = re.compile(rf"{_DECIMAL}|(?P<hexadecimal>0[xX][0-9a-fA-F]+)")
+_ROW = re.compile(rf"[\s,]*+((?:{_DECIMAL}[\s,]++)*+(?:{_DECIMAL})?+)\]")
+
+
+class Prototype(NamedTuple):
+    """A declared kind of node.
+
+    Attributes:
+        start: place in the text at which its body begins.
+        defaults: values of the fields that an instance does not set.
+        known: the prototypes that its body can use.
+    """
+
+    start: int
+    defaults: Mapping[str, Value | None]
+    known: Mapping[str, Prototype]
 
 
 class Reader:
-    """A parser of the text of one file.
-
-    Attributes:
-        left_out: counts of the parts that are not read, by their names.
-    """
-
-    fields = STANDARD
+    """A parser of the text of one file. The body of a prototype is parsed for each instance."""
 
     def __init__(self, text: str, name: str) -> None:
         """Parse ``text`` of the file ``name``, which is used in messages."""
         self._text, self._name = text, name
-        self._at = self._next = 0
-        self._tokens = self._scan()
-        self._ahead = next(self._tokens)
+        self._at, self._next = 0, len(text.partition("\n")[0])
         self._named: dict[str, Node] = {}
         self._prototypes: dict[str, Prototype] = {}
-        self.left_out: Counter[str] = Counter()
+        # The fields of the prototype whose body is parsed.
+        self._values: Mapping[str, Value | None] = {}
+        self._instances = self._expanded = 0
+        self._ahead = ""
+        self._advance()
 
     def nodes(self) -> tuple[Node | Use, ...]:
         """Return the nodes of the file. Raises InputError with the line of an error."""
@@ -79,14 +114,12 @@ class Reader:
             found += self._statement(0)
         return tuple(found)
 
-    def _scan(self) -> Iterator[str]:
-        self._next = len(self._text.partition("\n")[0])
-        while True:
-            found = _TOKEN.match(self._text, self._next)
-            if found is None:
-                raise self._error("unterminated text or unexpected character")
-            self._at, self._next = found.start(1), found.end()
-            yield found[1]
+    def _advance(self) -> None:
+        """Move to the next token; at the end of the file it is empty."""
+        found = _TOKEN.match(self._text, self._next)
+        if found is None:
+            raise self._error("unterminated text or unexpected character")
+        self._at, self._next, self._ahead = found.start(1), found.end(), found[1]
 
     def _error(self, what: str) -> InputError:
         line = self._text.count("\n", 0, self._at) + 1
@@ -97,7 +130,7 @@ class Reader:
         token = self._ahead
         if not token:
             raise self._error("the file ends too early")
-        self._ahead = next(self._tokens)
+        self._advance()
         return token
 
     def _expect(self, token: str) -> None:
@@ -122,8 +155,10 @@ class Reader:
             case "EXTERNPROTO":
                 # Its nodes are unknown.
                 self._new_name()
-                self._skip_brackets()
-                list(self._items(self._string))
+                self._expect("[")
+                while self._take() != "]":
+                    pass
+                self._value(depth)
             case _:
                 self._route()
         return []
@@ -137,6 +172,9 @@ class Reader:
     def _node(self, depth: int) -> Node | Use:
         if depth > MAX_DEPTH:
             raise self._error(f"nodes are nested more than {MAX_DEPTH} deep")
+        self._expanded += self._instances > 0
+        if self._expanded > MAX_EXPANDED:
+            raise InputError(f"{self._name} has prototypes that make over {MAX_EXPANDED} nodes.")
         kind = self._take()
         if kind == "NULL":
             return Node(kind)
@@ -156,13 +194,9 @@ class Reader:
 
     def _body(self, kind: str, name: str | None, depth: int) -> Node:
         """Parse a node after its kind."""
+        # What a file declares counts, also under a name of the standard.
         prototype = self._prototypes.get(kind)
-        types = self.fields.get(kind) if prototype is None else prototype.types
-        if types is None:
-            self._skip_brackets()
-            if kind in TEXTURES:
-                self.left_out["pictures on the surface"] += 1
-            return Node(kind, (), name)
+        names = FIELD_NAMES.get(kind) if prototype is None else prototype.defaults.keys()
         fields: dict[str, Value] = {}
         self._expect("{")
         while self._ahead != "}":
@@ -170,153 +204,107 @@ class Reader:
                 self._statement(depth)
                 continue
             field = self._take()
-            if field in types:
-                fields[field] = self._value(types[field], depth)
-            elif self._ahead == IS:
-                # An event of a prototype.
-                self._take()
-                self._take()
-            else:
+            if field in (*EVENT_ACCESS, *FIELD_ACCESS):
+                # The interface of a script.
+                self._declared(field, depth)
+                continue
+            is_known = names is None or field in names
+            if not is_known and self._ahead != IS:
                 raise self._error(f"{kind} has no field {field!r}")
+            value = self._value(depth)
+            # An unknown field can be an event of a prototype.
+            if is_known and value is not None:
+                fields[field] = value
         self._take()
         if prototype is None:
             return Node(kind, tuple(fields.items()), name)
-        return Instance(kind, tuple(fields.items()), name, prototype)
+        return self._instance(prototype, fields, depth)
+
+    def _declared(self, access: str, depth: int) -> tuple[str, Value | None]:
+        """Parse a part of an interface after its first word; return its name and value."""
+        self._take()
+        name = self._take()
+        has_value = access in FIELD_ACCESS or self._ahead == IS
+        return name, self._value(depth) if has_value else None
 
     def _prototype(self, depth: int) -> None:
         """Parse a declaration after its first word."""
         name = self._new_name()
-        types, defaults = self._interface(depth)
-        named, prototypes = self._named, self._prototypes
-        self._named, self._prototypes = {}, dict(prototypes)
-        self._expect("{")
-        body: list[Node | Use] = []
-        while self._ahead != "}":
-            body += self._statement(depth + 1)
-        self._take()
-        self._named, self._prototypes = named, prototypes
-        first = next((node for node in body if isinstance(node, Node)), Node("NULL"))
-        # What a file declares counts, also under a name of the standard.
-        self._prototypes[name] = Prototype(types, defaults, first)
-
-    def _interface(self, depth: int) -> tuple[dict[str, Type | None], dict[str, Value]]:
-        """Return types and defaults of the fields of a prototype."""
-        types: dict[str, Type | None] = {}
-        defaults: dict[str, Value] = {}
+        defaults: dict[str, Value | None] = {}
         self._expect("[")
         while self._ahead != "]":
             access = self._take()
             if access not in (*EVENT_ACCESS, *FIELD_ACCESS):
                 raise self._error(f"{access!r} is not a part of the interface of a prototype")
-            kind, field = TYPES.get(self._take()), self._take()
+            field, value = self._declared(access, depth)
             if access in FIELD_ACCESS:
-                types[field] = kind
-                defaults[field] = self._value(kind, depth)
+                defaults[field] = value
         self._take()
-        return types, defaults
+        self._expect("{")
+        prototype = Prototype(self._at, defaults, dict(self._prototypes))
+        self._expansion(prototype, {}, depth)
+        self._take()
+        self._prototypes[name] = prototype
 
-    def _skip_brackets(self) -> None:
-        """Skip a part in brackets or braces; nodes that are named in it can be used later."""
-        if self._ahead not in CLOSERS:
-            raise self._error(f"expected '{{', not {self._ahead[:40]!r}")
-        closers: list[str] = []
-        while True:
-            token = self._take()
-            if token in CLOSERS:
-                closers.append(CLOSERS[token])
-            elif token in ("}", "]"):
-                if token != closers.pop():
-                    raise self._error(f"{token!r} closes nothing")
-                if not closers:
-                    return
-            elif token == "DEF":
-                name = self._new_name()
-                self._named[name] = Node(self._ahead, (), name)
+    def _instance(self, prototype: Prototype, fields: Mapping[str, Value], depth: int) -> Node:
+        """Return the node for which an instance of ``prototype`` stands."""
+        place = self._at, self._next, self._ahead
+        self._next = prototype.start
+        self._advance()
+        self._instances += 1
+        node = self._expansion(prototype, fields, depth)
+        self._instances -= 1
+        self._at, self._next, self._ahead = place
+        return node
 
-    def _value(self, kind: Type | None, depth: int) -> Value:
-        """Return the next value of a type; None stands for a type without a meaning here."""
+    def _expansion(self, prototype: Prototype, fields: Mapping[str, Value], depth: int) -> Node:
+        """Parse the body of ``prototype`` up to its end; return its first node."""
+        outer = self._named, self._prototypes, self._values
+        self._named, self._prototypes = {}, dict(prototype.known)
+        self._values = {**prototype.defaults, **fields}
+        nodes: list[Node | Use] = []
+        while self._ahead != "}":
+            nodes += self._statement(depth + 1)
+        self._named, self._prototypes, self._values = outer
+        return next((node for node in nodes if isinstance(node, Node)), Node("NULL"))
+
+    def _value(self, depth: int) -> Value | None:
+        """Parse the value of a field; None if the field of a prototype has none."""
         if self._ahead == IS:
             self._take()
-            return Node(IS, (("type", "" if kind is None else kind.value),), self._take())
-        match kind:
-            case None:
-                return self._skipped()
-            case Type.NODE:
-                return self._node(depth + 1)
-            case Type.NODE_LIST:
-                return tuple(self._items(lambda: self._node(depth + 1)))
-            case Type.BOOL:
-                return self._bool()
-            case Type.STRING:
-                return self._string()
-            case Type.STRING_LIST:
-                return tuple(self._items(self._string))
-            case Type.INT:
-                return self._integer()
-            case Type.INT_LIST:
-                whole = self._row(INTEGERS, int)
-                return tuple(self._items(self._integer)) if whole is None else whole
-        width = WIDTHS[kind]
-        # A list of one value may omit its brackets.
-        if kind not in LISTS or self._ahead != "[":
-            row = tuple(self._float() for _ in range(width))
-            return row[0] if width == 1 and kind not in LISTS else row
-        numbers = self._row(NUMBERS, float)
-        if numbers is None:
-            numbers = tuple(self._items(self._float))
-        if len(numbers) % width:
-            raise self._error(f"{len(numbers)} numbers do not form rows of {width}")
-        return numbers
-
-    def _skipped(self) -> Value:
-        """Skip a value of numbers, such as an SFImage or MFTime."""
-        if self._ahead == "[":
-            self._skip_brackets()
-        while self._ahead[:1].isdigit() or self._ahead[:1] in ("+", "-", "."):
-            self._take()
-        return ()
-
-    def _items(self, one: Callable[[], T]) -> Iterator[T]:
+            return self._values.get(self._take())
         if self._ahead != "[":
-            yield one()
-            return
+            return self._item(depth)
+        row = _ROW.match(self._text, self._next)
+        if row is not None:
+            self._next = row.end(1)
+            self._take()
+            self._take()
+            return tuple(map(float, row[1].replace(",", " ").split()))
         self._take()
+        items: list[float | str | Node | Use] = []
         while self._ahead != "]":
-            yield one()
+            item = self._item(depth)
+            if isinstance(item, tuple) and not isinstance(item, Use):
+                items += item
+            else:
+                items.append(item)
         self._take()
+        return tuple(items)
 
-    def _row(self, pattern: re.Pattern[str], one: Callable[[str], N]) -> tuple[N, ...] | None:
-        """Return a list of plain numbers at once; None if the list is not that simple."""
-        end = self._text.find("]", self._next)
-        plain = self._text[self._next : end].replace(",", " ")
-        if self._ahead != "[" or end < 0 or not pattern.fullmatch(plain):
-            return None
-        self._next = end
-        self._take()
-        self._take()
-        return tuple(map(one, plain.split()))
-
-    def _string(self) -> str:
-        token = self._take()
-        if not token.startswith('"'):
-            raise self._error(f"expected a text in quotes, not {token!r}")
-        # Other backslashes are in paths of Windows.
-        return re.sub(r"\\([\"\\])", r"\1", token[1:-1])
-
-    def _bool(self) -> bool:
-        token = self._take()
-        if token.upper() not in ("TRUE", "FALSE"):
-            raise self._error(f"expected TRUE or FALSE, not {token!r}")
-        return token.upper() == "TRUE"
-
-    def _float(self) -> float:
-        token = self._take()
-        if not _NUMBER.fullmatch(token):
-            raise self._error(f"expected a number, not {token!r}")
-        return float(token)
-
-    def _integer(self) -> int:
-        token = self._take()
-        if not _INTEGER.fullmatch(token):
-            raise self._error(f"expected a whole number, not {token!r}")
-        return int(token, 0) if "x" in token.lower() else int(token)
+    def _item(self, depth: int) -> Value:
+        """Parse a text, a Boolean value, all numbers up to the next word, or a node."""
+        if self._ahead.startswith('"'):
+            # Other backslashes are in paths of Windows.
+            return re.sub(r"\\([\"\\])", r"\1", self._take()[1:-1])
+        if self._ahead.upper() in ("TRUE", "FALSE"):
+            return self._take().upper() == "TRUE"
+        numbers: list[float] = []
+        while number := _NUMBER.fullmatch(self._ahead):
+            numbers.append(int(number[0], 16) if number["hexadecimal"] else float(number[0]))
+            self._take()
+        if numbers:
+            return tuple(numbers) if len(numbers) > 1 else numbers[0]
+        if self._ahead[:1] in ("[", "]", "{", "}"):
+            raise self._error(f"expected a value, not {self._ahead!r}")
+        return self._node(depth + 1)

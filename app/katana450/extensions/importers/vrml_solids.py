@@ -1,7 +1,7 @@
 """Surfaces of the geometry nodes of VRML97, in their own frames.
 
-Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.17 ElevationGrid, 6.18 Extrusion,
-6.23 IndexedFaceSet, 6.42 Sphere.
+Source: ISO/IEC 14772-1:1997, 6.6 Box, 6.9 Cone, 6.12 Cylinder, 6.18 Extrusion, 6.23 IndexedFaceSet,
+6.42 Sphere.
 """
 
 from __future__ import annotations
@@ -31,28 +31,58 @@ LENGTHS = {
 """Fields of a solid that must not be negative."""
 
 
-def numbers(node: Node, field: str, default: Sequence[float], width: int = 1) -> FloatArray:
-    """Return a field of numbers as (k, width)."""
+class FieldError(Exception):
+    """A field has a value of a wrong type, as a clause."""
+
+
+def rows(node: Node, field: str, width: int = 1, default: Sequence[float] = ()) -> FloatArray:
+    """Return a field of numbers as (k, width). Raises FieldError."""
     value = node.get(field)
-    return np.array(default if value is None else value, dtype=np.float64).reshape(-1, width)
+    numbers = np.array(default if value is None else value).ravel()
+    if numbers.size and numbers.dtype.kind not in "fi":
+        raise FieldError(f"{node.kind}.{field} must be numbers")
+    if numbers.size % width:
+        raise FieldError(
+            f"the {numbers.size} numbers of {node.kind}.{field} are no rows of {width}"
+        )
+    return numbers.astype(np.float64).reshape(-1, width)
+
+
+def vector(node: Node, field: str, default: Sequence[float]) -> FloatArray:
+    """Return a field of as many numbers as ``default`` has, (n,). Raises FieldError."""
+    numbers = rows(node, field, 1, default)[:, 0]
+    if len(numbers) != len(default):
+        raise FieldError(f"{node.kind}.{field} has {len(numbers)} numbers, not {len(default)}")
+    return numbers
 
 
 def number(node: Node, field: str, default: float) -> float:
-    """Return a field of one number."""
-    value = node.get(field)
-    return default if value is None else float(value)  # type: ignore[arg-type]
+    """Return a field of one number. Raises FieldError."""
+    return float(vector(node, field, (default,))[0])
+
+
+def indices(node: Node, field: str) -> IntArray:
+    """Return a field of whole numbers (k,). Raises FieldError."""
+    numbers = rows(node, field)[:, 0]
+    if not (np.abs(numbers) < 2.0**53).all() or (numbers % 1.0).any():
+        raise FieldError(f"{node.kind}.{field} must be whole numbers")
+    return numbers.astype(np.int64)
 
 
 def flag(node: Node, field: str, default: bool = True) -> bool:
-    """Return a Boolean field."""
+    """Return a Boolean field. Raises FieldError."""
     value = node.get(field)
-    return default if value is None else bool(value)
+    if not isinstance(value, bool | None):
+        raise FieldError(f"{node.kind}.{field} must be TRUE or FALSE")
+    return default if value is None else value
 
 
 def part(node: Node, field: str) -> Node | None:
-    """Return the node in a field; None if there is none."""
+    """Return the node in a field; None if there is none. Raises FieldError."""
     value = node.get(field)
-    return value if isinstance(value, Node) else None
+    if not isinstance(value, Node | None):
+        raise FieldError(f"{node.kind}.{field} must be a node")
+    return None if value is None or value.kind == "NULL" else value
 
 
 def texts(value: Value | None) -> tuple[str, ...]:
@@ -62,7 +92,7 @@ def texts(value: Value | None) -> tuple[str, ...]:
 
 
 def _box(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
-    half = numbers(node, "size", (2.0, 2.0, 2.0))[:, 0] / 2.0
+    half = vector(node, "size", (2.0, 2.0, 2.0)) / 2.0
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     sides = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
     return of_polygons(signs * half, np.array(sides), np.full(6, 4), name)
@@ -96,15 +126,15 @@ def _turned(
     name: str,
 ) -> MeshSurface:
     """Return the surface of a profile (k, 2) of radius and y, bottom to top, turned about y."""
-    rows = np.asarray(profile, dtype=np.float64)
+    outline = np.asarray(profile, dtype=np.float64)
     turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
     ring = np.column_stack((np.sin(turn), np.zeros(ROUND), np.cos(turn)))
-    points = (rows[:, None, :1] * ring + rows[:, None, 1:] * (0.0, 1.0, 0.0)).reshape(-1, 3)
+    points = (outline[:, None, :1] * ring + outline[:, None, 1:] * (0.0, 1.0, 0.0)).reshape(-1, 3)
     corners: list[IntArray] = []
     sizes: list[int] = []
     here, ahead = np.arange(ROUND), np.roll(np.arange(ROUND), -1)
     if side:
-        for row in range(len(rows) - 1):
+        for row in range(len(outline) - 1):
             low, high = row * ROUND, (row + 1) * ROUND
             quads = np.column_stack((low + here, low + ahead, high + ahead, high + here))
             corners.append(quads.ravel())
@@ -113,7 +143,7 @@ def _turned(
         corners.append(here[::-1])
         sizes.append(ROUND)
     if top:
-        corners.append((len(rows) - 1) * ROUND + here)
+        corners.append((len(outline) - 1) * ROUND + here)
         sizes.append(ROUND)
     flat = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
     # At the axis, two corners are one.
@@ -123,12 +153,12 @@ def _turned(
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     coord, table = part(node, "coord"), colour_table(node)
     there = coord is not None and coord.kind == "Coordinate"
-    points = numbers(coord, "point", (), 3) if coord is not None and there else np.zeros((0, 3))
-    index = numbers(node, "coordIndex", ())[:, 0].astype(np.int64)
+    points = rows(coord, "point", 3) if coord is not None and there else np.zeros((0, 3))
+    index = indices(node, "coordIndex")
     corners, sizes = split(index)
     face_colours = corner_colours = None
     if table is not None:
-        chosen = numbers(node, "colorIndex", ())[:, 0].astype(np.int64)
+        chosen = indices(node, "colorIndex")
         if flag(node, "colorPerVertex"):
             places, their_sizes = split(chosen) if len(chosen) else (corners, sizes)
             fits = np.array_equal(sizes, their_sizes)
@@ -148,7 +178,7 @@ def colour_table(node: Node) -> FloatArray | None:
     color = part(node, "color")
     if color is None or color.kind != "Color":
         return None
-    return numbers(color, "color", (), 3)
+    return rows(color, "color", 3)
 
 
 def split(index: IntArray) -> tuple[IntArray, IntArray]:
@@ -175,53 +205,26 @@ def _facing(surface: MeshSurface, turned: bool) -> MeshSurface:
     return MeshSurface(surface.vertices, surface.faces[:, ::-1], surface.colours)
 
 
-def _grid(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
-    columns, rows = (int(number(node, f"{axis}Dimension", 0.0)) for axis in "xz")
-    height = numbers(node, "height", ())[:, 0]
-    if min(columns, rows) < 0 or columns * rows != len(height):
-        left_out["heights that do not match their grid"] += 1
-        # Heights beyond the grid are of no use, and a grid without all of its heights neither.
-        columns, rows = (columns, rows) if 0 < columns * rows < len(height) else (0, 0)
-        height = height[: columns * rows]
-    if min(columns, rows) < 2:
-        return NOTHING
-    x = np.arange(columns) * number(node, "xSpacing", 1.0)
-    z = np.arange(rows) * number(node, "zSpacing", 1.0)
-    points = np.column_stack((np.tile(x, rows), height, np.repeat(z, columns)))
-    first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    corners = np.column_stack((first, first + columns, first + columns + 1, first + 1)).ravel()
-    corner_colours = None
-    table = colour_table(node)
-    if table is not None:
-        by_vertex = flag(node, "colorPerVertex")
-        places = corners if by_vertex else np.repeat(np.arange(len(first)), 4)
-        corner_colours = chosen_colours(table, places, True, left_out)
-    surface = of_polygons(
-        points, corners, np.full(len(first), 4), name, corner_colours=corner_colours
-    )
-    return _facing(surface, not flag(node, "ccw"))
-
-
 def _extrusion(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     square = (1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
-    section = numbers(node, "crossSection", square, 2)
-    spine = numbers(node, "spine", (0.0, 0.0, 0.0, 0.0, 1.0, 0.0), 3)
-    scale = numbers(node, "scale", (1.0, 1.0), 2)
-    turns = numbers(node, "orientation", (0.0, 0.0, 1.0, 0.0), 4)
-    count, rows = len(section), len(spine)
-    if count < 2 or rows < 2 or not len(scale) or not len(turns):
+    section = rows(node, "crossSection", 2, square)
+    spine = rows(node, "spine", 3, (0.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+    scale = rows(node, "scale", 2, (1.0, 1.0))
+    turns = rows(node, "orientation", 4, (0.0, 0.0, 1.0, 0.0))
+    count, length = len(section), len(spine)
+    if count < 2 or length < 2 or not len(scale) or not len(turns):
         left_out["Extrusion with too few points"] += 1
         return NOTHING
-    check_triangles(2 * (count - 1) * (rows - 1), name)
+    check_triangles(2 * (count - 1) * (length - 1), name)
     frames = _frames(spine)
-    points = np.empty((rows, count, 3))
-    for row in range(rows):
+    points = np.empty((length, count, 3))
+    for row in range(length):
         x, y, z, angle = turns[min(row, len(turns) - 1)]
         flat = section * scale[min(row, len(scale) - 1)]
         placed = np.column_stack((flat[:, 0], np.zeros(count), flat[:, 1]))
         R = frames[row] @ so3.exp(angle * unit(np.array((x, y, z))))
         points[row] = placed @ R.T + spine[row]
-    first = (np.arange(rows - 1)[:, None] * count + np.arange(count - 1)).ravel()
+    first = (np.arange(length - 1)[:, None] * count + np.arange(count - 1)).ravel()
     quads = np.column_stack((first, first + 1, first + count + 1, first + count))
     corners, sizes = [quads.ravel()], [np.full(len(first), 4)]
     # The last corner of a closed section repeats the first.
@@ -229,7 +232,7 @@ def _extrusion(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     cap = np.arange(count - closed)
     for wanted, polygon in (
         (flag(node, "beginCap"), cap[::-1]),
-        (flag(node, "endCap"), (rows - 1) * count + cap),
+        (flag(node, "endCap"), (length - 1) * count + cap),
     ):
         if wanted and len(polygon) > 2:
             corners.append(polygon)
@@ -295,7 +298,6 @@ SOLIDS: dict[str, Callable[[Node, str, Counter[str]], MeshSurface]] = {
     "Cylinder": _cylinder,
     "Sphere": _sphere,
     "IndexedFaceSet": _face_set,
-    "ElevationGrid": _grid,
     "Extrusion": _extrusion,
 }
 """The function that builds the surface, by the kind of a node."""
@@ -308,7 +310,7 @@ def surface_of(node: Node, name: str, left_out: Counter[str]) -> MeshSurface | N
     """
     if node.kind not in SOLIDS:
         return None
-    if any((numbers(node, field, (1.0,)) < 0.0).any() for field in LENGTHS.get(node.kind, ())):
+    if any((rows(node, field) < 0.0).any() for field in LENGTHS.get(node.kind, ())):
         left_out[f"{node.kind} without a size"] += 1
         return NOTHING
     return SOLIDS[node.kind](node, name, left_out)
