@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Route
 
 from katana450.arm.robot.loader import load
 from katana450.cli.main import main
-from katana450.extensions.export.vrml_views import views
+from katana450.extensions.export.vrml import views
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -14,9 +14,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.props import load_props
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.water import water_environment
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray

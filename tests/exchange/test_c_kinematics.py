@@ -13,7 +13,7 @@ import pytest
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.export.c_kinematics import arm_data, kinematics_files
+from katana450.extensions.export.c_source import arm_data, kinematics_files
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.export.trajectory_file import load_motion
-from katana450.extensions.export.vrml import DIGITS, part_world, vrml_files, world_of
+from katana450.extensions.export.vrml import DIGITS, part_world, views, vrml_files, world_of
 from katana450.extensions.export.vrml_node import (
     FIELDS,
     KEYWORDS,
@@ -28,7 +28,6 @@ from katana450.extensions.export.vrml_node import (
     World,
 )
 from katana450.extensions.export.vrml_text import HEADER, world_text
-from katana450.extensions.export.vrml_views import views
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES

@@ -13,7 +13,7 @@ import pytest
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.trajectory_file import load_motion
-from katana450.extensions.export.vrml import world_of
+from katana450.extensions.export.vrml import views, world_of
 from katana450.extensions.export.vrml_node import (
     FIELDS,
     LISTS,
@@ -25,8 +25,7 @@ from katana450.extensions.export.vrml_node import (
     Value,
     World,
 )
-from katana450.extensions.export.vrml_views import views
-from katana450.extensions.export.x3d_text import x3d_text
+from katana450.extensions.export.vrml_text import x3d_text
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -14,8 +14,7 @@ import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 
 from katana450.errors import InputError
-from katana450.extensions.media.ffmpeg import ffmpeg
-from katana450.extensions.media.film import write_film
+from katana450.extensions.media.film import ffmpeg, write_film
 from katana450.extras import MissingExtraError
 
 Pixels = npt.NDArray[np.uint8]

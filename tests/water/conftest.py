@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from katana450.arm.robot.props import load_props
-from katana450.arm.robot.water import water_environment
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import WaterFlow
 

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.arm.robot.props import BASIN_AT, load_props
-from katana450.arm.robot.water import water_environment
+from katana450.arm.robot.props import BASIN_AT, load_props, water_environment
 from katana450.errors import InputError
 from katana450.maths.water.environment import Basin, WaterEnvironment
 from tests.geometry.strategies import repeatable

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.arm.robot.props import load_props
-from katana450.arm.robot.water import water_environment
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import VesselMove, Water, WaterFlow
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML

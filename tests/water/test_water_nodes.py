@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.robot.props import load_props
-from katana450.arm.robot.water import water_environment
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.extensions.water.nodes import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import VesselMove, WaterFlow

@@ -12,10 +12,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
-from katana450.arm.robot.props import load_props
+from katana450.arm.robot.props import load_props, water_environment
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf
-from katana450.arm.robot.water import water_environment
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
 from katana450.extension import RobotWorld, provided

@@ -10,6 +10,8 @@ from typing import Any
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.errors import RobotDescriptionError
+from katana450.maths.water.cylinder import Cylinder
+from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnvironment
 from katana450.resources import PROPS_PATH
 
 Point = tuple[float, float, float]
@@ -121,3 +123,27 @@ def _span(ends: Any) -> tuple[float, float]:
     if not -math.inf < low < high < math.inf:
         raise ValueError(f"{ends} is not an interval")
     return low, high
+
+
+def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
+    """Return the water environment of ``props``; ``basin_at``: place in the base frame [m].
+
+    The floor is at the underside of the table.
+    """
+    cup, basin, table = props.cup, props.basin, props.table
+    return WaterEnvironment(
+        {"cup": Cup(Cylinder(cup.inner_radius, _depth(cup)), cup.floor, cup.outer_radius)},
+        Basin(
+            basin_at,
+            basin.floor,
+            basin.floor_radius,
+            basin.inner_radius,
+            _depth(basin),
+            basin.outer_radius,
+        ),
+        TableTop(table.x, table.y, -table.thickness),
+    )
+
+
+def _depth(vessel: Vessel) -> float:
+    return vessel.height - vessel.floor

@@ -17,7 +17,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, looking
+from katana450.arm.robot.initial_camera import (
+    FIELD_OF_VIEW,
+    VIEW_DIRECTION,
+    InitialCamera,
+    fitted,
+    looking,
+)
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
@@ -27,11 +33,43 @@ from katana450.extensions.export.placed_object import PlacedObject
 from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
-from katana450.extensions.export.vrml_text import world_text
-from katana450.extensions.export.vrml_views import views
-from katana450.extensions.export.x3d_text import x3d_text
+from katana450.extensions.export.vrml_text import world_text, x3d_text
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+
+DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
+    "All": VIEW_DIRECTION,
+    "Front": (-1.0, 0.0, 0.0),
+    "Side": (0.0, 1.0, 0.0),
+    "Top": (0.0, 0.0, -1.0),
+}
+"""Directions of view in the root's frame, by viewpoint. x of the root points ahead."""
+
+TOOL = "Tool"
+"""Name of the viewpoint of the links behind the last axis of an arm."""
+
+
+def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]:
+    """Return the cameras of all viewpoints with the joints at ``values`` [rad, m], by name."""
+    points: dict[str, FloatArray] = {}
+    for link, T in zip(robot.links, robot.frames(values).values(), strict=True):
+        if link.shapes:
+            vertices = np.concatenate([shape.vertices for shape in link.shapes])
+            points[link.name] = vertices @ T[:3, :3].T + T[:3, 3]
+    everything = np.concatenate([*points.values(), np.zeros((1, 3))])
+    found = {name: fitted(everything, np.array(way)) for name, way in DIRECTIONS.items()}
+    if robot.arm is not None:
+        last = robot.arm.chain.names[-1]
+        behind = [
+            points[link.name]
+            for link in robot.links
+            if link.name in points
+            and any(at.joint is not None and at.joint.name == last for at in robot.path_to(link))
+        ]
+        if behind:
+            found[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
+    return found
+
 
 DIGITS = 5
 """Decimal places of a coordinate [m]: a hundredth of a millimetre."""

@@ -10,6 +10,8 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,15 +25,90 @@ from katana450.arm.robot.link import Joint
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_gripper_nodes import gripper_nodes
-from katana450.extensions.export.vrml_named import FieldOrders, FieldValue, NamedField, NamedNode
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import WIDTHS, Type
+from katana450.extensions.touch.foundation import PadPressure
+from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from katana450.server.service.nodes import Nodes
+
+FieldValue = float | list[float]
+"""The value of a field: one number or several."""
+
+
+class FieldOrders:
+    """The orders of one message, collected until all of it is parsed.
+
+    Attributes:
+        state: the present state.
+        axes: targets of axes [rad, m], by their numbers.
+        position: (3,) [m] target of the tool in the root's frame; None without one.
+        R: (3, 3) target of the tool in the root's frame; None without one.
+        others: further commands.
+    """
+
+    def __init__(self, state: State) -> None:
+        """Begin without orders."""
+        self.state = state
+        self.axes: dict[int, float] = {}
+        self.position: FloatArray | None = None
+        self.R: FloatArray | None = None
+        self.others: list[cmd.Command] = []
+
+
+@dataclass(frozen=True, eq=False)
+class NamedField:
+    """A field of a node.
+
+    Attributes:
+        type: its type.
+        read: function that returns its value.
+        put: function that sets it; None if it can only be read.
+        why: reason why it can only be read, with what to do; empty if there is nothing to say.
+    """
+
+    type: Type
+    read: Callable[[State], FieldValue]
+    put: Callable[[FieldOrders, FieldValue | None], None] | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedNode:
+    """A node: its kind, the object that it belongs to, and its fields."""
+
+    kind: str
+    of: str
+    fields: Mapping[str, NamedField]
+
+
+def gripper_nodes(model: TouchModel) -> dict[str, NamedNode]:
+    """Return the nodes of the pads of the gripper, which the files lack."""
+
+    def pad(number: int) -> NamedNode:
+        def value(state: State, of: Callable[[PadPressure], FieldValue], none: FieldValue) -> Any:
+            squeeze = model.squeeze(state)
+            return none if squeeze is None else of(squeeze.pads[number])
+
+        no_pressure = [0.0] * (ROWS * COLUMNS)
+        fields = {
+            "force": NamedField(Type.FLOAT, lambda state: value(state, lambda at: at.force, 0.0)),
+            "centre": NamedField(
+                Type.PAIR,
+                lambda state: value(state, lambda at: [*(at.centre or (0.0, 0.0))], [0.0, 0.0]),
+            ),
+            "pressure": NamedField(
+                Type.FLOAT_LIST,
+                lambda state: value(state, lambda at: at.pressure.ravel().tolist(), no_pressure),
+            ),
+        }
+        return NamedNode("Touch", f"link {model.pads[number].finger}", fields)
+
+    return {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}
+
 
 AXIS_TOLERANCE = 1e-6
 """[rad] Maximum angle between the axis of a rotation and that of the joint."""

@@ -1,8 +1,13 @@
-"""Text of VRML97 values and worlds."""
+"""Text of worlds in VRML97, and as X3D in its XML encoding (ISO/IEC 19776-1).
+
+Floats are written so that they can be read back exactly.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from xml.sax.saxutils import quoteattr
 
 from katana450.extensions.export.vrml_node import (
     FIELDS,
@@ -16,16 +21,27 @@ from katana450.extensions.export.vrml_node import (
 )
 
 HEADER = "#VRML V2.0 utf8"
-"""First line of a file."""
+"""First line of a VRML file."""
 
-LINE = 16
+X3D_HEADER = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<!DOCTYPE X3D PUBLIC "ISO//Web3D//DTD X3D 3.3//EN" '
+    '"https://www.web3d.org/specifications/x3d-3.3.dtd">\n'
+    '<X3D profile="Immersive" version="3.3" '
+    'xmlns:xsd="http://www.w3.org/2001/XMLSchema-instance" '
+    'xsd:noNamespaceSchemaLocation="https://www.web3d.org/specifications/x3d-3.3.xsd">\n'
+    "<Scene>\n"
+)
+"""Beginning of an X3D file: the profile that has Switch, sensors and interpolators."""
+
+ROWS_A_LINE = 16
 """Rows of numbers per line: few enough for old readers, enough for small files."""
 
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
 
 
 def world_text(world: World) -> str:
-    """Return the text of a file; floats are written so that they can be read back exactly."""
+    """Return the text of a VRML file."""
     parts = [HEADER, "\n"]
     for node in world.nodes:
         _write(parts, node, 0)
@@ -33,52 +49,92 @@ def world_text(world: World) -> str:
     return "".join(parts)
 
 
-def _write(parts: list[str], node: Node | Use | str | float, depth: int) -> None:
+def x3d_text(world: World) -> str:
+    """Return the text of an X3D file."""
+    kinds = {name: node.kind for name, node in world.named().items()}
+    parts = [X3D_HEADER]
+    for node in world.nodes:
+        _write_element(parts, node, kinds)
+    for route in world.routes:
+        parts.append(
+            f'<ROUTE fromNode="{route.source}" fromField="{route.out}" '
+            f'toNode="{route.target}" toField="{route.into}"/>\n'
+        )
+    return "".join([*parts, "</Scene>\n</X3D>\n"])
+
+
+def _write(parts: list[str], node: Node | Use, depth: int) -> None:
+    """Add the text of ``node`` in VRML."""
     indent = " " * depth
     if isinstance(node, Use):
         parts.append(f"{indent}USE {node.name}\n")
         return
-    assert isinstance(node, Node)
     parts.append(f"{indent}{'' if node.name is None else f'DEF {node.name} '}{node.kind} {{\n")
     for name, value in node.fields:
         kind = FIELDS[node.kind][name]
         if kind is Type.NODE:
-            assert isinstance(value, Node | Use)
             parts.append(f"{indent} {name}\n")
-            _write(parts, value, depth + 1)
+            for child in _children(value):
+                _write(parts, child, depth + 1)
         elif kind is Type.NODE_LIST:
-            assert isinstance(value, tuple)
             parts.append(f"{indent} {name} [\n")
-            for child in value:
+            for child in _children(value):
                 _write(parts, child, depth + 2)
             parts.append(f"{indent} ]\n")
         else:
-            parts.append(f"{indent} {name} {_plain(kind, value)}\n")
+            text = _quoted(value) if isinstance(value, str) else _plain(kind, value)
+            text = text.upper() if isinstance(value, bool) else text
+            space = " " if kind is Type.STRING_LIST else ""
+            text = f"[{space}{text}{space}]" if kind in LISTS else text
+            parts.append(f"{indent} {name} {text}\n")
     parts.append(f"{indent}}}\n")
 
 
+def _write_element(parts: list[str], node: Node | Use, kinds: Mapping[str, str]) -> None:
+    """Add the element of ``node``; ``kinds``: the kind of each node with a DEF name."""
+    if isinstance(node, Use):
+        parts.append(f'<{kinds[node.name]} USE="{node.name}"/>\n')
+        return
+    parts.append(f"<{node.kind}" + ("" if node.name is None else f' DEF="{node.name}"'))
+    children: list[Node | Use] = []
+    for name, value in node.fields:
+        kind = FIELDS[node.kind][name]
+        if kind in (Type.NODE, Type.NODE_LIST):
+            children += _children(value)
+        else:
+            text = value if isinstance(value, str) else _plain(kind, value)
+            # The ends of lines between numbers stay as they are.
+            is_text = kind in (Type.STRING, Type.STRING_LIST)
+            parts.append(f" {name}=" + (quoteattr(text) if is_text else f'"{text}"'))
+    if not children:
+        parts.append("/>\n")
+        return
+    parts.append(">\n")
+    for child in children:
+        _write_element(parts, child, kinds)
+    parts.append(f"</{node.kind}>\n")
+
+
+def _children(value: Value) -> list[Node | Use]:
+    """Return the nodes in the value of a field of nodes."""
+    # A reference is a tuple too.
+    items = value if isinstance(value, tuple) and not isinstance(value, Use) else (value,)
+    return [item for item in items if isinstance(item, Node | Use)]
+
+
 def _plain(kind: Type, value: Value) -> str:
+    """Return a value other than nodes and a single text, as both formats write it."""
     if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(value, str):
-        return _quoted(value)
-    if isinstance(value, float | int):
-        return _short(repr(value))
-    assert isinstance(value, tuple)
+        return str(value).lower()
+    items = value if isinstance(value, tuple) else (value,)
     if kind is Type.STRING_LIST:
-        return f"[ {' '.join(_quoted(str(text)) for text in value)} ]"
-    numbers = list(map(repr, value))
-    if kind not in LISTS:
-        return _short(" ".join(numbers))
-    step = WIDTHS[kind] * LINE
-    rows = [" ".join(numbers[at : at + step]) for at in range(0, len(numbers), step)]
-    return "[" + _short("\n".join(rows)) + "]"
+        return " ".join(_quoted(str(text)) for text in items)
+    numbers = list(map(repr, items))
+    step = WIDTHS[kind] * ROWS_A_LINE
+    rows = [" ".join(numbers[start : start + step]) for start in range(0, len(numbers), step)]
+    # 2 for 2.0. The zero of 0.5 stays: VTK reads .0122 as 0.
+    return _ZERO_AFTER.sub("", "\n".join(rows))
 
 
 def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
-
-
-def _short(numbers: str) -> str:
-    """Write 2 for 2.0. The zero of 0.5 stays: VTK reads .0122 as 0."""
-    return _ZERO_AFTER.sub("", numbers)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import threading
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
@@ -12,16 +13,21 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import CommandChannel
+from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
 from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import read_scene_zip
-from katana450.extensions.importers.scene_transfer import keep_mesh, keep_scene, zipped
+from katana450.extensions.importers.scene_file import StoredScene, read_scene_zip, scene_zip
 from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES, Format
+from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
+from katana450.extensions.programs.scene_draft import Scene
 from katana450.maths.planning.checkpoint import checked_by
+from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
+from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import actor_of
@@ -37,6 +43,55 @@ from katana450.server.web.bodies import (
 )
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.token_bucket import TokenBucket
+
+
+def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
+    """Store ``mesh``, so that it can be placed. Raises InputError if there is no room for it."""
+    state = None if hub.arm is None else hub.arm.state
+    hub.meshes.put([mesh], used_in(state))
+    names = {scene_object.name for scene_object in state.objects} if state is not None else set()
+    return answers.Mesh(
+        key=mesh.key,
+        name=free_name(mesh.name, names),
+        text=mesh.text,
+        size=list(mesh.solid.size),
+        triangles=len(mesh.faces),
+        scale=mesh.scale,
+    )
+
+
+def keep_scene(hub: Hub, data: bytes, stored: StoredScene, arm: ArmHandle) -> answers.Scene:
+    """Store ``stored``, read from ``data``, so that it can be loaded. Raises InputError."""
+    key = hashlib.sha256(data).hexdigest()[:32]
+    scene = stored.scene
+    scenes_of(hub).keep(key, cmd.ReplaceScene(scene.objects, scene.water), stored.meshes, arm)
+    names = [scene_object.name for scene_object in scene.objects]
+    text = f"{len(names)} object{'' if len(names) == 1 else 's'}: {', '.join(names) or 'none'}."
+    if scene.joints is not None:
+        text += " The arm does not move."
+    return answers.Scene(key=key, objects=names, text=text)
+
+
+def zipped(hub: Hub, arm: ArmHandle) -> bytes:
+    """Return the present scene as a .zip. Raises InputError or LeaseError if it cannot be saved."""
+    hand = arm.environment.hand
+    return scene_zip(_stored(hub, arm), None if hand is None else hand.T_palm_tool)
+
+
+def _stored(hub: Hub, arm: ArmHandle) -> StoredScene:
+    state = arm.state
+    held = state.held
+    if held is not None:
+        raise LeaseError(
+            f"{held.name!r} is held. Set it down first: a scene cannot have held objects."
+        )
+    water = None
+    if state.poured is not None:
+        water = ML * state.poured.water.cup.kept / MILLILITRE
+    keys = dict.fromkeys(t.solid.key for t in state.objects if t.solid is not None)
+    meshes = tuple(hub.meshes.need(key) for key in keys)
+    return StoredScene(Scene(state.objects, water, state.q), meshes)
+
 
 RATE, UPLOAD_BURST = 0.5, 10.0
 """Uploads per second, and maximum burst, of one identity."""

@@ -11,12 +11,26 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from katana450.extensions.media import room
 from katana450.extensions.media.camera import Camera
-from katana450.extensions.media.hits import FLOOR, NOWHERE, Hits, first_hits, hits_behind, lit
+from katana450.extensions.media.hits import (
+    FLOOR,
+    NOWHERE,
+    Hits,
+    Tracer,
+    first_hits,
+    hits_behind,
+    lit,
+)
 from katana450.extensions.media.scene import Bools, Floats, Ints, Item, RenderScene
-from katana450.extensions.media.shading import LAMPS, developed, shaded
-from katana450.extensions.media.tracer import Tracer
+from katana450.extensions.media.shading import (
+    LAMPS,
+    background,
+    developed,
+    dithered,
+    floor_light,
+    shaded,
+)
+from katana450.server.view.room import FLOOR_AT
 from katana450.server.viser_bridge.themes import Theme
 
 CORNERS = ((0.375, 0.125), (0.875, 0.375), (0.125, 0.625), (0.625, 0.875))
@@ -121,7 +135,7 @@ class _Renderer:
                 for right, down in CORNERS
             ) / np.float32(len(CORNERS))
         plain = samples.item == NOWHERE
-        colours[plain] = room.dithered(colours[plain], rows[plain], columns[plain])
+        colours[plain] = dithered(colours[plain], rows[plain], columns[plain])
         return Picture(
             np.rint(255.0 * colours).astype(np.uint8).reshape(height, width, 3),
             samples.item.reshape(height, width),
@@ -131,11 +145,11 @@ class _Renderer:
     def _samples(self, x: Floats, y: Floats) -> _Samples:
         """Return what the rays through x, y (n,) [px] show."""
         directions = self._camera.directions(x, y)
-        hits = first_hits(self._solid, self._tracer, self._eye, directions, room.HEIGHT)
+        hits = first_hits(self._solid, self._tracer, self._eye, directions, FLOOR_AT)
         reached = lit(self._tracer, hits, LAMPS[0].towards)
-        light = room.background(self._theme, self._camera, y)
+        light = background(self._theme, self._camera, y)
         floor, solid = hits.item == FLOOR, hits.item >= 0
-        light[floor] = room.floor(
+        light[floor] = floor_light(
             self._theme, self._camera, hits.some(floor), reached[floor], light[floor]
         )
         light[solid] = _surface(self._solid, hits.some(solid), reached[solid])

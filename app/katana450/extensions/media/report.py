@@ -20,7 +20,7 @@ from katana450.atomic import write_files, writer_of
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.media import figures
-from katana450.extensions.media.measured_figure import measured_figure
+from katana450.extensions.media.figures import measured_figure
 from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
 from katana450.extensions.media.pour_record import COLUMNS, PourRecord
 from katana450.extensions.programs.measured_run import MeasuredRun

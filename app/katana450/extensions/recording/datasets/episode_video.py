@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from katana450.extensions.media.ffmpeg import VideoEncoder
+from katana450.extensions.media.film import VideoEncoder
 from katana450.extensions.recording.datasets.lerobot_form import VIDEO_MB, VIDEO_PATH, place
 from katana450.extensions.recording.datasets.statistics import PixelCounts
 

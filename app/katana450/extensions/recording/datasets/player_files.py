@@ -18,8 +18,8 @@ from katana450.errors import InputError
 from katana450.extensions.export.page import FPS
 from katana450.extensions.export.recorded import recorded
 from katana450.extensions.media.film import check_filmable, write_film
+from katana450.extensions.media.hits import check_traceable
 from katana450.extensions.media.rendering_pool import RenderingPool, Shot
-from katana450.extensions.media.tracer import check_traceable
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.recorded_states import RecordedStates
 from katana450.extensions.recording.datasets.sampling import frame_times
