@@ -14,8 +14,9 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
+from katana450.extensions.export.rows import DIGITS
 from katana450.extensions.export.trajectory_file import load_motion
-from katana450.extensions.export.vrml import DIGITS, part_world, views, vrml_files, world_of
+from katana450.extensions.export.vrml import part_world, views, vrml_files, world_of
 from katana450.extensions.export.vrml_node import (
     FIELDS,
     KEYWORDS,

@@ -18,7 +18,7 @@ from katana450.arm.control.state import Reason, State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.export.ros2.srdf import srdf_text
+from katana450.extensions.export.ros2_package import srdf_text
 from katana450.extensions.hands.fixed_jaw import FixedJaw
 from katana450.extensions.hands.sides import with_sides
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock

@@ -17,7 +17,7 @@ from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.names import distinct
-from katana450.extensions.export.rows import distinct_rows
+from katana450.extensions.export.rows import indexed
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
 from katana450.maths.kinematics.chain import Chain
@@ -256,9 +256,6 @@ def _rows(declaration: str, rows: FloatArray) -> str:
 TEMPLATES = ("viewer.c", "Makefile", "CMakeLists.txt", "CMakePresets.json", "vcpkg.json")
 """Files that are copied unchanged."""
 
-DIGITS, NORMAL_DIGITS = 5, 3
-"""Decimal places of coordinates [m] and of normals."""
-
 RESERVED = frozenset(
     [
         *("auto", "break", "case", "char", "const", "continue", "default", "do", "double"),
@@ -295,18 +292,14 @@ def c_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
 
 def _part(link: Link, name: str) -> dict[str, str]:
     """Return the header and the source of one link."""
-    vertices, at = distinct_rows([shape.vertices for shape in link.shapes], DIGITS)
-    normals, along = distinct_rows([shape.normals for shape in link.shapes], NORMAL_DIGITS)
-    firsts = np.cumsum([0] + [len(shape.vertices) for shape in link.shapes])
-    faces = np.concatenate(
-        [shape.faces + first for shape, first in zip(link.shapes, firsts, strict=False)]
-    )
-    rows = np.column_stack((at[faces], along[faces], np.zeros_like(faces)))
+    surface = indexed(link.shapes)
+    faces = surface.faces
+    rows = np.column_stack((faces, surface.normal_faces, np.zeros_like(faces)))
     index = "unsigned short" if rows.max() < 1 << 16 else "unsigned int"
     guard = f"{name.upper()}_H"
     arrays = (
-        f"const float {name}_vertices[{len(vertices)}][3]",
-        f"const float {name}_normals[{len(normals)}][3]",
+        f"const float {name}_vertices[{len(surface.points)}][3]",
+        f"const float {name}_normals[{len(surface.normals)}][3]",
         f"const {index} {name}_face_indices[{len(faces)}][9]",
     )
     header = "\n".join(
@@ -356,11 +349,11 @@ def _part(link: Link, name: str) -> dict[str, str]:
             '#include "robot.h"',
             "",
             f"{arrays[0]} = {{",
-            *_float_rows(vertices),
+            *_float_rows(surface.points),
             "};",
             "",
             f"{arrays[1]} = {{",
-            *_float_rows(normals),
+            *_float_rows(surface.normals),
             "};",
             "",
             f"{arrays[2]} = {{",

@@ -68,7 +68,9 @@ def mjcf_files(robot: Robot, path: Path) -> dict[str, bytes]:
         "scene.xml": _text(_scene(f"{name}.xml", robot)),
         **{f"meshes/{file}.obj": text.encode() for file, text in model.meshes.items()},
     }
-    return {f"{name}_mjcf.zip": zipped({f"{name}/{each}": files[each] for each in files})}
+    return {
+        f"{name}_mjcf.zip": zipped({f"{name}/{each}": files[each] for each in files}, mode=0o644)
+    }
 
 
 class _Model:

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.export.rows import distinct_rows
+from katana450.extensions.export.rows import DIGITS, NORMAL_DIGITS, indexed
 from katana450.maths.geometry.arrays import FloatArray, IntArray
-
-DIGITS = 5
-"""Decimal places of a coordinate [m]: a hundredth of a millimetre."""
-
-NORMAL_DIGITS = 3
-"""Decimal places of a normal."""
 
 LIBRARY = "materials.mtl"
 """Name of the MTL file with the materials, in the folder of the OBJ files."""
@@ -28,16 +20,11 @@ def obj_text(shapes: Sequence[VisualMesh], material: str | None) -> str:
 
     ``material``: name of its material in `LIBRARY`; None for no material.
     """
-    points, point_index = distinct_rows([shape.vertices for shape in shapes], DIGITS)
-    normals, normal_index = distinct_rows([shape.normals for shape in shapes], NORMAL_DIGITS)
-    starts = np.cumsum([0, *(len(shape.vertices) for shape in shapes)])
-    faces = np.concatenate(
-        [shape.faces + start for shape, start in zip(shapes, starts, strict=False)]
-    )
+    surface = indexed(shapes)
     lines = [] if material is None else [f"mtllib {LIBRARY}", f"usemtl {material}"]
-    lines += _rows("v", points, DIGITS)
-    lines += _rows("vn", normals, NORMAL_DIGITS)
-    lines += _faces(point_index[faces] + 1, normal_index[faces] + 1)
+    lines += _rows("v", surface.points, DIGITS)
+    lines += _rows("vn", surface.normals, NORMAL_DIGITS)
+    lines += _faces(surface.faces + 1, surface.normal_faces + 1)
     return "\n".join((*lines, ""))
 
 

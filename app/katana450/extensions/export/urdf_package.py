@@ -26,16 +26,18 @@ from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.archive import zipped
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
-from katana450.extensions.export.ros2.control import control_xacro, controllers_yaml
-from katana450.extensions.export.ros2.display import (
+from katana450.extensions.export.ros2_package import (
     RVIZ,
+    cmake_text,
     control_launch,
+    control_xacro,
+    controllers_yaml,
     display_launch,
+    groups_of,
+    manifest_text,
     rviz_text,
+    srdf_text,
 )
-from katana450.extensions.export.ros2.groups import groups_of
-from katana450.extensions.export.ros2.manifest import cmake_text, manifest_text
-from katana450.extensions.export.ros2.srdf import srdf_text
 from katana450.resources import URDF_PATH
 
 CONVERTED = (".glb", ".gltf")
@@ -88,7 +90,7 @@ def package_files(path: Path) -> dict[str, bytes]:
         "CMakeLists.txt": cmake_text(package, files).encode(),
         **files,
     }
-    return {f"{package}.zip": zipped({f"{package}/{n}": c for n, c in files.items()})}
+    return {f"{package}.zip": zipped({f"{package}/{n}": c for n, c in files.items()}, mode=0o644)}
 
 
 def _launched(robot: Robot, package: str, plain: str) -> dict[str, bytes]:

@@ -30,6 +30,7 @@ from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.placed_object import PlacedObject
+from katana450.extensions.export.rows import DIGITS, NORMAL_DIGITS
 from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
@@ -70,12 +71,6 @@ def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]
             found[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
     return found
 
-
-DIGITS = 5
-"""Decimal places of a coordinate [m]: a hundredth of a millimetre."""
-
-NORMAL_DIGITS = 3
-"""Decimal places of a normal."""
 
 SURFACE = "_surface"
 """Put, with a number, behind the name of a link or object for its face sets."""

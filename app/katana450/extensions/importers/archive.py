@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 
 from katana450.errors import InputError
+from katana450.extensions.export.archive import zipped
 from katana450.extensions.importers.companions import is_inside
 
 MAX_ARCHIVE_BYTES = 60_000_000
@@ -24,9 +25,6 @@ COMPANION_SUFFIXES = ("bin", "mtl")
 
 NAMING = ("wrl", "gltf", "obj")
 """Suffixes of files that can name others."""
-
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Time stamp of all files, the earliest of the format: the same files give the same bytes."""
 
 LONGEST_NAME = 200
 """[bytes] Maximum length of the name of a file in another."""
@@ -169,9 +167,4 @@ def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
 
 def packed(main: str, files: Mapping[str, bytes]) -> bytes:
     """Return a .zip of ``files``, whose comment is ``main``: the path of a shape file, or empty."""
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as archive:
-        archive.comment = main.encode()
-        for path in sorted(files):
-            archive.writestr(zipfile.ZipInfo(path, EPOCH), files[path], zipfile.ZIP_DEFLATED)
-    return out.getvalue()
+    return zipped(files, main)

@@ -1,1 +1,0 @@
-"""Files of the exported ROS 2 package beside the URDF and its meshes."""
