@@ -92,7 +92,7 @@ def test_every_joint_is_that_of_yourdfpy(everything: Path, tmp_path: Path) -> No
             assert (joint.limit is None) == (other.limit is None)
             if joint.limit is not None:
                 limit = other.limit
-                assert joint.limit == (limit.lower, limit.upper, limit.velocity)
+                assert joint.limit == (limit.lower, limit.upper, limit.velocity, limit.effort)
             assert (joint.mimic is None) == (other.mimic is None)
             if joint.mimic is not None:
                 mimic = other.mimic
@@ -108,7 +108,11 @@ def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
     assert can.extents == pytest.approx((0.2, 0.2, 0.4), abs=2e-3)
     (collision,) = root.collisions
     assert collision.visual.mesh.bounds.tolist() == [[0.5, 1.0, 1.5], [1.5, 3.0, 4.5]]
-    assert (root.mass, root.center.tolist()) == (2.5, [0.1, -0.2, 0.3])
+    assert root.inertial is not None
+    assert (root.inertial.mass, root.inertial.T_link_inertia[:3, 3].tolist()) == (
+        2.5,
+        [0.1, -0.2, 0.3],
+    )
 
 
 @pytest.mark.parametrize("path", [URDF_PATH, GANTRY])

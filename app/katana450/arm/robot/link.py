@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.robot.surfaces import VisualMesh, main_colour, shapes_of
+from katana450.arm.robot.urdf import Inertial
 from katana450.arm.robot.visual import Visual
 from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
@@ -32,6 +33,8 @@ class Joint:
         leader: the joint whose value it follows; its own name if it is driven itself.
         factor, offset: value = factor * leader + offset.
         speed: maximum [rad/s] or [m/s], infinite if the file states none.
+        effort: maximum force [N m] or [N], 0 if the file states none.
+        damping, friction: [N m s/rad, N s/m] and [N m, N], 0 if the file states none.
     """
 
     name: str
@@ -43,6 +46,9 @@ class Joint:
     factor: float = 1.0
     offset: float = 0.0
     speed: float = math.inf
+    effort: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
 
     def motion(self, value: float) -> FloatArray:
         """Return the pose (4, 4) that the joint adds at ``value`` [rad] or [m]."""
@@ -62,8 +68,7 @@ class Link:
         joint: None if it is fixed.
         visuals: its shapes as the file has them.
         collisions: the shapes that represent it in collision checks.
-        mass: [kg], 0 if the file states none.
-        center: (3,) centre of mass in its own frame [m].
+        inertial: its mass, if the file states one.
         missing: the mesh files of its visuals, and of its collisions, that do not exist.
     """
 
@@ -73,8 +78,7 @@ class Link:
     joint: Joint | None
     visuals: tuple[Visual, ...]
     collisions: tuple[Visual, ...]
-    mass: float
-    center: FloatArray
+    inertial: Inertial | None
     missing: tuple[tuple[Path, ...], tuple[Path, ...]] = ((), ())
 
     def at_rest(self, resting: Mapping[str, float]) -> FloatArray:

@@ -93,8 +93,7 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
                 joint=None if parent_joint is None else following.get(parent_joint.name),
                 visuals=tuple(shape.visual for shape in link.visuals) or rods(below[name]),
                 collisions=tuple(shape.visual for shape in link.collisions),
-                mass=link.mass,
-                center=link.center,
+                inertial=link.inertial,
                 missing=link.missing,
             )
         )
@@ -110,12 +109,13 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
     size = float(np.linalg.norm(joint.axis))
     if not 0.0 < size < math.inf:
         raise RobotDescriptionError(f"Joint {joint.name!r} of {path.name} has no axis.")
-    lower, upper, speed = -math.inf, math.inf, math.inf
+    lower, upper, speed, effort = -math.inf, math.inf, math.inf, 0.0
     if joint.limit is not None:
         if joint.type != "continuous":
             lower = lower if joint.limit.lower is None else joint.limit.lower
             upper = upper if joint.limit.upper is None else joint.limit.upper
         speed = speed if joint.limit.velocity is None else joint.limit.velocity
+        effort = joint.limit.effort or 0.0
     leader, factor, offset = joint.name, 1.0, 0.0
     if joint.mimic is not None:
         leader, factor, offset = joint.mimic
@@ -131,6 +131,9 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
         factor=factor,
         offset=offset,
         speed=speed,
+        effort=effort,
+        damping=joint.damping,
+        friction=joint.friction,
     )
 
 

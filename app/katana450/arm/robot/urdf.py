@@ -16,11 +16,12 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 
 
 class UrdfLimit(NamedTuple):
-    """Limits [rad] or [m] and maximum speed [rad/s] or [m/s] of a joint; None if not stated."""
+    """Limits [rad, m], maximum speed [rad/s, m/s] and force [N m, N] of a joint, where stated."""
 
     lower: float | None
     upper: float | None
     velocity: float | None
+    effort: float | None
 
 
 class UrdfMimic(NamedTuple):
@@ -43,6 +44,7 @@ class UrdfJoint:
         axis: (3,) as stated, in the frame of the child; not normalised.
         limit: limits and speed, if stated.
         mimic: the joint that it follows, if any.
+        damping, friction: [N m s/rad, N s/m] and [N m, N], 0 if not stated.
     """
 
     name: str
@@ -53,6 +55,30 @@ class UrdfJoint:
     axis: FloatArray
     limit: UrdfLimit | None
     mimic: UrdfMimic | None
+    damping: float
+    friction: float
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """The mass of a link.
+
+    Attributes:
+        mass: [kg], above 0.
+        T_link_inertia: (4, 4) pose of the frame of ``moments``, its origin the centre of mass [m].
+        moments: (3, 3) inertia [kg m^2].
+    """
+
+    mass: float
+    T_link_inertia: FloatArray
+    moments: FloatArray
+
+    @property
+    def principal(self) -> tuple[FloatArray, FloatArray]:
+        """The principal moments (3,) [kg m^2], and their right-handed axes (3, 3) in the link."""
+        values, axes = np.linalg.eigh(self.moments)
+        axes = axes * np.sign(np.linalg.det(axes))
+        return values, self.T_link_inertia[:3, :3] @ axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +106,14 @@ class UrdfLink:
     Attributes:
         name: of the link.
         visuals, collisions: its shapes.
-        mass: [kg], 0 if not stated.
-        center: (3,) centre of mass in the frame of the link [m].
+        inertial: its mass, if one is stated.
         missing: the mesh files of its visuals, and of its collisions, that do not exist.
     """
 
     name: str
     visuals: tuple[UrdfShape, ...]
     collisions: tuple[UrdfShape, ...]
-    mass: float
-    center: FloatArray
+    inertial: Inertial | None
     missing: tuple[tuple[Path, ...], tuple[Path, ...]]
 
 
@@ -176,15 +200,16 @@ def _link(link: Any, colors: Mapping[str | None, Any], folder: Path) -> UrdfLink
         )
         for shapes, files in zip((link.visuals, link.collisions), missing, strict=True)
     )
-    mass, center = 0.0, np.zeros(3)
-    if link.inertial is not None and link.inertial.mass is not None:
-        mass, center = max(link.inertial.mass, 0.0), _origin(link.inertial)[:3, 3]
+    inertial = None
+    if link.inertial is not None and (link.inertial.mass or 0.0) > 0.0:
+        moments = np.zeros((3, 3)) if link.inertial.inertia is None else link.inertial.inertia
+        inertial = Inertial(link.inertial.mass, _origin(link.inertial), frozen(moments))
     lost = tuple(missing[0]), tuple(missing[1])
-    return UrdfLink(link.name, visuals, collisions, mass, frozen(center), lost)
+    return UrdfLink(link.name, visuals, collisions, inertial, lost)
 
 
 def _joint(joint: Any) -> UrdfJoint:
-    limit, mimic = joint.limit, joint.mimic
+    limit, mimic, losses = joint.limit, joint.mimic, joint.dynamics
     return UrdfJoint(
         name=joint.name,
         type=joint.type,
@@ -192,8 +217,10 @@ def _joint(joint: Any) -> UrdfJoint:
         child=joint.child,
         origin=_origin(joint),
         axis=frozen(joint.axis),
-        limit=None if limit is None else UrdfLimit(limit.lower, limit.upper, limit.velocity),
-        mimic=None if mimic is None else UrdfMimic(mimic.joint, mimic.multiplier, mimic.offset),
+        limit=limit and UrdfLimit(limit.lower, limit.upper, limit.velocity, limit.effort),
+        mimic=mimic and UrdfMimic(mimic.joint, mimic.multiplier, mimic.offset),
+        damping=0.0 if losses is None else losses.damping or 0.0,
+        friction=0.0 if losses is None else losses.friction or 0.0,
     )
 
 

@@ -25,11 +25,12 @@ def loads_of(robot: Robot) -> tuple[LinkLoad, ...]:
         T = T_shoulder_link[link.name] = T_shoulder_link[link.parent] @ link.at_rest(arm.resting)
         turned = link.joint is not None and link.joint.name in arm.chain.names
         count = axes[link.name] = axes[link.parent] + turned
+        if link.inertial is None:
+            continue
         # The fourth entry is the mass itself.
-        moment = link.mass * (T @ np.append(link.center, 1.0))
+        moment = link.inertial.mass * (T @ link.inertial.T_link_inertia[:, 3])
         moments[count] = moments.get(count, np.zeros(4)) + moment
     return tuple(
         LinkLoad(count, float(moment[3]), frozen(moment[:3] / moment[3]))
         for count, moment in moments.items()
-        if moment[3] > 0.0
     )

@@ -90,7 +90,7 @@ def _mjcf(job: ExportJob) -> Mapping[str, bytes]:
     from katana450.assembly.robot_session import find_arm
     from katana450.extensions.export.mjcf import mjcf_files
 
-    return mjcf_files(read_robot(job.options.urdf, None, find_arm), job.options.urdf)
+    return mjcf_files(read_robot(job.options.urdf, None, find_arm))
 
 
 FORMATS: Mapping[str, ExportFormat] = {

@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
+from katana450.arm.robot.urdf import Inertial
 from katana450.arm.robot.visual import PrimitiveShape, Visual
 from katana450.extensions.export.archive import zipped
 from katana450.extensions.export.excluded_pairs import excluded_pairs
 from katana450.extensions.export.home import home_of
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.obj_text import obj_text
-from katana450.extensions.export.physics import Drive, Inertial, drives_of, inertials_of, is_frame
+from katana450.extensions.export.physics import Drive, drives_of, is_frame
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -59,9 +59,9 @@ SCENE = {
 """Sky, light and floor of the scene."""
 
 
-def mjcf_files(robot: Robot, path: Path) -> dict[str, bytes]:
-    """Return name and content of the zip for ``robot``, whose URDF file is at ``path``."""
-    model = _Model(robot, path)
+def mjcf_files(robot: Robot) -> dict[str, bytes]:
+    """Return name and content of the zip for ``robot``."""
+    model = _Model(robot)
     (name,) = distinct([robot.name])
     files = {
         f"{name}.xml": _text(model.root()),
@@ -80,11 +80,10 @@ class _Model:
         meshes: text of each mesh by its name.
     """
 
-    def __init__(self, robot: Robot, path: Path) -> None:
+    def __init__(self, robot: Robot) -> None:
         self.meshes: dict[str, str] = {}
         self._robot = robot
-        self._inertials = inertials_of(path)
-        self._drives = drives_of(robot, path)
+        self._drives = drives_of(robot)
         self._assets = ET.Element("asset")
         shown = dict.fromkeys(shape.material for link in robot.links for shape in link.shapes)
         names = distinct(material.name for material in shown)
@@ -126,15 +125,14 @@ class _Model:
 
     def _add_body(self, parent: ET.Element, link: Link) -> None:
         place = _place(link.T_parent_link)
-        if is_frame(self._robot, link, self._inertials):
+        if is_frame(self._robot, link):
             ET.SubElement(
                 parent, "site", {"name": link.name, "size": SITE_RADIUS, "group": "4", **place}
             )
             return
         body = ET.SubElement(parent, "body", {"name": _body(link.name), **place})
-        inertial = self._inertials.get(link.name)
-        if inertial is not None:
-            body.append(_inertial(inertial))
+        if link.inertial is not None:
+            body.append(_inertial(link.inertial))
         if link.joint is not None:
             body.append(_joint(link.joint, self._drives[link.joint.name]))
         for shape in link.shapes:

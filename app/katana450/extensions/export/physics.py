@@ -1,19 +1,14 @@
-"""Masses, and properties of joints, that a URDF states and kinematics do not need."""
+"""Drives of joints for simulations, from the masses that a URDF states."""
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
-from katana450.assembly.robot_files import read_urdf
-from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -41,28 +36,6 @@ CREDIBLE_RATIO = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Inertial:
-    """The mass of a link.
-
-    Attributes:
-        mass: [kg].
-        T_link_inertia: (4, 4) pose of the frame of ``moments``, its origin the centre of mass [m].
-        moments: (3, 3) inertia [kg m^2].
-    """
-
-    mass: float
-    T_link_inertia: FloatArray
-    moments: FloatArray
-
-    @property
-    def principal(self) -> tuple[FloatArray, FloatArray]:
-        """The principal moments (3,) [kg m^2], and their right-handed axes (3, 3) in the link."""
-        values, axes = np.linalg.eigh(self.moments)
-        axes = axes * np.sign(np.linalg.det(axes))
-        return values, self.T_link_inertia[:3, :3] @ axes
-
-
-@dataclass(frozen=True, eq=False)
 class Drive:
     """A position controller of a joint, and the losses of the joint.
 
@@ -84,52 +57,21 @@ class Drive:
     max_force: float
 
 
-def inertials_of(path: Path) -> dict[str, Inertial]:
-    """Return the masses of the links of the URDF file at ``path`` that state one above 0."""
-    found: dict[str, Inertial] = {}
-    for link in ET.fromstring(read_urdf(path)).iterfind("link"):
-        inertial, mass = link.find("inertial"), link.find("inertial/mass")
-        if inertial is None or mass is None or float(mass.get("value", "0")) <= 0.0:
-            continue
-        ixx, ixy, ixz, iyy, iyz, izz = _numbers(
-            inertial.find("inertia"), ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-        )
-        found[link.get("name", "")] = Inertial(
-            float(mass.get("value", "0")),
-            _origin(inertial.find("origin")),
-            np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]),
-        )
-    return found
-
-
-def is_frame(robot: Robot, link: Link, inertials: Mapping[str, Inertial]) -> bool:
-    """Return whether ``link`` is only a frame on another: fixed, without mass, shape and children.
-
-    ``inertials``: the masses of the links of ``robot`` that have one.
-    """
+def is_frame(robot: Robot, link: Link) -> bool:
+    """Return whether ``link`` is only a frame: fixed, without mass, shape and children."""
     return not (
         link.parent is None
         or link.joint is not None
-        or link.name in inertials
+        or link.inertial is not None
         or link.collisions
         or robot.children(link)
         or any(len(shape.faces) for shape in link.shapes)
     )
 
 
-def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
-    """Return a drive for each movable joint of ``robot``, whose URDF file is at ``path``."""
-    inertials = inertials_of(path)
-    stated = {
-        joint.get("name", ""): (
-            *_numbers(joint.find("dynamics"), ("damping", "friction")),
-            *_numbers(joint.find("limit"), ("effort",)),
-        )
-        for joint in ET.fromstring(read_urdf(path)).iterfind("joint")
-    }
-    carried = {
-        joint.name: _carried(robot, link, joint, inertials) for link, joint in moved_links(robot)
-    }
+def drives_of(robot: Robot) -> dict[str, Drive]:
+    """Return a drive for each movable joint of ``robot``."""
+    carried = {joint.name: _carried(robot, link, joint) for link, joint in moved_links(robot)}
     found: dict[str, Drive] = {}
     for _, joint in moved_links(robot):
         # A drive carries the joints that follow it too.
@@ -142,10 +84,12 @@ def drives_of(robot: Robot, path: Path) -> dict[str, Drive]:
         inertia = sum(factor * factor * mass for factor, _, mass in moved)
         stiffness = load / SAG
         armature = max(INERTIA_RATIO * inertia, stiffness / MAX_FREQUENCY**2 - inertia)
-        damping, friction, effort = stated.get(joint.name, (0.0, 0.0, 0.0))
-        force = effort if CREDIBLE_RATIO * load <= effort < np.inf else FORCE_RATIO * load
+        is_credible = CREDIBLE_RATIO * load <= joint.effort < np.inf
+        force = joint.effort if is_credible else FORCE_RATIO * load
         spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
-        found[joint.name] = Drive(stiffness, armature, damping or spring, friction, force)
+        found[joint.name] = Drive(
+            stiffness, armature, joint.damping or spring, joint.friction, force
+        )
     return found
 
 
@@ -156,9 +100,7 @@ def moved_links(robot: Robot) -> Iterator[tuple[Link, Joint]]:
             yield link, link.joint
 
 
-def _carried(
-    robot: Robot, link: Link, joint: Joint, inertials: Mapping[str, Inertial]
-) -> tuple[float, float]:
+def _carried(robot: Robot, link: Link, joint: Joint) -> tuple[float, float]:
     """Return upper bounds on the weight [N m or N] and the inertia that ``joint`` moves."""
     load = inertia = 0.0
     farthest = {link.name: 0.0}
@@ -168,7 +110,7 @@ def _carried(
                 continue
             step = float(np.linalg.norm(other.T_parent_link[:3, 3])) + _travel(other)
             farthest[other.name] = farthest[other.parent] + step
-        inertial = inertials.get(other.name)
+        inertial = other.inertial
         if inertial is not None:
             offset = float(np.linalg.norm(inertial.T_link_inertia[:3, 3]))
             arm = 1.0 if joint.slides else farthest[other.name] + offset
@@ -185,18 +127,3 @@ def _travel(link: Link) -> float:
         return 0.0
     ends = [abs(end) for end in (joint.lower, joint.upper) if np.isfinite(end)]
     return max(ends, default=0.0)
-
-
-def _numbers(element: ET.Element | None, names: Sequence[str]) -> tuple[float, ...]:
-    """Return the numbers in attributes of ``element``; 0 for absent ones."""
-    return tuple(0.0 if element is None else float(element.get(name, "0")) for name in names)
-
-
-def _origin(element: ET.Element | None) -> FloatArray:
-    """Return the pose (4, 4) of an element <origin> [m]."""
-    if element is None:
-        return np.eye(4)
-    xyz, rpy = (
-        [float(part) for part in element.get(name, "0 0 0").split()] for name in ("xyz", "rpy")
-    )
-    return se3.from_rotation_translation(so3.from_rpy(*rpy), xyz)
