@@ -16,7 +16,7 @@ from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import Structure, structure_of
-from katana450.arm.robot.urdf import Urdf, UrdfJoint
+from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -76,9 +76,13 @@ def fingers_of(
     by_name = {joint.name: joint for joint in (*hand, *others)}
     notes = []
     for joint in hand:
-        found = _following(joint, by_name, follow) if joint.mimic is not None else None
-        if found is not None:
-            follow[joint.name] = found
+        leader = driver_of(joint, by_name)
+        if joint.mimic is not None and leader is not None and leader.joint in follow:
+            factor, offset = follow[leader.joint]
+            follow[joint.name] = (
+                leader.multiplier * factor,
+                leader.multiplier * offset + leader.offset,
+            )
     resting = {}
     for joint in by_name.values():
         if joint.name not in follow:
@@ -135,34 +139,6 @@ def _with_lead(
         lower, upper = upper, lower
     factor = (upper - lower) / (high - low)
     return factor, lower - factor * low
-
-
-def _following(
-    joint: UrdfJoint, joints: Mapping[str, UrdfJoint], follow: Mapping[str, tuple[float, float]]
-) -> tuple[float, float] | None:
-    """Return factor and offset of a joint that mimics another; None if it follows no finger.
-
-    Raises RobotDescriptionError if it mimics itself, directly or through others.
-    """
-    factor, offset = 1.0, 0.0
-    passed = [joint.name]
-    while joint.mimic is not None:
-        offset += factor * float(joint.mimic.offset or 0.0)
-        factor *= 1.0 if joint.mimic.multiplier is None else float(joint.mimic.multiplier)
-        above = joints.get(joint.mimic.joint)
-        if above is None:
-            return None
-        if above.name in passed:
-            raise RobotDescriptionError(
-                f"Joint {passed[0]!r} mimics {joint.mimic.joint!r}, which is not driven and "
-                "follows no driven joint. Name a driven joint in its <mimic>."
-            )
-        passed.append(above.name)
-        joint = above
-    if joint.name not in follow:
-        return None
-    a, b = follow[joint.name]
-    return factor * a, factor * b + offset
 
 
 SHOULDER_FRAME = "shoulder_frame"

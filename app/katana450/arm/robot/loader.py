@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from katana450.arm.robot.arm_reader import FindArm, arm_in
 from katana450.arm.robot.description import checked, explained, refuse_loops, unexpanded
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.urdf import Urdf, UrdfJoint, urdf_of
+from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of, urdf_of
 from katana450.arm.robot.visual import rods
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -65,20 +65,27 @@ def load(
 def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]]:
     """Return the tree, parents first, and sentences on its joints that cannot be moved."""
     above = {joint.child: joint for joint in urdf.joints.values()}
+    readable: dict[str, UrdfJoint] = {}
     joints: dict[str, Joint] = {}
     faults: list[str] = []
     for described in urdf.joints.values():
         try:
             if described.type != "fixed":
                 joints[described.name] = _joint(path, described)
+                readable[described.name] = described
         except RobotDescriptionError as error:
             faults.append(str(error))
     following: dict[str, Joint] = {}
-    for name, joint in joints.items():
-        try:
-            following[name] = _following(path, joint, joints)
-        except RobotDescriptionError as error:
-            faults.append(str(error))
+    for name, described in readable.items():
+        leader = driver_of(described, readable)
+        if leader is not None:
+            named, factor, offset = leader
+            following[name] = replace(joints[name], leader=named, factor=factor, offset=offset)
+        elif described.mimic is not None:
+            faults.append(
+                f"Joint {name!r} of {path.name} mimics {described.mimic.joint!r}, which is not "
+                "driven and follows no driven joint. Name a driven joint in its <mimic>."
+            )
     below: dict[str, list[FloatArray]] = {name: [] for name in urdf.links}
     for described in urdf.joints.values():
         below[described.parent].append(described.origin[:3, 3])
@@ -116,38 +123,15 @@ def _joint(path: Path, joint: UrdfJoint) -> Joint:
             upper = upper if joint.limit.upper is None else joint.limit.upper
         speed = speed if joint.limit.velocity is None else joint.limit.velocity
         effort = joint.limit.effort or 0.0
-    leader, factor, offset = joint.name, 1.0, 0.0
-    if joint.mimic is not None:
-        leader, factor, offset = joint.mimic
-        if leader == joint.name:
-            raise RobotDescriptionError(f"Joint {joint.name!r} of {path.name} mimics itself.")
     return Joint(
         name=joint.name,
         slides=MOVABLE[joint.type],
         axis=frozen(joint.axis / size),
         lower=lower,
         upper=upper,
-        leader=leader,
-        factor=factor,
-        offset=offset,
+        leader=joint.name,
         speed=speed,
         effort=effort,
         damping=joint.damping,
         friction=joint.friction,
     )
-
-
-def _following(path: Path, joint: Joint, joints: Mapping[str, Joint]) -> Joint:
-    """Return ``joint`` with the driven joint at the end of its chain of leaders as its leader."""
-    passed, named = [joint.name], joint.leader
-    while joint.leader != passed[-1]:
-        above = joints.get(joint.leader)
-        if above is None or above.name in passed:
-            raise RobotDescriptionError(
-                f"Joint {joint.name!r} of {path.name} mimics {named!r}, which is not driven and "
-                "follows no driven joint. Name a driven joint in its <mimic>."
-            )
-        passed.append(above.name)
-        factor, offset = joint.factor * above.factor, joint.factor * above.offset + joint.offset
-        joint = replace(joint, leader=above.leader, factor=factor, offset=offset)
-    return joint

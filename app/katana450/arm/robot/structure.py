@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from katana450.arm.robot.urdf import Urdf, UrdfJoint
+from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of
 from katana450.errors import RobotDescriptionError
 
 TOOL_FRAMES = (
@@ -155,17 +155,6 @@ class _Tree:
         """Return the maximum number of consecutive driven joints, beginning with ``joint``."""
         return self._depth[joint.child] + _drives(joint)
 
-    def leader(self, joint: UrdfJoint) -> UrdfJoint | None:
-        """Return the driven joint that ``joint`` follows, directly or not; None without one."""
-        passed: list[str] = []
-        leader: UrdfJoint | None = joint
-        while leader is not None and leader.mimic is not None:
-            if leader.name in passed:
-                return None
-            passed.append(leader.name)
-            leader = self.joints.get(leader.mimic.joint)
-        return leader
-
 
 def _is_called(link: str, frame: str) -> bool:
     """Return whether ``link`` is called ``frame``, with or without a prefix."""
@@ -241,7 +230,13 @@ def _listed(joints: Iterable[UrdfJoint]) -> str:
 def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoint]:
     """Return the next joints behind ``link``, without bars of ``axes`` that carry nothing."""
     found = tree.next_joints(link)
-    own = [j for j in found if j.mimic is None or tree.leader(j) not in axes or tree.depth(j)]
+    driven = {joint.name for joint in axes}
+
+    def is_bar(joint: UrdfJoint) -> bool:
+        leader = driver_of(joint, tree.joints)
+        return joint.mimic is not None and leader is not None and leader.joint in driven
+
+    own = [joint for joint in found if not is_bar(joint) or tree.depth(joint)]
     return own or found[:1]
 
 

@@ -147,6 +147,23 @@ class Urdf:
         return order
 
 
+def driver_of(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> UrdfMimic | None:
+    """Return the driven joint among ``joints`` that ``joint`` follows, directly or not.
+
+    Multiplier and offset are those of all joints between. A driven joint follows itself. None if
+    it follows none of them.
+    """
+    factor, offset, passed = 1.0, 0.0, [joint.name]
+    while joint.mimic is not None:
+        leader = joints.get(joint.mimic.joint)
+        if leader is None or leader.name in passed:
+            return None
+        factor, offset = factor * joint.mimic.multiplier, factor * joint.mimic.offset + offset
+        passed.append(leader.name)
+        joint = leader
+    return UrdfMimic(joint.name, factor, offset)
+
+
 FILENAME = re.compile(rb"filename\s*=\s*[\"']([^\"']*)[\"']")
 """The name of a mesh file in the contents of a URDF file."""
 
