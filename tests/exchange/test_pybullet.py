@@ -1,4 +1,4 @@
-"""The exported ROS package in PyBullet, as it is shipped: the same robot, and the same pictures."""
+"""The exported ROS package in PyBullet, as it is shipped: the same robot."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.robot import Robot
-from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
-from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.exchange.tools import PYBULLET, needs_package, run
 
 MASS = 4.8
@@ -72,53 +69,3 @@ def test_pybullet_loads_the_same_robot(
     ]
     colours = [[name, *np.round(rgba[:3], 4).tolist()] for name, *rgba in found["colours"]]
     assert sorted(colours) == sorted(shown)
-
-
-DRAW = """
-import json, sys
-import numpy as np
-import pybullet as bullet
-path, file = sys.argv[1:3]
-view, values = map(json.loads, sys.argv[3:5])
-bullet.connect(bullet.DIRECT)
-robot = bullet.loadURDF(path, useFixedBase=True)
-joints = {bullet.getJointInfo(robot, k)[1].decode(): k for k in range(bullet.getNumJoints(robot))}
-for name, value in values.items():
-    bullet.resetJointState(robot, joints[name], value)
-size = view["size"]
-*_, parts = bullet.getCameraImage(
-    size,
-    size,
-    bullet.computeViewMatrix(view["eye"], view["target"], (0.0, 0.0, 1.0)),
-    bullet.computeProjectionMatrixFOV(np.degrees(view["angle"]), 1.0, 0.05, 10.0),
-    renderer=bullet.ER_TINY_RENDERER,
-)
-blocks = (np.reshape(parts, (size // 2, 2, size // 2, 2)) >= 0).mean(axis=(1, 3))
-np.save(file, blocks >= 0.5)
-"""
-
-
-@needs_package(PYBULLET)
-@pytest.mark.long
-@pytest.mark.parametrize("pose", POSES)
-def test_pybullet_draws_the_reference_picture(
-    tmp_path: Path,
-    urdf: Path,
-    katana: Robot,
-    monkeypatch: pytest.MonkeyPatch,
-    pose: tuple[float, ...],
-) -> None:
-    """Its renderer needs no graphics card and tells which link is in each pixel."""
-    monkeypatch.setenv("PYTHONPATH", os.fspath(PYBULLET.folder))
-    view, values = camera(katana), katana.values(pose)
-    seen_from = {
-        # Twice as fine, because its pixels are half a pixel beside ours.
-        "size": 2 * SIZE,
-        "eye": view.eye.tolist(),
-        "target": view.target.tolist(),
-        "angle": FIELD_OF_VIEW,
-    }
-    words = (urdf, "seen.npy", json.dumps(seen_from), json.dumps(values))
-    run(sys.executable, "-c", DRAW, *words, folder=tmp_path)
-    theirs = np.load(tmp_path / "seen.npy")
-    assert overlap(theirs, silhouette(placed(URDF_PATH, values), view)) >= 0.98
