@@ -30,7 +30,6 @@ PACKAGES = {
     "cmake": "cmake",
     "/usr/include/GL/freeglut.h": "freeglut3-dev",
     "/usr/share/doc/libgl1-mesa-dri": "libgl1-mesa-dri",
-    "/usr/share/doc/libegl1": "libegl1",
     "xvfb-run": "xvfb",
     "xauth": "xauth",
     "xdotool": "xdotool",

@@ -33,7 +33,7 @@ from katana450.extensions.export.placed_object import PlacedObject
 from katana450.extensions.export.rows import DIGITS, NORMAL_DIGITS
 from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
-from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
+from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World, axis_angle
 from katana450.extensions.export.vrml_text import world_text, x3d_text
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -184,7 +184,10 @@ def _surroundings(robot: Robot, values: Mapping[str, float]) -> list[Node]:
                 "Viewpoint",
                 (
                     ("position", _rounded(_TURN @ view.eye, 6)),
-                    ("orientation", _axis_angle(_TURN @ looking(view.target - view.eye))),
+                    (
+                        "orientation",
+                        _rounded(axis_angle(_TURN @ looking(view.target - view.eye)), 9),
+                    ),
                     ("fieldOfView", FIELD_OF_VIEW),
                     ("description", title),
                 ),
@@ -233,13 +236,7 @@ def _placed(writing: _Writing, link: Link) -> Node:
 
 def _pose(T: FloatArray) -> tuple[tuple[str, Value], ...]:
     """Return the fields of a Transform with the pose ``T`` (4, 4)."""
-    return ("translation", _rounded(T[:3, 3], 9)), ("rotation", _axis_angle(T[:3, :3]))
-
-
-def _axis_angle(R: FloatArray) -> tuple[float, ...]:
-    w = so3.log(R)
-    angle = float(np.linalg.norm(w))
-    return _rounded([*(w / angle if angle else (0.0, 0.0, 1.0)), angle], 9)
+    return ("translation", _rounded(T[:3, 3], 9)), ("rotation", _rounded(axis_angle(T[:3, :3]), 9))
 
 
 def _dressed(

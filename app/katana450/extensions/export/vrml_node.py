@@ -12,6 +12,11 @@ from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
+
 
 class Type(Enum):
     """The VRML type of a field: SF types have a single value, MF types a list of values."""
@@ -191,3 +196,10 @@ class World:
     def named(self) -> dict[str, Node]:
         """Return every node with a DEF name, by that name."""
         return {n.name: n for top in self.nodes for n in top.walk() if n.name is not None}
+
+
+def axis_angle(R: FloatArray) -> list[float]:
+    """Return the rotation (3, 3) as an axis and an angle [rad]."""
+    w = so3.log(R)
+    angle = float(np.linalg.norm(w))
+    return [*(w / angle).tolist(), angle] if angle else [0.0, 0.0, 1.0, 0.0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
-from katana450.extensions.export.vrml_node import WIDTHS, Type
+from katana450.extensions.export.vrml_node import WIDTHS, Type, axis_angle
 from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.touch_model import TouchModel
@@ -272,13 +272,6 @@ class VrmlNodes(Nodes):
 
     def _link(self, link: str) -> NamedNode:
         """Return the node of a link with its pose in the root's frame; a tool can be set."""
-
-        def translation(state: State) -> FieldValue:
-            return [*self._pose(state, link)[:3, 3].tolist()]
-
-        def rotation(state: State) -> FieldValue:
-            return _axis_angle(self._pose(state, link)[:3, :3])
-
         arm = self._robot.arm
         other = f"{link} is not the tool frame of the arm and cannot be set. Set "
 
@@ -294,27 +287,17 @@ class VrmlNodes(Nodes):
             check_tool(orders)
             orders.R = _rotation(link, _given(link, value))
 
-        tool = arm is not None and link in arm.tools
+        is_tool = arm is not None and link in arm.tools
         why = other + ("a joint." if arm is None else f"{' or '.join(arm.tools)}.")
-        return NamedNode(
-            "Transform",
-            f"link {link}",
-            {
-                "translation": NamedField(Type.VECTOR, translation, move if tool else None, why),
-                "rotation": NamedField(Type.ROTATION, rotation, turn if tool else None, why),
-            },
-        )
+        node = _placed(f"link {link}", lambda state: self._pose(state, link), move, turn)
+        if is_tool:
+            return node
+        fields = {name: replace(field, put=None, why=why) for name, field in node.fields.items()}
+        return replace(node, fields=fields)
 
     def _object(self, name: str) -> NamedNode:
         def pose(state: State) -> FloatArray:
-            scene_object = _known_object(state, name)
-            return self._surroundings.pose(scene_object, state.x)
-
-        def rotation(state: State) -> FieldValue:
-            return _axis_angle(pose(state)[:3, :3])
-
-        def translation(state: State) -> FieldValue:
-            return [*pose(state)[:3, 3].tolist()]
+            return self._surroundings.pose(_known_object(state, name), state.x)
 
         def move(orders: FieldOrders, value: FieldValue | None) -> None:
             position = np.array(_out_of_the_hand(orders, name, value))
@@ -324,20 +307,33 @@ class VrmlNodes(Nodes):
             R = _rotation(name, _out_of_the_hand(orders, name, value))
             orders.others.append(cmd.MoveObject(name, R=R))
 
-        return NamedNode(
-            "Transform",
-            f"object {name}",
-            {
-                "translation": NamedField(Type.VECTOR, translation, move),
-                "rotation": NamedField(Type.ROTATION, rotation, turn),
-            },
-        )
+        return _placed(f"object {name}", pose, move, turn)
+
+
+Put = Callable[[FieldOrders, FieldValue | None], None]
+"""A function that sets a field."""
+
+
+def _placed(of: str, pose: Callable[[State], FloatArray], move: Put, turn: Put) -> NamedNode:
+    """Return the Transform of something at ``pose`` (4, 4), which can be moved and turned."""
+    return NamedNode(
+        "Transform",
+        of,
+        {
+            "translation": NamedField(
+                Type.VECTOR, lambda state: [*pose(state)[:3, 3].tolist()], move
+            ),
+            "rotation": NamedField(
+                Type.ROTATION, lambda state: axis_angle(pose(state)[:3, :3]), turn
+            ),
+        },
+    )
 
 
 def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, NamedNode]:
     """Return the Switch of a link or object, and the Material of its paint."""
 
-    def put(trait: AppearanceTrait) -> Callable[[FieldOrders, FieldValue | None], None]:
+    def put(trait: AppearanceTrait) -> Put:
         def changed(orders: FieldOrders, value: FieldValue | None) -> None:
             trait_value = tuple(value) if isinstance(value, list) else value
             orders.others.append(cmd.SetAppearance(name, trait, trait_value))
@@ -441,13 +437,6 @@ def _unit(given: list[float]) -> FloatArray | None:
         return None
     scaled = np.array([number / largest for number in given])
     return np.asarray(scaled / np.linalg.norm(scaled))
-
-
-def _axis_angle(R: FloatArray) -> list[float]:
-    """Return the VRML rotation (4,) of ``R`` (3, 3)."""
-    w = so3.log(R)
-    angle = float(np.linalg.norm(w))
-    return [*(w / angle).tolist(), angle] if angle else [0.0, 0.0, 1.0, 0.0]
 
 
 def _known_object(state: State, name: str) -> SceneObject:

@@ -75,14 +75,7 @@ def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None
         space.plot(*seen.T, color=ERROR, linewidth=1.1, label=names[1])
         space.scatter(*desired[0], color=INK, s=12)
         drawn += [desired, seen]
-    equal_axes(space, np.concatenate(drawn))
-    space.set_xlabel("x (mm)")
-    space.set_ylabel("y (mm)")
-    space.set_zlabel("z (mm)", labelpad=9.0)
-    for axis in (space.xaxis, space.yaxis, space.zaxis):
-        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-        axis.set_major_locator(plt.MaxNLocator(4))
-    space.view_init(elev=22.0, azim=-52.0)
+    _frame(plt, space, np.concatenate(drawn))
     space.legend(loc="upper center", bbox_to_anchor=(0.54, 0.06), fontsize=8.0)
 
 
@@ -173,6 +166,14 @@ LABEL_ITERATIONS = 30
 PARTS = 200
 """Number of parts of a path; the largest error of each is drawn."""
 
+ABOVE: dict[str, Any] = {
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "borderaxespad": 0.0,
+    "fontsize": 8.0,
+}
+"""Place of a legend above the upper right corner."""
+
 TIME = "time (s)"
 """Label of a time axis."""
 
@@ -188,25 +189,17 @@ def path_figure(paths: Sequence[PathTrace]) -> bytes:
         power = math.floor(math.log10(worst)) if worst > 0.0 else 0
         for number, path in enumerate(paths):
             desired, traced = 1e3 * path.desired, 1e3 * path.traced
-            label = {"label": "desired"} if number == 0 else {}
-            space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, **label)
-            label = {"label": "traced"} if number == 0 else {}
-            space.plot(*traced.T, color=AXES[0], linewidth=1.1, **label)
+            names = ("desired", "traced") if number == 0 else (None, None)
+            space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, label=names[0])
+            space.plot(*traced.T, color=AXES[0], linewidth=1.1, label=names[1])
             space.scatter(*desired[0], color=INK, s=14)
         sigma, errors = largest(paths)
         errors = 1e3 * errors / 10.0**power
         panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
         panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
-        equal_axes(space, 1e3 * np.concatenate([path.desired for path in paths]))
-        space.set_xlabel("x (mm)")
-        space.set_ylabel("y (mm)")
-        space.set_zlabel("z (mm)", labelpad=9.0)
+        _frame(plt, space, 1e3 * np.concatenate([path.desired for path in paths]))
         figure.text(0.02, 0.931, "Desired and traced path", fontsize=10.0, fontweight="bold")
         space.legend(loc="upper left", bbox_to_anchor=(0.01, 1.0), ncols=2, fontsize=8.0)
-        space.view_init(elev=22.0, azim=-52.0)
-        for axis in (space.xaxis, space.yaxis, space.zaxis):
-            axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
-            axis.set_major_locator(plt.MaxNLocator(4))
         panel.set_title("Position error of the kinematics")
         panel.set_xlabel("along the path (%)")
         panel.set_ylabel(f"error ($10^{{{power}}}$ mm)")
@@ -247,8 +240,7 @@ def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
                 plt.Line2D([], [], color=AXES[0], linewidth=1.4, label="setpoint"),
                 plt.Line2D([], [], **MEASURED, label="measured"),
             )
-            above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
-            panel.legend(handles=names, **above, ncols=2, fontsize=8.0)
+            panel.legend(handles=names, **ABOVE, ncols=2)
         _name_lines(panel, trace.t, degrees, [f"θ{n + 1}" for n in range(arm.chain.n)])
         panel.set_title("Joint variables")
         panel.set_xlabel(TIME)
@@ -275,10 +267,7 @@ def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
         upper.set_ylim(-115.0, 115.0)
         upper.set_title("Joint speeds as fractions of their limits")
         upper.set_ylabel("speed (% of limit)")
-        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
-        upper.legend(
-            **above, ncols=fractions.shape[1], fontsize=8.0, handlelength=1.1, columnspacing=1.0
-        )
+        upper.legend(**ABOVE, ncols=fractions.shape[1], handlelength=1.1, columnspacing=1.0)
         tools = [arm.kinematics_to(tool) for tool in trace.tools]
         rows = zip(tools, trace.q, trace.qd, strict=True)
         speeds = 1e3 * np.array([tool.tool_speed(q, qd) for tool, q, qd in rows])
@@ -299,7 +288,6 @@ def water_figure(pour: PourRecord) -> bytes:
         figure, (upper, lower) = plt.subplots(
             2, 1, figsize=(7.2, 5.0), sharex=True, layout="constrained"
         )
-        above = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0}
         volumes = (
             ("in the cup", pour.cup),
             ("in the basin", pour.basin),
@@ -315,7 +303,7 @@ def water_figure(pour: PourRecord) -> bytes:
         flow = _second(upper, "flow (ml/s)")
         lines += flow.plot(pour.t, pour.flow, color=AXES[4], linewidth=0.9, label="flow")
         flow.set_ylim(bottom=0.0)
-        upper.legend(handles=lines, **above, ncols=len(lines), fontsize=8.0)
+        upper.legend(handles=lines, **ABOVE, ncols=len(lines))
         lines = lower.plot(
             pour.t, np.degrees(pour.tilt), color=AXES[3], linewidth=1.4, label="tilt of the cup"
         )
@@ -326,7 +314,7 @@ def water_figure(pour: PourRecord) -> bytes:
         lip = _second(lower, "height (mm)")
         name = "lip above the water"
         lines += lip.plot(pour.t, 1e3 * pour.lip, color=AXES[0], linewidth=1.2, label=name)
-        lower.legend(handles=lines, **above, ncols=len(lines), fontsize=8.0)
+        lower.legend(handles=lines, **ABOVE, ncols=len(lines))
         return to_png(plt, figure)
 
 
@@ -337,6 +325,18 @@ def _second(panel: Any, label: str) -> Any:
     second.set_ylabel(label)
     second.grid(visible=False)
     return second
+
+
+def _frame(plt: Any, space: Any, points: FloatArray) -> None:
+    """Label the axes of a plot in space around ``points`` (n, 3) [mm], and set its view."""
+    equal_axes(space, points)
+    space.set_xlabel("x (mm)")
+    space.set_ylabel("y (mm)")
+    space.set_zlabel("z (mm)", labelpad=9.0)
+    space.view_init(elev=22.0, azim=-52.0)
+    for axis in (space.xaxis, space.yaxis, space.zaxis):
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis.set_major_locator(plt.MaxNLocator(4))
 
 
 def equal_axes(space: Any, points: FloatArray) -> None:

@@ -1,4 +1,7 @@
-"""Light from a surface to the camera: Lambert's cosine under three lamps and a bright sky."""
+"""Light to the camera: from surfaces, by Lambert's cosine, from the floor and the background.
+
+The room is that of the page. Three lamps and a bright sky light it.
+"""
 
 from __future__ import annotations
 
