@@ -23,8 +23,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
-from katana450.extensions.export.placed_object import initial_objects
-from katana450.extensions.export.vrml import world_of
+from katana450.extensions.export.vrml import initial_objects, world_of
 from katana450.extensions.export.vrml_node import FIELDS, Node, World
 from katana450.extensions.export.vrml_nodes import VrmlNodes
 from katana450.maths.geometry import se3, so3

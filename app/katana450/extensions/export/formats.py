@@ -60,8 +60,7 @@ def _x3d(job: ExportJob) -> Mapping[str, bytes]:
 
 
 def _world(job: ExportJob) -> World:
-    from katana450.extensions.export.placed_object import initial_objects
-    from katana450.extensions.export.vrml import world_of
+    from katana450.extensions.export.vrml import initial_objects, world_of
 
     objects = initial_objects(job.robot) if job.options.objects else ()
     return world_of(job.robot, job.values, job.motion, objects, plain=job.options.plain)

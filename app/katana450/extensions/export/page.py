@@ -3,13 +3,76 @@
 from __future__ import annotations
 
 import argparse
+import secrets
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import viser
+
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
+from katana450.arm.robot.object_meshes import Meshes
+from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
+from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.export.playback import chosen
-from katana450.extensions.export.recorded import recorded
+from katana450.extensions.joint_view.machine_view import FLOOR_GAP
+from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.progress import progress
+from katana450.extensions.water.nodes import WaterLayer
+from katana450.server.view.cameras import fixed_pose
+from katana450.server.view.controls import NoGestures
+from katana450.server.view.room import set_up_room
+from katana450.server.view.scene import ArmNodes
+from katana450.server.view.scene_objects import SceneObjectNodes
+from katana450.server.view.scenery import Scenery
+from katana450.server.viser_bridge.presets import Preset
+from katana450.server.viser_bridge.recording_page import titled
+from katana450.server.viser_bridge.viser_server import close_server, open_server
+
+
+def recorded(
+    robot: Robot, session: Session, states: Iterable[State], interval: float, title: str
+) -> str:
+    """Return HTML that shows ``states``, ``interval`` [s] apart, with a slider for the time.
+
+    A caption in it has the ``title`` and the duration.
+    """
+    # The key is secret, so no client connects: only the messages of the server are used.
+    server = open_server(secrets.token_hex())
+    try:
+        show = _scene(server, robot, session)
+        look, camera = fixed_pose(Preset.FREE, robot), server.initial_camera
+        camera.position, camera.look_at = look.position, look.target
+        recording = server.get_scene_serializer()
+        number = 0
+        for number, state in enumerate(states):
+            if number:
+                recording.insert_sleep(interval)
+            show(state)
+        caption = f"{title}, {number * interval:.1f} s" if number else title
+        return titled(recording.as_html(), title, caption)
+    finally:
+        close_server(server)
+
+
+def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callable[[State], None]:
+    """Build the scene of ``robot``; return what shows a state in it."""
+    if robot.arm is None:
+        set_up_room(server, session.environment.table_height - FLOOR_GAP)
+        nodes = ArmNodes(server, robot)
+        objects = SceneObjectNodes(server, load_props(), session.environment, Meshes())
+
+        def show(state: State) -> None:
+            nodes.move(robot.joint_values(state.q, state.gripper))
+            objects.follow(state)
+
+        return show
+    layers = (ConduitLayer(), WaterLayer(), TracesLayer())
+    return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show
+
 
 FPS = 25.0
 """States per second in the page; states between them are left out."""

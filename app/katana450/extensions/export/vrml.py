@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,18 +25,57 @@ from katana450.arm.robot.initial_camera import (
     looking,
 )
 from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.robot.surfaces import Material, VisualMesh
+from katana450.arm.robot.surfaces import Material, VisualMesh, main_colour, shapes_of
+from katana450.arm.robot.visual import Visual
+from katana450.assembly.robot_session import arm_session
 from katana450.errors import InputError
 from katana450.extensions.export.names import distinct
-from katana450.extensions.export.placed_object import PlacedObject
 from katana450.extensions.export.rows import DIGITS, NORMAL_DIGITS
 from katana450.extensions.export.trajectory_file import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World, axis_angle
 from katana450.extensions.export.vrml_text import world_text, x3d_text
 from katana450.maths.geometry import so3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.settings import Settings
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedObject:
+    """An object at its place.
+
+    Attributes:
+        name: its name on a server.
+        T: (4, 4) its pose in the root's frame [m].
+        shapes: its surfaces in its own frame.
+    """
+
+    name: str
+    T: FloatArray
+    shapes: Sequence[VisualMesh]
+
+    @property
+    def colour(self) -> tuple[float, float, float]:
+        """The colour (sRGB, 0..1) of its largest part."""
+        return main_colour(self.shapes)
+
+
+def initial_objects(robot: Robot) -> tuple[PlacedObject, ...]:
+    """Return the objects that a new server has around ``robot``; none without an arm."""
+    if robot.arm is None:
+        return ()
+    props, ones = load_props(), frozen(np.ones(3))
+    files = {"cup": props.cup.mesh, "basin": props.basin.mesh}
+    session = arm_session(Settings(), robot).session
+    return tuple(
+        PlacedObject(
+            each.name, each.T, shapes_of(Visual(frozen(np.eye(4)), ones, files[each.name]))
+        )
+        for each in session.begin(session.ready, 0.0, 0.0).objects
+    )
+
 
 DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
     "All": VIEW_DIRECTION,

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Mapping
 from contextlib import redirect_stdout
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from sys import stderr
 from types import ModuleType
+from xml.etree.ElementTree import fromstring
 
-from katana450.atomic import write_files, writer_of
+from katana450.arm.robot.description import checked
 from katana450.errors import ConfigurationError
+from katana450.extensions.derived_urdf import derived_urdf
 from katana450.extensions.gallery.listed_robot import ListedRobot
 from katana450.extensions.xacro.ros_package import package_folder
 from katana450.extensions.xacro.xacro_file import expanded
-from katana450.platform_support import cache_folder
 
 PACKAGE_NAME = re.compile(r"package://([A-Za-z][\w-]*)/")
 """The beginning of the name of a mesh in a package of ROS."""
@@ -39,7 +40,7 @@ def file_of(robot: ListedRobot) -> Path:
             "`katana450 arms`."
         )
     packages = getattr(module, "XACRO_PACKAGE_PATHS", {})
-    return _expanded_file(robot, _existing(robot, Path(xacro)), _arguments(module), packages)
+    return _expanded_file(_existing(robot, Path(xacro)), _arguments(module), packages)
 
 
 def _downloaded(robot: ListedRobot) -> ModuleType:
@@ -87,36 +88,23 @@ def _arguments(module: ModuleType) -> dict[str, str]:
     return {str(name): str(value) for name, value in getattr(module, "XACRO_ARGS", {}).items()}
 
 
-def _expanded_file(
-    robot: ListedRobot, xacro: Path, arguments: Mapping[str, str], packages: Mapping[str, str]
-) -> Path:
-    """Return a file with the expansion of ``xacro``, in this user's folder for such files.
-
-    Its meshes have absolute names, because it lies outside its package.
-    """
+def _expanded_file(xacro: Path, arguments: Mapping[str, str], packages: Mapping[str, str]) -> Path:
+    """Return a file with the expansion of ``xacro``, in this user's folder for such files."""
     before = os.environ.get("ROS_PACKAGE_PATH")
     folders = [*map(str, packages.values()), *([before] if before else [])]
     try:
         if folders:
             os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join(folders)
-        text = expanded(xacro, arguments).decode()
+        text = checked(xacro, partial(expanded, arguments=arguments)).decode()
 
         def absolute(match: re.Match[str]) -> str:
             folder = package_folder(match[1], xacro.parent)
             return match[0] if folder is None else f"file://{folder.resolve()}/"
 
-        data = PACKAGE_NAME.sub(absolute, text).encode()
+        text = PACKAGE_NAME.sub(absolute, text)
     finally:
         if before is None:
             os.environ.pop("ROS_PACKAGE_PATH", None)
         else:
             os.environ["ROS_PACKAGE_PATH"] = before
-    digest = hashlib.sha256(data).hexdigest()[:12]
-    file = cache_folder() / "katana450-gallery" / f"{robot.name}-{digest}.urdf"
-    if not file.is_file():
-        try:
-            file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_files({file: writer_of(data)}, 0o600)
-        except OSError as error:
-            raise ConfigurationError(f"{file} cannot be written: {error.strerror}.") from error
-    return file
+    return derived_urdf(fromstring(text), xacro, "gallery")

@@ -15,8 +15,7 @@ from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.export.page import FPS
-from katana450.extensions.export.recorded import recorded
+from katana450.extensions.export.page import FPS, recorded
 from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.hits import check_traceable
 from katana450.extensions.media.rendering_pool import RenderingPool, Shot
