@@ -28,6 +28,7 @@ from katana450.assembly.supervisor import (
     child_spec,
 )
 from katana450.cli import serve
+from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.live import recorder
 from katana450.platform_support import claim_file
@@ -132,5 +133,5 @@ def test_server_that_ends_early_reports_no_lost_episodes(
     config, ended = SimpleNamespace(episodes=tmp_path), threading.Event()
     for _ in range(2):
         found = recorder._episodes(config, Mock(), Mock(), ended)  # type: ignore[arg-type]
-        assert found == (None, None)
+        assert isinstance(found, InputError)
     assert not caplog.text

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import re
 import signal
@@ -30,12 +29,12 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import FOLDER, script_runs
 from katana450.extensions.recording.files.trimming import trim
-from katana450.extensions.recording.live import ring, script_notes
+from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.live.ring import Ring
-from katana450.extensions.recording.live.script_notes import (
-    ScriptNoter,
-    ScriptReader,
-    notes_folder,
+from katana450.extensions.recording.live.running_scripts import (
+    MAX_RUNS,
+    RunningScripts,
+    ScriptNote,
 )
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
@@ -192,7 +191,6 @@ def test_script_that_runs_is_attached_again_after_a_crash(server: AppServer, fol
         thread.join(20.0)
         client.clear_stop()
     assert text in scripts_of(before[-1]).values()
-    waited_for(lambda: not list(notes(folder, server)), "the note to be removed")
     (last,) = (each for each in katana450.open(kept(folder)).programs if each.name == "Long")
     assert last.end is not None
 
@@ -202,10 +200,6 @@ def suppressed(client: Client, text: str) -> None:
         client.run(text)
 
 
-def notes(folder: Path, server: AppServer) -> Iterator[Path]:
-    return notes_folder(folder / "ring", server.port).iterdir()
-
-
 def _attached(folder: Path, text: str) -> bool:
     """Return whether the newest file of ``folder``, which is being written, has ``text``."""
     files = recordings_in(folder)
@@ -213,22 +207,20 @@ def _attached(folder: Path, text: str) -> bool:
     return path is not None and text in scripts_of(path).values()
 
 
-def recorded_ring(folder: Path, notes: Path, times: tuple[tuple[float, float | None], ...]) -> None:
+def recorded_ring(folder: Path, times: tuple[tuple[float, float | None], ...]) -> RunningScripts:
     """Record 300 ticks from 1000 s in files of 100; scripts run at ``times`` [s]."""
     records: list[TickRecord] = []
     run(300, 1, records.append, swinging, odd=False)
-    kept = Ring(folder, header(), scripts=ScriptReader(notes))
-    noter = ScriptNoter(notes)
+    scripts = RunningScripts()
+    kept = Ring(folder, header(), scripts=scripts)
     for number, (began, ended) in enumerate(times):
-        noter.note(f"S{number}", f"name: S{number}\n", began, None)
-        if ended is not None:
-            noter.note(f"S{number}", f"name: S{number}\n", began, ended)
-    waited_for(lambda: not noter.waits, "the notes")
+        scripts.note(ScriptNote(f"S{number}", f"name: S{number}\n", began, ended))
     for number, each in enumerate(records):
         kept.put(each)
         if number % 50 == 49:
             kept.sync()
     kept.close()
+    return scripts
 
 
 @pytest.mark.long
@@ -236,9 +228,9 @@ def test_each_file_of_a_ring_has_the_scripts_that_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ring, "MAX_FILE_TICKS", 100)
-    folder, notes = tmp_path / "ring", tmp_path / "notes"
+    folder = tmp_path / "ring"
     # One that ended before the first tick, one that ended, and one that runs to the end.
-    recorded_ring(folder, notes, ((900.0, 901.0), (1000.1, 1000.5), (1000.2, None)))
+    scripts = recorded_ring(folder, ((900.0, 901.0), (1000.1, 1000.5), (1000.2, None)))
     files = recordings_in(folder)
     assert [list(scripts_of(each).values()) for each in files] == [
         ["name: S1\n", "name: S2\n"],
@@ -250,28 +242,17 @@ def test_each_file_of_a_ring_has_the_scripts_that_run(
             (last,) = (each for each in script_runs([file]) if each.name == "S2")
         assert last.start == 1000.2
         assert last.end is None
-    # The note of the one that runs waits for the next process; a process that ends ends it.
-    assert [each.suffix for each in notes.iterdir()] == [".begun"]
-    ScriptNoter(notes)
-    waited_for(lambda: any(notes.glob("*.ended")), "the end of the script")
-    reader = ScriptReader(notes)
-    assert [each.ended is None for each in reader.read()] == [False]
-    assert not reader.read()
-    assert not list(notes.iterdir())
+    assert [run.name for run in scripts.read()] == ["S2"]
 
 
 def test_same_text_is_attached_once_and_each_run_is_listed(tmp_path: Path) -> None:
-    folder, notes = tmp_path / "ring", tmp_path / "notes"
-    notes.mkdir()
+    folder, scripts = tmp_path / "ring", RunningScripts()
     records: list[TickRecord] = []
     run(50, 1, records.append, swinging, odd=False)
-    kept = Ring(folder, header(), scripts=ScriptReader(notes))
-    noter = ScriptNoter(notes)
-    for at in (1000.1, 1000.2):
-        for ended in (None, at + 0.05):
-            # Names become names of files.
-            noter.note("../a b", "name: ../a b\nsteps: []\n", at, ended)
-    waited_for(lambda: not noter.waits, "the notes")
+    kept = Ring(folder, header(), scripts=scripts)
+    for began in (1000.1, 1000.2):
+        # Names become names of files.
+        scripts.note(ScriptNote("../a b", "name: ../a b\nsteps: []\n", began, began + 0.05))
     kept.put_all(records)
     kept.close()
     (path,) = recordings_in(folder)
@@ -285,37 +266,16 @@ def test_same_text_is_attached_once_and_each_run_is_listed(tmp_path: Path) -> No
     assert [each.end for each in programs] == pytest.approx([1000.15, 1000.25])
 
 
-def test_damaged_notes_are_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    notes = tmp_path / "notes"
-    assert ScriptReader(notes).read() == []
-    noter = ScriptNoter(notes)
-    noter.note("kept", "name: kept\n", 1.0, None)
-    waited_for(lambda: not noter.waits, "the note")
-    (notes / "00000000000000000002.begun").write_bytes(b"{")
-    old = {"name": "old", "text": "", "began": 3.0, "utc_offset": 0.0}
-    (notes / "00000000000000000003.begun").write_bytes(json.dumps(old).encode())
-    reader = ScriptReader(notes)
-    assert [each.name for each in reader.read()] == ["kept"]
-    assert caplog.text.count("is left out") == 2
-    assert [each.name for each in reader.read()] == ["kept"]
-    assert len(list(notes.iterdir())) == 1
-
-
-def test_notes_that_nobody_takes_are_bounded(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(script_notes, "MAX_NOTES", 3)
-    noter = ScriptNoter(tmp_path / "notes")
-    for number in range(5):
-        noter.note(f"S{number}", "", float(number), None)
-    waited_for(lambda: not noter.waits, "the notes")
-    assert len(list((tmp_path / "notes").iterdir())) == 3
-    assert caplog.text.count("is not attached") == 2
+def test_notes_that_nobody_takes_are_bounded() -> None:
+    scripts = RunningScripts()
+    for number in range(MAX_RUNS + 5):
+        scripts.note(ScriptNote(f"S{number}", "", float(number)))
+    assert [run.name for run in scripts.read()] == [f"S{n}" for n in range(5, MAX_RUNS + 5)]
 
 
 def test_changed_text_is_refused(tmp_path: Path) -> None:
-    folder, notes = tmp_path / "ring", tmp_path / "notes"
-    recorded_ring(folder, notes, ((1000.1, None),))
+    folder = tmp_path / "ring"
+    recorded_ring(folder, ((1000.1, None),))
     (path,) = recordings_in(folder)
     content = path.read_bytes()
     assert content.count(b"name: S0\n") == 1

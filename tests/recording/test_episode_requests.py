@@ -7,7 +7,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, HTTPServer
-from multiprocessing.connection import Listener
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,20 +16,16 @@ import pytest
 from katana450.client.episodes import EpisodeClient
 from katana450.client.files import LostError, RefusedError, Site
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes import interrupted, link
+from katana450.extensions.recording.episodes import interrupted
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
-from katana450.extensions.recording.episodes.link import EpisodeListener, request_episode
 from katana450.extensions.recording.episodes.routes import EpisodeRoutes
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.messages import EPISODES
 from katana450.extensions.recording.places import recordings_in
-from katana450.platform_support import pipe_address
 from katana450.server.web.http_api import RouteContext
-from tests.recording.episode_bench import ADA, Bench
-
-PORT = 8080
+from tests.recording.episode_bench import Bench
 
 
 def attempt(bench: Bench, **stop: object) -> None:
@@ -144,31 +139,11 @@ def test_interrupted_episode_is_finished_while_others_are_recorded(
     assert bench.ring.held is None
 
 
-def test_connection_that_fails_does_not_end_the_listener(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    accept, failing = Listener.accept, [True, True]
-
-    def accept_later(listener: Any) -> Any:
-        if failing:
-            failing.pop()
-            raise OSError("Too many open files")
-        return accept(listener)
-
-    monkeypatch.setattr(Listener, "accept", accept_later)
-    monkeypatch.setattr(link, "ACCEPT_SECONDS", 0.05)
-    folder = bench.folder.folder
-    EpisodeListener(bench.keeper, folder, pipe_address(folder, "test"), PORT, b"salt")
-    done = request_episode(folder, PORT, '{"do": "start", "task": "pour"}', ADA)
-    assert done["number"] == 1
-    assert caplog.text.count("Too many open files") == 1
-
-
 def test_people_who_only_watch_do_not_learn_where_files_are(tmp_path: Path) -> None:
     (tmp_path / "episode-0001.mcap").write_bytes(b"broken")
     hub = SimpleNamespace(shown={})
     context = RouteContext(hub, None, None, None)  # type: ignore[arg-type]
-    routes = EpisodeRoutes(context, tmp_path, PORT)
+    routes = EpisodeRoutes(context, tmp_path, None)  # type: ignore[arg-type]
     for paths in (True, False):
         told = json.dumps(routes._listed(paths=paths))
         assert "episode-0001.mcap" in told

@@ -1,19 +1,14 @@
-"""Episodes are not lost with a missing ring, and nobody waits for a process that hangs."""
+"""Episodes are not lost with a missing ring."""
 
 from __future__ import annotations
 
-import json
 import threading
-from multiprocessing.connection import Listener
 from pathlib import Path
 
 import pytest
 
 from katana450.cli.main import main
-from katana450.errors import InputError
-from katana450.extensions.recording.episodes import link
 from katana450.extensions.recording.episodes.episode_folder import EpisodeMarker
-from katana450.platform_support import pipe_address
 from tests.recording.episode_bench import Bench
 
 
@@ -65,15 +60,3 @@ def test_end_of_an_interrupted_episode_keeps_the_files_of_a_new_one(
     finishing.join()
     starting.join()
     assert bench.ring.held == bench.ring.newest
-
-
-def test_process_that_hangs_is_not_waited_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(link, "GREETING_SECONDS", 0.1)
-    address = pipe_address(tmp_path, "hangs")
-    with Listener(address):
-        about = {"port": 8080, "address": address, "key": "00" * 32}
-        (tmp_path / link.SERVER_FILE).write_text(json.dumps(about))
-        with pytest.raises(InputError, match="is not ready"):
-            link.connect_to_episodes(tmp_path, 8080)

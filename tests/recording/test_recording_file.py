@@ -35,6 +35,7 @@ from katana450.extensions.recording.files.recording_writer import RecordingWrite
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.live import recorder
+from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
@@ -369,7 +370,7 @@ def test_scene_of_a_server_is_attached_to_its_recordings(
     scene.write_text("objects: []\n", encoding="utf-8")
     facts = ServerFacts(Settings(), URDF_PATH, None, 8080, None)  # type: ignore[arg-type]
     config = recorder.RecorderConfig(facts, tmp_path / "ring", tmp_path / "episodes", scene)
-    kept, _ = recorder._ring(config)
+    kept, _ = recorder._ring(config, RunningScripts())
     run(20, 1, kept.put, swinging, odd=False)
     kept.close()
     (path,) = recordings_in(tmp_path / "ring")

@@ -15,7 +15,7 @@ from katana450.extension import ExtraProcess, ServerFacts, TickSender
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
-    from katana450.server.service.runner import Runner
+    from katana450.extensions.recording.live.recorder_link import RecorderLink
     from katana450.server.web.http_api import RouteContext
 
 
@@ -84,12 +84,15 @@ def routes(context: RouteContext) -> list[BaseRoute]:
     port = context.hub.stop_path.main_port
     folder: Path | None = None
     episodes: Path | None = None
+    link: RecorderLink | None = None
     if options is not None and not options.no_record:
-        from katana450.extensions.recording.episodes.follower import follow_episodes
+        from katana450.extensions.programs.server.program_runner import ProgramRunner
+        from katana450.extensions.recording.live.recorder_link import RecorderLink, recorder_file
 
         folder, episodes = options.record or default_folder(port), _episodes_folder(options, port)
-        follow_episodes(context.hub, episodes, port)
-        _note_scripts(context.hub.runner, folder, port)
+        link = RecorderLink(context.hub, recorder_file(folder, port))
+        if isinstance(context.hub.runner, ProgramRunner):
+            context.hub.runner.follow_run = link.note
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
@@ -102,21 +105,12 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         made: list[BaseRoute] = [*recording_routes(context, store)]
         made += JobRoutes(context, store).routes()
         made += PlaybackRoutes(context, store).routes()
-        if episodes is not None:
-            made += EpisodeRoutes(context, episodes, port).routes()
+        if episodes is not None and link is not None:
+            made += EpisodeRoutes(context, episodes, link).routes()
         return made
 
     names = [f"{ROOT}/{name}" for name in ("recording", "playback", "episodes")]
     return LateRoutes(names, make).routes()
-
-
-def _note_scripts(runner: Runner, folder: Path, port: int) -> None:
-    """Let the scripts that ``runner`` runs be attached to the recording in ``folder``."""
-    from katana450.extensions.programs.server.program_runner import ProgramRunner
-    from katana450.extensions.recording.live.script_notes import ScriptNoter, notes_folder
-
-    if isinstance(runner, ProgramRunner):
-        runner.follow_run = ScriptNoter(notes_folder(folder, port)).note
 
 
 def tick_sender(options: Namespace) -> TickSender | None:

@@ -28,11 +28,10 @@ from katana450.extensions.recording.episodes.episode_requests import (
     StartEpisode,
     episode_request,
 )
-from katana450.extensions.recording.episodes.follower import ENTRY
-from katana450.extensions.recording.episodes.link import (
-    READY_SECONDS,
+from katana450.extensions.recording.live.recorder_link import (
+    ENTRY,
     NotReadyError,
-    request_episode,
+    RecorderLink,
 )
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
@@ -48,6 +47,9 @@ Each has one of the few threads of the event loop, which others need too.
 """
 
 
+READY_SECONDS = 15.0
+"""[s] Maximum time for which the first episode waits for the process that records."""
+
 READY_CHECK_SECONDS = 0.1
 """[s] Time between two attempts to reach the process that records."""
 
@@ -55,10 +57,10 @@ READY_CHECK_SECONDS = 0.1
 class EpisodeRoutes:
     """The HTTP routes of episodes."""
 
-    def __init__(self, context: RouteContext, folder: Path, port: int) -> None:
-        """Serve the episodes in ``folder`` of the server on ``port`` to clients of ``context``."""
+    def __init__(self, context: RouteContext, folder: Path, link: RecorderLink) -> None:
+        """Serve the episodes in ``folder`` to clients of ``context``; ``link`` records them."""
         self._context = context
-        self._folder, self._port = folder, port
+        self._folder, self._link = folder, link
         self._read = EpisodeFolder(folder)
         self._waiting = 0
         self._listing = asyncio.Lock()
@@ -126,9 +128,7 @@ class EpisodeRoutes:
         try:
             while True:
                 try:
-                    done = await asyncio.to_thread(
-                        request_episode, self._folder, self._port, body.decode(), giver_of(actor)
-                    )
+                    done = await asyncio.to_thread(self._link.ask, decoded, giver_of(actor))
                     break
                 except NotReadyError:
                     if not waits or time.monotonic() >= ready_by:

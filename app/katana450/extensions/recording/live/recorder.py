@@ -18,12 +18,13 @@ from katana450.assembly.record_pipe import connected_to_ticks
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.errors import InputError
 from katana450.extension import ServerFacts
+from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import lower_priority
 
 if TYPE_CHECKING:
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
-    from katana450.extensions.recording.episodes.link import EpisodeListener
     from katana450.extensions.recording.files.header import RecordingHeader
+    from katana450.extensions.recording.live.recorder_link import RecorderListener
     from katana450.extensions.recording.live.ring import Ring
 
 START_DELAY = 3.0
@@ -69,15 +70,20 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
     try:
         pipe = connected_to_ticks(facts.address, supervisor.ended)
         supervisor.ended.wait(START_DELAY)
-        ring, header = _ring(config)
-        keeper, listener = _episodes(config, ring, header, supervisor.ended)
+        scripts = RunningScripts()
+        ring, header = _ring(config, scripts)
+        if supervisor.ended.is_set():
+            return
+        keeper = _episodes(config, ring, header, supervisor.ended)
+        listener = _listener(config, keeper, scripts, header.salt, supervisor.ended)
         try:
             while True:
                 _receive(pipe, ring)
                 pipe = connected_to_ticks(facts.address, supervisor.ended)
         finally:
-            if keeper is not None and listener is not None:
+            if not isinstance(keeper, InputError):
                 keeper.close()
+            if listener is not None:
                 listener.close()
             ring.close()
     except EOFError:
@@ -85,11 +91,10 @@ def run_recorder(config: RecorderConfig, supervisor: SupervisorPipe) -> None:
         return
 
 
-def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
+def _ring(config: RecorderConfig, scripts: RunningScripts) -> tuple[Ring, RecordingHeader]:
     from katana450.assembly.robot_session import find_robot
     from katana450.extensions.recording.files.header import attached_scene, header_of
     from katana450.extensions.recording.live.ring import Ring
-    from katana450.extensions.recording.live.script_notes import ScriptReader, notes_folder
 
     facts = config.facts
     found = find_robot(facts.settings, facts.urdf, facts.tool)
@@ -98,35 +103,46 @@ def _ring(config: RecorderConfig) -> tuple[Ring, RecordingHeader]:
     header = header_of(
         found.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
     )
-    scripts = ScriptReader(notes_folder(config.folder, facts.port))
     return Ring(config.folder, header, scripts=scripts), header
 
 
 def _episodes(
     config: RecorderConfig, ring: Ring, header: RecordingHeader, ended: threading.Event
-) -> tuple[EpisodeKeeper, EpisodeListener] | tuple[None, None]:
-    """Return the keeper of the episodes, and what takes requests.
-
-    None if the folder forbids it, or the server ends.
-    """
-    if ended.is_set():
-        return None, None
+) -> EpisodeKeeper | InputError:
+    """Return the keeper of the episodes, or why there is none."""
     from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
     from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
-    from katana450.extensions.recording.episodes.link import EpisodeListener
 
     folder = EpisodeFolder(config.episodes)
     try:
         folder.claim()
-        keeper = EpisodeKeeper(folder, ring, config.folder, header.metadata["utc_offset_ns"])
-        address = f"{config.facts.address.name}-episodes"
-        listener = EpisodeListener(keeper, config.episodes, address, config.facts.port, header.salt)
+        return EpisodeKeeper(folder, ring, config.folder, header.metadata["utc_offset_ns"])
+    except (InputError, OSError) as error:
+        # A server that ends removes its folders.
+        if not ended.wait(END_NOTICE_TIME):
+            log.error("Episodes cannot be recorded: %s", error)
+        return InputError(f"Episodes cannot be recorded: {error}")
+
+
+def _listener(
+    config: RecorderConfig,
+    keeper: EpisodeKeeper | InputError,
+    scripts: RunningScripts,
+    salt: bytes,
+    ended: threading.Event,
+) -> RecorderListener | None:
+    """Return what takes requests of the page's server; None if it cannot, or the server ends."""
+    from katana450.extensions.recording.live.recorder_link import RecorderListener, recorder_file
+
+    file = recorder_file(config.folder, config.facts.port)
+    try:
+        address = f"{config.facts.address.name}-recorder"
+        return RecorderListener(keeper, scripts, file, address, salt)
     except (InputError, OSError) as error:
         # A server that ends removes the folder of the address.
         if not ended.wait(END_NOTICE_TIME):
-            log.error("Episodes cannot be recorded: %s", error)
-        return None, None
-    return keeper, listener
+            log.error("Episodes and scripts cannot be recorded: %s", error)
+        return None
 
 
 def _receive(pipe: Connection, ring: Ring) -> None:

@@ -22,7 +22,7 @@ from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.live.run_events import RunEvents
-from katana450.extensions.recording.live.script_notes import ScriptReader
+from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.platform_support import claim_file, create_file
 
@@ -92,7 +92,7 @@ class Ring:
         folder: Path,
         header: RecordingHeader,
         clock: Callable[[], float] = time.monotonic,
-        scripts: ScriptReader | None = None,
+        scripts: RunningScripts | None = None,
     ) -> None:
         """Use ``folder``, which need not exist. Files that a crash left open are repaired.
 
@@ -213,14 +213,15 @@ class Ring:
         """Attach the scripts that run, or have run since the last sync. Raises OSError."""
         if self._writer is None or self._scripts is None or self._unsynced_t > self.last_t:
             return
-        for name, text, since, ended in self._scripts.read():
+        for run in self._scripts.read():
+            since, ended = run.began, run.ended
             if ended is not None and ended < self._first_t:
                 continue
             for began, t in ((True, since), (False, ended)):
                 if t is not None:
                     # A time without ticks is not part of the recording.
                     at = min(max(t, self._unsynced_t), self.last_t)
-                    self._writer.script(at, name, text, since, began=began)
+                    self._writer.script(at, run.name, run.text, since, began=began)
         self._unsynced_t = math.inf
 
     def lost(self, t: float, ticks: int) -> None:

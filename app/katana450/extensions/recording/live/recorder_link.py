@@ -1,0 +1,350 @@
+"""The connection between the page's server and the process that records.
+
+The process that records listens in the private folder of the server. Address and key stand in a
+file of the folder of the ring that only this user can read. Requests about episodes and notes of
+scripts go to it; answers and the state of the episodes come back.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import secrets
+import threading
+import time
+import weakref
+from contextlib import suppress
+from itertools import count
+from multiprocessing import AuthenticationError
+from multiprocessing.connection import Client, Listener, answer_challenge, deliver_challenge
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
+from katana450.atomic import write_files, writer_of
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode import EpisodeGiver
+from katana450.extensions.recording.episodes.episode_requests import AnyEpisodeRequest
+from katana450.extensions.recording.live.running_scripts import RunningScripts, ScriptNote
+from katana450.extensions.recording.pseudonyms import Pseudonyms
+from katana450.server.service.hub import Hub
+
+if TYPE_CHECKING:
+    from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
+
+IDLE_SECONDS = 60.0
+"""[s] Maximum time between two states of the episodes while nothing changes."""
+
+ACTIVE_SECONDS = 0.5
+"""[s] Time between two states of the episodes while one runs."""
+
+ACCEPT_SECONDS = 0.5
+"""[s] Time after a connection that could not be accepted until the next one."""
+
+START_DELAY = 2.0
+"""[s] Time in which the process that records is not yet ready."""
+
+RECONNECT_SECONDS = 0.5
+"""[s] Time between two attempts to reach the process that records."""
+
+GREETING_SECONDS = 5.0
+"""[s] Maximum time for which the page's server waits until the process that records greets it."""
+
+ANSWER_SECONDS = 300.0
+"""[s] Maximum time for which a request waits for its answer, such as the saving of an hour."""
+
+MAX_MESSAGE_BYTES = 1_000_000
+
+MAX_REPEATED = 20
+"""Number of runs of scripts that are noted again by a process that records and has just started."""
+
+ENTRY = "episodes"
+"""Name of the state of episodes in the status of all pages."""
+
+NOT_READY = (
+    "The process that records is not ready. It starts a few seconds after the arm; try it again."
+)
+ENDED = "The process that records has ended. It is started again; look at the list of episodes."
+SILENT = (
+    f"The process that records has not answered for {ANSWER_SECONDS:g} s. Look at the list of "
+    "episodes, and start the server again if this repeats."
+)
+
+log = logging.getLogger(__name__)
+
+
+class NotReadyError(InputError):
+    """Raised while no process records episodes."""
+
+
+class GivenRequest(msgspec.Struct, frozen=True, tag="request"):
+    """A request about episodes. The ``key`` of its giver becomes a pseudonym."""
+
+    number: int
+    request: AnyEpisodeRequest
+    by: EpisodeGiver
+
+
+class RequestAnswer(msgspec.Struct, frozen=True, tag="answer"):
+    """The answer to the request ``number``: the episode, or the reason why it is refused."""
+
+    number: int
+    episode: dict[str, Any] | None = None
+    why: str = ""
+
+
+class EpisodesState(msgspec.Struct, frozen=True, tag="state"):
+    """The state of the episodes for the pages."""
+
+    state: dict[str, Any]
+
+
+def recorder_file(ring: Path, port: int) -> Path:
+    """Return the file with address and key of the process that records for the page on ``port``."""
+    return ring.absolute() / f".recorder-{port}.json"
+
+
+class RecorderListener:
+    """Accepts the connection of the page's server in the process that records."""
+
+    def __init__(
+        self,
+        keeper: EpisodeKeeper | InputError,
+        scripts: RunningScripts,
+        file: Path,
+        address: str,
+        salt: bytes,
+    ) -> None:
+        """Listen at ``address``.
+
+        Args:
+            keeper: executes the requests about episodes; the reason if there are none.
+            scripts: takes the notes of scripts.
+            file: file for the address and the key.
+            address: a socket file in a private folder, or the name of a pipe of Windows.
+            salt: random bytes for the pseudonyms of people, as in the recording.
+
+        Raises:
+            InputError: the file cannot be written.
+            OSError: the address cannot be used.
+        """
+        self._keeper, self._scripts, self._pseudonyms = keeper, scripts, Pseudonyms(salt)
+        self._key = secrets.token_bytes(32)
+        # A process that was killed leaves its socket file.
+        with suppress(OSError):
+            Path(address).unlink()
+        self._closed = False
+        self._newest: Any = None
+        self._sending = threading.Lock()
+        # Without a key: a client that stalls in its handshake must not keep others out.
+        self._listener = Listener(address, backlog=8)
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        text = json.dumps({"address": address, "key": self._key.hex()}).encode()
+        write_files({file: writer_of(text)}, mode=0o600)
+        threading.Thread(target=self._accept, name="recorder link", daemon=True).start()
+        if not isinstance(keeper, InputError):
+            threading.Thread(
+                target=self._tick, args=(keeper,), name="episode clock", daemon=True
+            ).start()
+
+    def close(self) -> None:
+        """Take no more requests."""
+        self._closed = True
+        # Its socket may be gone with the private folder of the server.
+        with suppress(OSError):
+            self._listener.close()
+
+    def _accept(self) -> None:
+        reported = ""
+        while True:
+            try:
+                connection = self._listener.accept()
+            except OSError as error:
+                if self._closed:
+                    return
+                # As when too many files are open: later connections may be accepted.
+                if reported != (reported := str(error)):
+                    log.error("The page's server could not be accepted: %s.", error)
+                time.sleep(ACCEPT_SECONDS)
+                continue
+            threading.Thread(
+                target=self._serve, args=(connection,), name="recorder link", daemon=True
+            ).start()
+
+    def _tick(self, keeper: EpisodeKeeper) -> None:
+        """Let the keeper look at the time while an episode runs."""
+        while True:
+            keeper.wait(keeper.revision, ACTIVE_SECONDS if keeper.active else 5.0)
+            try:
+                keeper.tick()
+            except Exception:
+                # The next look must come, whatever happened.
+                log.exception("The clock of the episodes met an error.")
+
+    def _serve(self, connection: Any) -> None:
+        with GuardedPipe(connection, "The connection of the page"), suppress(AuthenticationError):
+            deliver_challenge(connection, self._key)
+            answer_challenge(connection, self._key)
+            # The page's server before this one has ended, and with it what it ran.
+            self._newest = connection
+            self._scripts.end_all(time.perf_counter())
+            self._in_thread(self._send_states, connection)
+            decoder = msgspec.json.Decoder(GivenRequest | ScriptNote)
+            while True:
+                message = decoder.decode(connection.recv_bytes(MAX_MESSAGE_BYTES))
+                if isinstance(message, ScriptNote):
+                    self._scripts.note(message)
+                else:
+                    # So that the saving of a long episode delays no other request.
+                    self._in_thread(self._answer, connection, message)
+        if self._newest is connection:
+            self._scripts.end_all(time.perf_counter())
+        connection.close()
+
+    def _in_thread(self, work: Any, *given: Any) -> None:
+        threading.Thread(target=work, args=given, name="episode request", daemon=True).start()
+
+    def _send(self, connection: Any, message: msgspec.Struct) -> None:
+        with self._sending:
+            connection.send_bytes(msgspec.json.encode(message))
+
+    def _send_states(self, connection: Any) -> None:
+        """Send the state whenever it changes, until the other end closes."""
+        keeper = self._keeper
+        if isinstance(keeper, InputError):
+            return
+        with suppress(*PIPE_ERRORS):
+            while self._newest is connection:
+                revision = keeper.revision
+                self._send(connection, EpisodesState(keeper.status()))
+                keeper.wait(revision, ACTIVE_SECONDS if keeper.active else IDLE_SECONDS)
+
+    def _answer(self, connection: Any, given: GivenRequest) -> None:
+        by = msgspec.structs.replace(given.by, key=self._pseudonyms.of(given.by.key))
+        try:
+            if isinstance(self._keeper, InputError):
+                raise self._keeper
+            answer = RequestAnswer(given.number, self._keeper.handle(given.request, by))
+        except InputError as error:
+            answer = RequestAnswer(given.number, why=str(error))
+        except Exception as error:
+            log.exception("A request about an episode met an error.")
+            why = f"The process that records met an error: {error}."
+            answer = RequestAnswer(given.number, why=why)
+        with suppress(*PIPE_ERRORS):
+            self._send(connection, answer)
+
+
+class RecorderLink:
+    """The end of the page's server. It connects in a thread of its own, again and again."""
+
+    def __init__(self, hub: Hub, file: Path, delay: float = START_DELAY) -> None:
+        """Show the state of the episodes to all pages of ``hub``.
+
+        ``file``: see ``recorder_file``; ``delay``: time until the first attempt to connect [s].
+        """
+        # The threads wait when this process ends, and must not keep the hub then.
+        self._hub, self._file, self._delay = weakref.ref(hub), file, delay
+        self._lock = threading.Lock()
+        self._numbers = count(1)
+        self._connection: Any = None
+        self._pending: dict[int, SimpleQueue[RequestAnswer]] = {}
+        self._runs: dict[float, ScriptNote] = {}
+        self._sent: SimpleQueue[msgspec.Struct] = SimpleQueue()
+        for work in (self._receive, self._send):
+            threading.Thread(target=work, name="recorder link", daemon=True).start()
+
+    def note(self, name: str, text: str, began: float, ended: float | None) -> None:
+        """Note that a script has begun, or ended. Returns at once."""
+        run = ScriptNote(name, text, began, ended)
+        with self._lock:
+            self._runs[began] = run
+            while len(self._runs) > MAX_REPEATED:
+                del self._runs[next(iter(self._runs))]
+        self._sent.put(run)
+
+    def ask(self, request: AnyEpisodeRequest, by: EpisodeGiver) -> dict[str, Any]:
+        """Send ``request`` of ``by`` to the process that records; return the episode.
+
+        Raises NotReadyError while no process records, and InputError if the request is refused.
+        """
+        answers: SimpleQueue[RequestAnswer] = SimpleQueue()
+        with self._lock:
+            if self._connection is None:
+                raise NotReadyError(NOT_READY)
+            number = next(self._numbers)
+            self._pending[number] = answers
+        self._sent.put(GivenRequest(number, request, by))
+        try:
+            answer = answers.get(timeout=ANSWER_SECONDS)
+        except Empty:
+            raise InputError(SILENT) from None
+        finally:
+            with self._lock:
+                self._pending.pop(number, None)
+        if answer.episode is None:
+            raise InputError(answer.why)
+        return answer.episode
+
+    def _send(self) -> None:
+        """Send what waits. What was sent to a process that has ended is answered by ``_lost``."""
+        while True:
+            message = self._sent.get()
+            connection = self._connection
+            if connection is not None:
+                with suppress(*PIPE_ERRORS):
+                    connection.send_bytes(msgspec.json.encode(message))
+
+    def _receive(self) -> None:
+        time.sleep(self._delay)
+        decoder = msgspec.json.Decoder(RequestAnswer | EpisodesState)
+        while True:
+            with suppress(*PIPE_ERRORS, ValueError, KeyError, TypeError, AuthenticationError):
+                connection = self._connected()
+                with self._lock:
+                    self._connection = connection
+                    for run in self._runs.values():
+                        self._sent.put(run)
+                while True:
+                    message = decoder.decode(connection.recv_bytes(MAX_MESSAGE_BYTES))
+                    if isinstance(message, EpisodesState):
+                        self._show(message.state)
+                    elif (waiting := self._pending.get(message.number)) is not None:
+                        waiting.put(message)
+            self._lost()
+            # A process that ends each connection must not keep this thread busy.
+            time.sleep(RECONNECT_SECONDS)
+
+    def _connected(self) -> Any:
+        """Return a connection on which both ends have shown that they know the key."""
+        found = json.loads(self._file.read_bytes())
+        connection: Any = Client(found["address"])
+        try:
+            # A process that hangs accepts connections too.
+            if not connection.poll(GREETING_SECONDS):
+                raise EOFError("The process that records does not answer.")
+            key = bytes.fromhex(found["key"])
+            answer_challenge(connection, key)
+            deliver_challenge(connection, key)
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    def _lost(self) -> None:
+        """Answer all requests that wait, because the process that records has ended."""
+        with self._lock:
+            connection, self._connection = self._connection, None
+            for number, waiting in self._pending.items():
+                waiting.put(RequestAnswer(number, why=ENDED))
+        if connection is not None:
+            connection.close()
+        self._show(None)
+
+    def _show(self, state: dict[str, Any] | None) -> None:
+        hub = self._hub()
+        if hub is not None:
+            hub.shown = {**hub.shown, ENTRY: state}

@@ -1,0 +1,144 @@
+"""The connection of the page's server to the process that records."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from multiprocessing.connection import Listener
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from katana450.arm.runtime.guarded_pipe import disconnect
+from katana450.errors import InputError
+from katana450.extensions.recording.episodes.episode_requests import StartEpisode, StopEpisode
+from katana450.extensions.recording.live import recorder_link
+from katana450.extensions.recording.live.recorder_link import (
+    ENTRY,
+    NotReadyError,
+    RecorderLink,
+    RecorderListener,
+    recorder_file,
+)
+from katana450.extensions.recording.live.running_scripts import RunningScripts
+from katana450.platform_support import pipe_address
+from tests.recording.episode_bench import ADA, Bench
+from tests.recording.test_recorder import waited_for
+
+
+class Page:
+    """The part of a hub that is used."""
+
+    def __init__(self) -> None:
+        self.shown: dict[str, Any] = {}
+
+
+@pytest.fixture(autouse=True)
+def _soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("ACCEPT_SECONDS", "RECONNECT_SECONDS"):
+        monkeypatch.setattr(recorder_link, name, 0.02)
+
+
+def linked(page: Page, file: Path) -> RecorderLink:
+    return RecorderLink(page, file, 0.0)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def listen(bench: Bench, tmp_path: Path) -> Callable[..., RunningScripts]:
+    """Return a function that listens in this process, and returns the scripts that it hears of."""
+
+    def begin(keeper: object = None) -> RunningScripts:
+        scripts, address = RunningScripts(), pipe_address(tmp_path, "test")
+        file = recorder_file(tmp_path, 8080)
+        RecorderListener(keeper or bench.keeper, scripts, file, address, b"salt")  # type: ignore[arg-type]
+        return scripts
+
+    return begin
+
+
+def test_requests_are_answered_and_the_state_is_shown(
+    bench: Bench,
+    listen: Callable[..., RunningScripts],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    accept, failing = Listener.accept, [True, True]
+
+    def accept_later(listener: Any) -> Any:
+        if failing:
+            failing.pop()
+            raise OSError("Too many open files")
+        return accept(listener)
+
+    monkeypatch.setattr(Listener, "accept", accept_later)
+    page = Page()
+    link = linked(page, recorder_file(tmp_path, 8080))
+    with pytest.raises(NotReadyError):
+        link.ask(StartEpisode(), ADA)
+    listen()
+    waited_for(lambda: page.shown.get(ENTRY), "the state")
+    assert caplog.text.count("Too many open files") == 1
+    begun = link.ask(StartEpisode(task="pour"), ADA)
+    assert begun["number"] == 1
+    # People are named by pseudonyms in a recording.
+    assert begun["by"]["key"] not in ("", ADA.key)
+    waited_for(lambda: page.shown[ENTRY]["running"], "the running episode")
+    with pytest.raises(InputError, match="runs already"):
+        link.ask(StartEpisode(), ADA)
+    bench.move(40)
+    assert link.ask(StopEpisode(), ADA)["outcome"] == "unjudged"
+
+
+def test_without_a_folder_of_episodes_the_reason_is_the_answer(
+    listen: Callable[..., RunningScripts], tmp_path: Path
+) -> None:
+    page = Page()
+    scripts = listen(InputError("Another server uses it."))
+    link = linked(page, recorder_file(tmp_path, 8080))
+    waited_for(lambda: link._connection, "the connection")
+    with pytest.raises(InputError, match="Another server uses it"):
+        link.ask(StartEpisode(), ADA)
+    link.note("turn", "name: turn", 1.0, None)
+    waited_for(lambda: scripts._runs, "the note")
+
+
+def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
+    listen: Callable[..., RunningScripts], tmp_path: Path
+) -> None:
+    page = Page()
+    link = linked(page, recorder_file(tmp_path, 8080))
+    link.note("early", "name: early", 1.0, None)
+    link.note("early", "name: early", 1.0, 2.0)
+    link.note("long", "name: long", 3.0, None)
+    scripts = listen()
+    waited_for(lambda: len(scripts._runs) == 2, "both notes")
+    early, running = scripts.read()
+    assert (early.ended, running.ended) == (2.0, None)
+    # One that has ended is returned once.
+    assert [run.name for run in scripts.read()] == ["long"]
+    # The process that records is started again.
+    newest = link._connection
+    scripts = listen()
+    disconnect(newest)
+    waited_for(lambda: 3.0 in scripts._runs, "the note for the new process")
+    waited_for(lambda: link._connection not in (None, newest), "the connection")
+    # The page's server ends.
+    link._file.unlink()
+    disconnect(link._connection)
+    waited_for(lambda: scripts._runs[3.0].ended is not None, "the end of the script")
+
+
+def test_process_that_hangs_is_not_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder_link, "GREETING_SECONDS", 0.05)
+    address, file = pipe_address(tmp_path, "hangs"), recorder_file(tmp_path, 8080)
+    page = Page()
+    with Listener(address):
+        file.write_text(json.dumps({"address": address, "key": "00" * 32}))
+        link = linked(page, file)
+        waited_for(lambda: ENTRY in page.shown, "the first attempt")
+        with pytest.raises(InputError, match="is not ready"):
+            link.ask(StartEpisode(), ADA)
