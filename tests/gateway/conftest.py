@@ -7,9 +7,8 @@ from collections.abc import Iterator
 import pytest
 
 from katana450.assembly.robot_session import DescribedRobot, find_robot
-from katana450.client import Client, connect
+from katana450.client import Client
 from katana450.resources import URDF_PATH
-from katana450.server.api import requests
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.browser.shared_server import SharedServer
@@ -48,15 +47,3 @@ def shared_server() -> Iterator[SharedServer]:
 def server(shared_server: SharedServer) -> AppServer:
     """Return the server in the state of a new one."""
     return shared_server.as_new()
-
-
-@pytest.fixture
-def live_program(server: AppServer) -> Iterator[Client]:
-    """Connect a program to the server in other processes, with the lease."""
-    with connect(server.url, "Test") as program:
-        program.clear_stop()
-        program.ask(requests.Speed(value=1.0))
-        yield program
-        program.clear_stop()
-        program.go(requests.Home())
-        program.ask(requests.ReleaseLease())

@@ -136,17 +136,6 @@ def test_server_drives_the_emulated_arm_and_keeps_a_log(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-def test_server_simulates_a_plant() -> None:
-    with AppServer((*APP, "--plant", "katana450")) as app, connect(app.url, "Test") as client:
-        assert measured(client).mode == "holding"
-        state = client.joints([0.0, -1.0, 1.0, 0.5, 0.0])
-        time.sleep(0.5)
-        state = client.query(answers.State)
-        away = np.degrees(np.abs(np.array(state.q) - [0.0, -1.0, 1.0, 0.5, 0.0]).max())
-        assert 0.0 < away < 0.15, "it droops"
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -169,11 +169,6 @@ def test_numbers_that_do_not_fit_are_refused_and_leave_the_codec_usable() -> Non
     assert host.send(requests.EchoRequest())
 
 
-def test_every_request_can_be_refused() -> None:
-    for request, _ in PAIRS:
-        assert host_events(request, [refusal_bytes()]) == [RequestRefused(request)]
-
-
 def test_unknown_status_is_said_to_be_unknown() -> None:
     assert status_words(AxisStatus.COLLIDED) == "a collision stopped it"
     assert status_words(77) == "it reports the unknown status 77"

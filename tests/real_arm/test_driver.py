@@ -20,7 +20,7 @@ from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.driver.machine import ArmMachine
 from katana450.extensions.real_arm.link.arm_url import ArmUrl
 from tests.real_arm.control_loop import SmallLoop, swing
-from tests.real_arm.paper_arm import ENDS, HOME, JOINTS, PaperArm
+from tests.real_arm.paper_arm import ENDS, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware
 
 
@@ -64,27 +64,6 @@ def orders(arm: PaperArm) -> list[requests.ArmRequest]:
         if isinstance(request, requests.SendSplines)
         or (isinstance(request, requests.CommandMotor) and request.flag in (4, 24, 0))
     ]
-
-
-@pytest.mark.long
-def test_motion_is_followed_over_a_connection() -> None:
-    with served() as (paper, _, loop):
-        loop.engage()
-        begun = time.perf_counter()
-        loop.setpoint = swing(JOINTS, begun)
-        time.sleep(1.5)
-        assert loop.report.mode is ArmMode.MOVING
-        loop.stop()
-        loop.wait(ArmMode.HOLDING)
-        stop = loop.report.measured_stop
-        assert stop is not None
-        assert stop.time < 0.3
-        errors = [
-            np.abs(q - report.expected[:5]).max() for _, report, q in loop.reports_since(begun)
-        ]
-        assert max(errors[:100]) < 0.03
-        assert not paper.arm.starved
-        assert 0.0 < loop.report.round_trip < 0.1
 
 
 @pytest.mark.cases(2)
@@ -198,11 +177,3 @@ def test_setpoint_that_is_not_finite_is_refused() -> None:
     with pytest.raises(InputError, match="must be finite"):
         driver.send(np.full(5, np.nan), 0.0, 0.0)
     driver.stop()
-
-
-def test_measured_joints_are_those_of_the_arm() -> None:
-    with served() as (paper, _, loop):
-        loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
-        time.sleep(0.2)
-        assert np.abs(loop.answers[-1][1].q - JOINTS[:5]).max() < 1e-9
-        assert (paper.arm.place == HOME).all()

@@ -64,16 +64,6 @@ def test_freeze_ends_a_calibration_without_calibrating() -> None:
     assert not all(axis.is_calibrated for axis in bench.arm.axes)
 
 
-def test_power_up_posture_is_the_same_however_time_is_cut() -> None:
-    def place(step: float) -> tuple[float, ...]:
-        bench = Bench(EmulatedArm(calibrated=True))
-        bench.move(1, 20000)
-        bench.wait(1.0, step=step)
-        return tuple(axis.plant.position for axis in bench.arm.axes)
-
-    assert place(0.01) == place(0.0025) == place(0.1)
-
-
 def test_target_is_reached_within_the_limits_that_the_host_set(bench: Bench) -> None:
     bench.ask(req.SetAxisParameter(1, 3, 100, 50))
     bench.ask(req.SetAxisParameter(1, 4, 2, 0))
@@ -280,15 +270,6 @@ def test_stops_are_the_limits_of_the_described_arm(robot: Robot) -> None:
     low, high = zip(*(sorted(pair) for pair in zip(*ends, strict=True)), strict=True)
     assert low == pytest.approx(chain.lower.tolist(), abs=math.radians(0.01))
     assert high == pytest.approx(chain.upper.tolist(), abs=math.radians(0.01))
-
-
-def test_status_of_each_axis_is_read_by_its_own_request_too(bench: Bench) -> None:
-    bench.move(3, -20000)
-    bench.wait(0.5)
-    reading = bench.ask(req.ReadAxis(3))
-    assert reading.status == 24
-    # Twice the speed, with the sign of falling counts, as on real arms.
-    assert reading.velocity == -20
 
 
 def test_unknown_axis_and_parameter_are_refused(bench: Bench) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import pytest
 
-from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from tests.real_arm.emulated import emulator, exchanged, linked, raw
+from tests.real_arm.emulated import emulator, exchanged, raw
 
 
 @pytest.fixture(scope="module")
@@ -35,16 +32,3 @@ def test_second_client_waits_for_the_end_of_the_first(port: int) -> None:
         first.close()
         second.settimeout(5.0)
         assert second.recv(16).hex() == "7ae381"
-
-
-def test_calibration_is_seen_by_polling_the_first_axis() -> None:
-    with emulator("--calibration-scale", "30") as port, linked(port) as link:
-        link.exchange(req.SetCollisionDetection(0))
-        link.exchange(req.CommandMotor(0, req.MotorFlag.CALIBRATE, 32000))
-        begun, polls = time.monotonic(), 0
-        while link.exchange(req.ReadAxis(1)).status == AxisStatus.CALIBRATING:  # type: ignore[attr-defined]
-            polls += 1
-            assert time.monotonic() - begun < 20.0
-        assert polls > 10
-        positions = link.exchange(req.ReadPositions()).positions  # type: ignore[attr-defined]
-        assert all(abs(abs(each) - 30500) < 100 for each in positions)

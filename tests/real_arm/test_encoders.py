@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import ConfigurationError
 from katana450.extensions.real_arm.encoders import EncoderMap
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, VARIANTS
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
 
 MAP = EncoderMap(DEFAULT_VARIANT)
 CALIBRATED = np.array([30500, -30500, -30500, 30500, 30500, 30500])
@@ -69,8 +69,3 @@ def test_joints_return_within_half_an_encoder(fractions: list[float]) -> None:
     sent = np.rint(MAP.encoders(joints))
     assert np.abs(sent - encoders).max() <= 0.5 + 1e-9
     assert (np.abs(MAP.joints(sent) - joints) <= (0.5 + 1e-9) * np.abs(MAP.scale)).all()
-
-
-def test_arm_without_gripper_has_five_driven_axes() -> None:
-    assert VARIANTS["6M180_F"].driven == (1, 2, 3, 4, 5)
-    assert DEFAULT_VARIANT.driven == (1, 2, 3, 4, 5, 6)

@@ -111,14 +111,6 @@ def test_bytes_without_a_request_are_found_before_the_next_one_is_sent() -> None
         assert firmware.requests == [requests.ReadPositions()]
 
 
-def test_numbers_that_do_not_fit_leave_the_link_usable() -> None:
-    with link_to(REPLY) as (link, firmware):
-        with pytest.raises(InputError):
-            link.exchange(requests.CommandMotor(1, 24, 40_000))
-        assert link.exchange(requests.ReadPositions()) == POSITIONS
-        assert len(firmware.requests) == 1
-
-
 def test_no_arm_is_reported() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

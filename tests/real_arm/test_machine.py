@@ -45,15 +45,6 @@ def test_connection_only_reads(talk: Conversation) -> None:
     assert report.sensors == tuple(map(float, range(16)))
 
 
-def test_setpoints_move_nothing_before_the_motors_are_engaged(talk: Conversation) -> None:
-    talk.connect()
-    talk.stopped = False
-    talk.setpoint = sway(talk.now)
-    talk.run(2.0)
-    assert not talk.motors
-    assert not talk.sent(SendSplines)
-
-
 def test_engage_freezes_each_axis_where_it_is(talk: Conversation) -> None:
     talk.engage()
     expected = [(0, MotorFlag.FLUSH), *((axis, MotorFlag.FREEZE) for axis in range(1, 7))]

@@ -84,14 +84,3 @@ def test_setpoint_beyond_the_limits_ends_at_them(talk: Conversation) -> None:
     assert talk.mode() is ArmMode.HOLDING
     assert talk.arm.place[0] == MAP.upper[0]
     assert talk.reports[-1][2][0] == pytest.approx(ENDS[0][0], abs=1e-9)
-
-
-def test_end_of_the_program_stops_what_moves(talk: Conversation) -> None:
-    talk.engage()
-    talk.setpoint = sway(talk.now)
-    talk.run(1.0)
-    talk.machine.freeze(talk.now)
-    talk._tick = np.inf
-    talk.run(0.5)
-    assert not talk.machine.moves
-    assert talk.mode() is ArmMode.HOLDING

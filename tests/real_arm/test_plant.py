@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.real_arm.plant.axis import PlantAxis
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.gravity import GravityLoads
-from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES, STIFF, profile_named
+from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES, STIFF
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 
@@ -76,24 +75,6 @@ def test_katana_plant_lags_by_its_delay_and_little_more(robot: Robot) -> None:
         tracked = max(tracked, float(np.abs(each.q - each.report.expected[:-1]).max()))
     # Far from the 3 degrees at which the session stops the arm.
     assert 0.02 < np.degrees(tracked) < 0.3
-
-
-def test_motion_is_the_same_on_each_run(robot: Robot) -> None:
-    first, second = (
-        driven(PlantDriver(robot, START, 0.0, KATANA450), 0.5, moved) for _ in range(2)
-    )
-    assert all((a.q == b.q).all() for a, b in zip(first, second, strict=True))
-
-
-def test_step_of_the_plant_takes_a_small_part_of_a_tick(robot: Robot) -> None:
-    driver = PlantDriver(robot, START, 0.0, KATANA450)
-    driver.start(0.0)
-    took = []
-    for n in range(1, 200):
-        begun = time.process_time()
-        driver.send(moved(n * TICK), 0.0, n * TICK)
-        took.append(time.process_time() - begun)
-    assert sorted(took)[len(took) // 2] < 0.05 * TICK
 
 
 def test_stop_brakes_where_the_arm_is_and_is_measured(robot: Robot) -> None:
@@ -214,8 +195,3 @@ def test_robot_without_an_arm_has_a_plant_without_weights() -> None:
     for n in range(1, 200):
         answer = driver.send(target, 0.0, n * TICK)
     assert np.allclose(answer.q, target, atol=1e-3)
-
-
-def test_unknown_profile_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match="stiff, katana450"):
-        profile_named("rubber")

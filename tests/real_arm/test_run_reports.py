@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import random
 import subprocess
 import sys
 from pathlib import Path
@@ -13,22 +12,9 @@ from typing import Any
 
 import pytest
 
-import katana450.extensions.programs
-from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.robot.loader import load
 from katana450.cli.main import main
-from katana450.client import connect
-from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.posture import loads_of_robot
-from katana450.extensions.real_arm.emulator.server import EmulatorServer
-from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.real_arm.emulated import ROOT
-from tests.real_arm.test_arm_commands import wait_for
-
-LIBRARY = Path(katana450.extensions.programs.__file__).parent / "library"
-LENIENT = ("--silence", "2.0", "--owner-silence", "6.0")
-"""A machine that others keep busy delays heartbeats."""
 
 SCRIPT = """
 name: Short line
@@ -119,39 +105,3 @@ def test_run_on_a_server_reports_what_it_has_measured(script: Path, tmp_path: Pa
     assert 15.0 <= found["tracking_lag_ms"] < 80.0
     assert 0.01 < found["measured_position_error_mm"] < 5.0
     assert (out / "measured.png").exists()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["circle_with_gripper", "pour"])
-def test_run_on_the_emulated_arm_with_slow_replies_is_reported_as_measured(
-    name: str, tmp_path: Path
-) -> None:
-    """Server and command are processes, with real time between them and the emulator."""
-    out = tmp_path / "report"
-    emulated = EmulatedArm(calibrated=True, loads=loads_of_robot(load()))
-    server = EmulatorServer(emulated, "127.0.0.1", 0, lambda: random.uniform(0.035, 0.045))
-    server.start()
-    try:
-        arm = ("--arm", f"tcp://127.0.0.1:{server.port}", *LENIENT)
-        record = ("--record", str(tmp_path / "recordings"))
-        with AppServer((*RECORDING_APP, *record, *arm)) as app:
-            with connect(app.url, "Test") as client:
-                for act, mode in ((ArmAct.CONNECT, "uncalibrated"), (ArmAct.ENGAGE, "holding")):
-                    client.ask(OperateArm(act=act, confirmed=True))
-                    wait_for(client, mode)
-                client.clear_stop()
-            command = ("run", str(LIBRARY / f"{name}.yaml"), "--speed", "0.5", "--url", app.url)
-            done = command_done(*command, "--report", str(out), seconds=300.0)
-            assert done.returncode == 0, done.stderr
-    finally:
-        server.stop()
-    assert "Commanded: the plan and its setpoints" in done.stdout
-    assert "Measured at the arm" in done.stdout
-    found = report_in(out)
-    assert found["measured"] == f"at {app.url}"
-    assert found["bounds_held"]
-    # Setpoints wait in the arm for 0.33 s; its driver knows that, so it is no tracking error.
-    assert 300.0 <= found["tracking_lag_ms"] < 600.0
-    assert 0.0 < found["joint_tracking_error_deg"] < 1.5
-    assert 0.0 < found["measured_position_error_mm"] < 2.0
-    assert found["executed_position_error_mm"] < 1e-6

@@ -5,24 +5,19 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.encoders import EncoderMap
 from katana450.extensions.real_arm.splines import (
-    LARGEST,
     SEGMENT_TICKS,
     TICK,
     SplineSegment,
     SplineStream,
-    joined,
 )
 from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
 from katana450.maths.geometry.arrays import FloatArray
 from tests.conftest import LONG
 
-EXAMPLES = 500 if LONG else 40
 MAP = EncoderMap(DEFAULT_VARIANT)
 START = np.array([1000, -12000, -15000, 15000, 9000, 20000])
 TICKS = np.arange(SEGMENT_TICKS + 1)
@@ -125,28 +120,6 @@ def test_motion_after_a_rest_begins_with_its_first_setpoint() -> None:
             ends.append(segment.end.position[0] - START[0])
     assert ends[:3] == [0, 0, 0]
     assert np.abs(ends[3] - (0.32 - 0.25) ** 2 * 20_000) <= 1.0
-
-
-Encoders = st.lists(st.integers(-32768, 32767), min_size=6, max_size=6)
-Speeds = st.lists(st.integers(-180, 180), min_size=6, max_size=6)
-
-
-@settings(max_examples=EXAMPLES)
-@given(Encoders, Speeds, Encoders, Speeds)
-def test_no_coefficient_overflows(
-    position: list[int], speed: list[int], target: list[int], final: list[int]
-) -> None:
-    limited = np.clip(position, MAP.lower, MAP.upper)
-    stream = SplineStream(limited.astype(int), MAP.speed)
-    begin = joined(stream.knot, limited, np.array(speed, float))
-    segments = [begin]
-    for _ in range(5):
-        goal = np.clip(target, MAP.lower, MAP.upper)
-        segments.append(joined(segments[-1].end, goal, np.array(final, float)))
-    for segment in segments:
-        assert (np.abs(segment.end.position) <= LARGEST + 1).all()
-        # Raises InputError for a number beyond 16 bits.
-        assert SendSplines(segment.axes(), More.START).payload
 
 
 def test_still_setpoints_end_at_rest() -> None:

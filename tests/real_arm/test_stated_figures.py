@@ -1,12 +1,10 @@
-"""Figures that the documents of the arm state: times of a stop, rates, retries, the plant."""
+"""Figures that the documents of the arm state: times of a stop, rates, the plant."""
 
 from __future__ import annotations
 
 import itertools
 import math
 import re
-import socket
-import time
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
-from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.real_arm.link.transport import LinkLostError, Transport
 from katana450.extensions.real_arm.plant.profile import KATANA450, STIFF
 from katana450.extensions.real_arm.splines import SplineStream
-from katana450.maths.geometry.arrays import FloatArray
 from tests.conftest import LONG
-from tests.real_arm.control_loop import SmallLoop
-from tests.real_arm.paper_arm import ENDS, JOINTS, MAP
-from tests.real_arm.small_firmware import SmallFirmware
-from tests.real_arm.test_driver import PaperServer
+from tests.real_arm.paper_arm import JOINTS, MAP
 from tests.real_arm.test_programs_with_emulator import PERIOD, EmulatorOnPaper
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -135,37 +125,3 @@ def test_friction_of_the_plant_leaves_an_axis_within_the_stated_angle() -> None:
     assert stated
     left = math.degrees(KATANA450.coulomb / KATANA450.bandwidth**2)
     assert left == pytest.approx(float(stated[1]), abs=5e-4)
-
-
-@pytest.mark.long
-def test_lost_arm_is_connected_to_again_after_a_quarter_to_two_seconds(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
-    tries: list[float] = []
-    opened = ArmUrl.open
-
-    def noted(url: ArmUrl) -> Transport:
-        tries.append(time.perf_counter())
-        if len(tries) > 1:
-            raise LinkLostError("The cable is out.")
-        return opened(url)
-
-    monkeypatch.setattr(ArmUrl, "open", noted)
-    paper = PaperServer()
-    loop = SmallLoop(KatanaDriver(ArmUrl("127.0.0.1", port), ENDS, JOINTS))
-    try:
-        with SmallFirmware(paper.answer, port):
-            loop.act(ArmAct.CONNECT, ArmMode.UNCALIBRATED)
-            paper.faults = [(None,)]
-            loop.wait(ArmMode.LOST)
-            lost = time.perf_counter()
-            time.sleep(8.5)
-    finally:
-        loop.end()
-    gaps: FloatArray = np.diff([lost, *tries[1:]])
-    for gap, stated in zip(gaps, (0.25, 0.5, 1.0, 2.0, 2.0), strict=False):
-        # A busy machine may delay a thread.
-        assert stated - 0.1 < gap < stated + 0.5
-    assert len(gaps) >= 4
