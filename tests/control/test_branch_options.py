@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.branch_options import branch_options
-from katana450.arm.control.modes import JointTarget, PoseTarget
+from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.maths.geometry import se3, so3
@@ -133,19 +133,6 @@ def test_target_is_kept_on_the_other_shoulder(
         for each, branch in ((state.target, state.branch), (back.target, back.branch))
     )
     assert np.allclose(T, T_back, atol=1e-12)
-
-
-def test_target_pose_is_kept_on_another_branch(
-    arm: ArmModel, session: Session, state: State
-) -> None:
-    T = se3.from_rotation_translation(so3.rotation_y(0.4), np.array([0.35, 0.0, 0.1]))
-    posed = take(session, state, cmd.SetPose(T))
-    down = take(session, posed, cmd.TakeBranch(Branch("front", "down")))
-    assert isinstance(down.target, PoseTarget)
-    assert down.goal[2] <= 0.0
-    assert np.allclose(point(arm, down.goal), T[:3, 3], atol=1e-9) == (
-        Reason.OUT_OF_REACH not in reasons(down)
-    )
 
 
 def test_branch_options_predict_the_result_of_taking_them(

@@ -181,25 +181,6 @@ def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWo
     assert near[-1] > STOP
 
 
-def test_steps_with_collision_world_replay_to_the_bit(guarded: Session) -> None:
-    start, commands, _ = INTO["base"]
-    ends = [run(guarded, standing(guarded, start), commands)[0] for _ in range(2)]
-    assert ends[0].setpoint.tobytes() == ends[1].setpoint.tobytes()
-    assert ends[0].findings == ends[1].findings
-
-
-def test_distant_collision_world_does_not_change_motion(session: Session, guarded: Session) -> None:
-    commands: list[cmd.Command] = [cmd.SetJoint(0, 1.0), cmd.SetGripper(0.2)]
-    free, kept = (each.begin(each.ready, 0.0, 0.0) for each in (session, guarded))
-    for _ in range(80):
-        free = session.step(free, commands, free.t + TICK)
-        kept = guarded.step(kept, commands, kept.t + TICK)
-        assert (free.setpoint == kept.setpoint).all()
-        assert free.gripper_setpoint == kept.gripper_setpoint
-        commands = []
-    assert kept.findings == ()
-
-
 def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> None:
     """Close to the base the other elbow has no room."""
     state = standing(guarded, np.radians((10.5, -75.6, 94.5, 88.4, 47.8)))

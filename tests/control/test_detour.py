@@ -177,15 +177,3 @@ def test_offer_of_another_state_is_refused(shipped: Session, held: State) -> Non
         after = shipped.step(state, [command], state.t + TICK)
         assert after.outcomes[0].verdict is Verdict.REFUSED
         assert after.detour is None
-
-
-def test_arm_on_a_detour_stops_like_on_every_plan(shipped: Session, offered: State) -> None:
-    state = shipped.step(offered, [cmd.Go()], offered.t + TICK)
-    for _ in range(60):
-        state = shipped.step(state, (), state.t + TICK)
-    assert not state.motion.at_rest
-    state = settled(shipped, state, cmd.Stop())
-    assert state.stopped is not None
-    after = shipped.step(state, [cmd.Go()], state.t + TICK)
-    assert after.outcomes[0].verdict is Verdict.REFUSED
-    np.testing.assert_array_equal(after.setpoint, state.setpoint)

@@ -22,7 +22,6 @@ from katana450.extensions.programs.curve import Linear, ToolArc, ToolLine
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
@@ -224,12 +223,6 @@ def test_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured
         other.check(cmd.Follow(poured))
 
 
-def test_go_along_without_a_plan_does_nothing(session: Session, state: State) -> None:
-    after = session.step(state, [cmd.GoAlong(1.0)], TICK)
-    assert after.setpoint is state.setpoint
-    assert after.following is None
-
-
 @pytest.mark.parametrize(
     "command",
     [
@@ -368,14 +361,3 @@ def test_invalid_goal_is_refused(arm: ArmModel, state: State) -> None:
     for goal in (np.full(5, math.nan), np.zeros(4), state.setpoint, np.full(5, 9.0)):
         with pytest.raises(InputError):
             plan_to(arm, None, state, goal)
-
-
-def test_plan_replays_to_the_bit(session: Session, poured: Plan) -> None:
-    commands: dict[int, list[cmd.Command]] = {
-        0: [cmd.Follow(poured)],
-        70: [cmd.GoAlong(0.0)],
-        150: [cmd.Stop()],
-    }
-    start = session.begin(poured.start, 0.0, 0.0)
-    ends: list[FloatArray] = [trace(session, start, commands, 300)[-1].setpoint for _ in range(2)]
-    assert ends[0].tobytes() == ends[1].tobytes()

@@ -220,20 +220,6 @@ def scene_object(name: str = "box", **changed: Any) -> SceneObject:
     return SceneObject(**(given | changed))
 
 
-def test_object_on_the_path_blocks_the_arm_until_it_is_removed(session: Session) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
-    high = scene_object(
-        size=(0.05, 0.4, 0.6), T=se3.from_rotation_translation(np.eye(3), (0.2, 0.35, 0))
-    )
-    state = session.step(state, [cmd.PlaceObject(high)], 0.01)
-    met = run(session, state, cmd.SetJoint(0, 1.2))
-    (contact,) = (f for f in met.findings if f.reason is Reason.CONTACT)
-    assert contact.parts is not None
-    assert "box" in contact.parts
-    free = run(session, met, cmd.Remove("box"))
-    assert free.q[0] == pytest.approx(1.2)
-
-
 def test_objects_are_replaced_by_name_and_limited_in_number(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
     commands: list[cmd.Command] = [

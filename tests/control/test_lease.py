@@ -129,15 +129,6 @@ def test_only_a_free_lease_is_granted() -> None:
     assert lease.take(CARA, 2.0).holder == CARA
 
 
-def test_spectator_cannot_affect_a_program() -> None:
-    for holder in (Lease(), Lease().acquire(ANNA, 1.0)):
-        for event in ("acquire", "take", "request"):
-            with pytest.raises(LeaseError, match="Dora may only watch"):
-                EVENTS[event](holder, DORA, ANNA, 2.0)
-    with pytest.raises(LeaseError, match="Dora may only watch"):
-        Lease().acquire(ANNA, 1.0).hand_over(ANNA, DORA, 2.0)
-
-
 def test_lease_goes_to_the_first_in_the_queue() -> None:
     lease = Lease().acquire(ANNA, 1.0).request(CARA).request(BERT)
     assert lease.waiting == (CARA, BERT)

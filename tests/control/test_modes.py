@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.modes import Idle, Jogging, Positioning, Servoing, Tracking
+from katana450.arm.control.modes import Jogging, Servoing, Tracking
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from tests.control.clearing import cleared
 
 TICK = 0.01
 
@@ -47,17 +45,6 @@ def point(session: Session, q: FloatArray) -> FloatArray:
     return forward(session.require_arm().chain, q)[:3, 3]
 
 
-def test_jog_after_a_stream_continues(session: Session, state: State) -> None:
-    state = streamed(session, state, 40)
-    jogged = run(session, state, JOG, 2)
-    for _ in range(60):
-        jogged = run(session, jogged, JOG)
-        assert jogged.jogging is not None
-        assert jogged.servo is None
-    moved = point(session, jogged.setpoint) - point(session, state.setpoint)
-    assert moved[1] > 0.04
-
-
 def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
     state = run(session, state, JOG, 30)
     dragged = run(session, state, FAR_DRAG)
@@ -74,13 +61,6 @@ def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
         assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
 
 
-def test_drag_replaces_a_stream(session: Session, state: State) -> None:
-    state = streamed(session, state, 40)
-    desired = np.add(point(session, state.goal), (0.0, 0.0, 0.05))
-    dragged = run(session, run(session, state, cmd.MoveTool(desired)), None, 200)
-    np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
-
-
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
     Jogging: lambda session, state: run(session, state, JOG),
     Servoing: lambda session, state: streamed(session, state, 1),
@@ -95,37 +75,6 @@ def test_later_mode_replaces_the_earlier_one(
     begun = BEGINNINGS[first](session, state)
     assert isinstance(begun.mode, first)
     assert isinstance(BEGINNINGS[second](session, begun).mode, second)
-
-
-def test_modes_in_random_order_all_end(session: Session, state: State) -> None:
-    rng = np.random.default_rng(13)
-    kinds: list[Callable[[State], cmd.Command]] = [
-        lambda _: JOG,
-        lambda state: cmd.Servo(state.goal + rng.normal(scale=0.01, size=5)),
-        lambda state: cmd.MoveTool(point(session, state.goal) + rng.normal(scale=0.1, size=3)),
-        lambda _: cmd.TurnTool(rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)),
-        lambda _: cmd.EndDrag(),
-        lambda _: cmd.Home(),
-        lambda _: cmd.SetTool(str(rng.choice(list(session.require_arm().tools)))),
-        lambda _: cmd.Hold(),
-        lambda _: cmd.Pause(),
-        lambda _: cmd.Resume(),
-        lambda _: cmd.Stop(),
-        lambda _: cmd.ClearStop(),
-    ]
-    for _ in range(1500):
-        command = kinds[rng.integers(len(kinds))](state)
-        if isinstance(command, cmd.ClearStop):
-            state = cleared(session, state)
-        state = run(session, state, command, int(rng.integers(1, 4)))
-        if state.stopped is not None:
-            assert isinstance(state.mode, Idle)
-    # Without further commands every mode but a pause ends.
-    state = run(session, cleared(session, state), cmd.Resume())
-    assert not math.isnan(state.setpoint.sum())
-    over = run(session, state, None, 600)
-    assert isinstance(over.mode, Idle | Positioning)
-    assert not over.moving
 
 
 def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(

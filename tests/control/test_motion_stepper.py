@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.modes import JointTarget
-from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -70,42 +69,6 @@ def test_stop_brings_the_arm_to_rest_and_reports_its_distance(
     way = math.dist(point(chain, moving.setpoint), point(chain, stopped.setpoint))
     assert finding.amount == pytest.approx(way, abs=1e-4)
     assert stopped.findings == (finding,)
-
-
-COMMANDS: list[cmd.Command] = [
-    cmd.SetJoint(0, 1.0),
-    cmd.SetJoints(FAR),
-    cmd.MoveTool(np.array([0.3, 0.2, 0.1])),
-    cmd.TurnTool(0.3, 0.3),
-    cmd.SetPose(np.eye(4)),
-    cmd.SetGripper(0.2),
-    cmd.Home(),
-    cmd.GoToZero(),
-    cmd.Hold(),
-    cmd.EndDrag(),
-    cmd.Pause(),
-    cmd.Resume(),
-    cmd.Jog(np.array([0.1, 0.0, 0.0, 0.0, 0.0])),
-]
-
-
-def test_stopped_arm_moves_only_after_clear_stop_and_a_new_command(
-    session: Session, state: State
-) -> None:
-    moving = run(session, state, [cmd.SetJoints(FAR), cmd.SetGripper(0.3)], 30)
-    stopped = run(session, moving, [cmd.Stop()], 200)
-    grip = moving.gripper_setpoint
-    for command in COMMANDS:
-        after = run(session, stopped, [command], 50)
-        assert (after.setpoint == stopped.setpoint).all(), command
-        assert after.gripper_setpoint == stopped.gripper_setpoint == grip
-        assert after.status is Status.STOPPED
-    released = run(session, stopped, [cmd.ClearStop()], 100)
-    assert released.status is Status.OK
-    assert (released.setpoint == stopped.setpoint).all()
-    assert isinstance(released.target, JointTarget)
-    assert released.gripper_setpoint == grip
-    assert run(session, released, [cmd.SetJoint(0, 1.0)], 5).moving
 
 
 def test_stop_overrides_motion_in_the_same_tick(session: Session, state: State) -> None:
@@ -185,23 +148,6 @@ def test_invalid_speed_is_refused(fraction: float) -> None:
         cmd.SpeedScale(fraction)
 
 
-@pytest.mark.parametrize("goals", [12, pytest.param(40, marks=pytest.mark.long)])
-def test_tool_keeps_its_maximum_speed(session: Session, state: State, goals: int) -> None:
-    rng = np.random.default_rng(7)
-    chain, fastest = session.require_arm().chain, 0.0
-    for number in range(goals):
-        goal = rng.uniform(chain.lower, chain.upper)
-        ticks = int(rng.integers(20, 200))
-        command: cmd.Command = cmd.SetJoints(goal)
-        if number % 4 == 3:
-            command = cmd.MoveTool(rng.uniform(-0.5, 0.5, 3))
-        for _ in range(ticks):
-            state = run(session, state, [command])
-            fastest = max(fastest, speed(chain, state.motion))
-            command = cmd.SpeedScale(1.0)
-    assert 0.8 * TOOL_SPEED < fastest <= TOOL_SPEED
-
-
 JOGS: dict[str, tuple[list[float], JogFrame]] = {
     "x": ([0.1, 0.0, 0.0, 0.0, 0.0], JogFrame.BASE),
     "z": ([0.0, 0.0, 0.1, 0.0, 0.0], JogFrame.BASE),
@@ -251,30 +197,6 @@ def test_jog_without_renewal_ends(session: Session, state: State) -> None:
     assert (held.setpoint == held.goal).all()
     assert held.jogging is None
     assert held.findings == ()
-
-
-@pytest.mark.long
-def test_arm_comes_to_rest_at_its_goal_after_a_jog(session: Session, state: State) -> None:
-    """Jogs in all directions follow each other until joints reach their limits."""
-    random = np.random.default_rng(5)
-    near = 0
-    for _ in range(60):
-        rates = np.zeros(5)
-        rates[random.integers(3)] = random.choice((-0.25, 0.25))
-        for _ in range(random.integers(2, 18)):
-            state = run(session, state, [cmd.Jog(rates)], 5)
-        near += not session.require_arm().chain.within_limits(state.setpoint, slack=-0.05)
-        state = run(session, state, [cmd.Jog(np.zeros(5))], 200)
-        assert not state.moving
-        assert (state.setpoint == state.goal).all()
-    assert near > 5
-
-
-def test_jog_stops_before_a_limit(session: Session, state: State) -> None:
-    chain = session.require_arm().chain
-    for _ in range(500):
-        state = run(session, state, [cmd.Jog(np.array([0.0, 0.3, 0.0, 0.0, 0.0]))])
-        assert chain.within_limits(state.setpoint, slack=0.0)
 
 
 def test_jog_beside_a_limit_never_reverses(session: Session) -> None:

@@ -17,7 +17,6 @@ from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.freedoms import pitch_and_roll
 
@@ -67,20 +66,6 @@ def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: S
         after = session.step(state, [cmd.SetJoint(0, 2.0)], t)
         assert (after.setpoint == state.setpoint).all()
         assert after.t == 0.0
-
-
-def test_steps_replay_to_the_bit(session: Session, state: State) -> None:
-    commands: list[list[cmd.Command]] = [
-        [cmd.MoveTool(np.array([0.3, 0.1 + 0.01 * i, 0.0])), cmd.SetGripper(0.01 * i)]
-        for i in range(20)
-    ]
-    first = second = state
-    for batch in commands:
-        first = session.step(first, batch, first.t + TICK)
-    for batch in commands:
-        second = session.step(second, batch, second.t + TICK)
-    assert first.setpoint.tobytes() == second.setpoint.tobytes()
-    assert first.goal.tobytes() == second.goal.tobytes()
 
 
 def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
@@ -207,30 +192,6 @@ def test_joint_stops_at_its_limit_and_reports_it(
     (finding,) = state.findings
     assert (finding.reason, finding.axis) == (Reason.AXIS_LIMIT, axis)
     assert finding.amount == limit
-
-
-def test_dragging_never_changes_the_branch(arm: ArmModel, session: Session, state: State) -> None:
-    rng = np.random.default_rng(450)
-    branch = state.branch
-    position = tool_point(arm, state)
-    for _ in range(400):
-        position = position + rng.normal(scale=0.03, size=3)
-        position = np.clip(position, -0.9, 0.9)
-        pitch, roll = pitch_and_roll(session.require_arm().chain, state.goal)
-        batch: list[cmd.Command] = [cmd.MoveTool(position)]
-        if rng.random() < 0.2:
-            batch.append(cmd.TurnTool(pitch + rng.normal(scale=0.3), roll + rng.normal(scale=0.3)))
-        state = run(session, state, batch)
-        assert state.branch == branch
-        assert arm.chain.within_limits(state.goal)
-        on = branch_of(arm.chain_to(state.tool), state.goal)
-        # A posture on the seam between two branches belongs to both.
-        r = (
-            math.cos(state.goal[0]) * tool_point(arm, state)[0]
-            + math.sin(state.goal[0]) * tool_point(arm, state)[1]
-        )
-        assert on.elbow == branch.elbow or abs(state.goal[2]) < 1e-6  # type: ignore[union-attr]
-        assert on.shoulder == branch.shoulder or abs(r) < 1e-6  # type: ignore[union-attr]
 
 
 def test_sliders_may_change_the_branch(session: Session, state: State) -> None:

@@ -11,19 +11,10 @@ from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import JogFrame
+from tests.control.test_session import run
 
-TICK = 0.01
 EXACT = 1e-6
 """[m] Tolerance of the tracker."""
-
-
-def run(session: Session, state: State, commands: list[cmd.Command], ticks: int = 1) -> State:
-    """Run ``ticks`` ticks; the commands are given in the first."""
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        commands = []
-    return state
 
 
 def pose(session: Session, state: State) -> FloatArray:
@@ -83,9 +74,3 @@ def test_steps_beyond_the_reach_do_not_pile_up(session: Session, state: State) -
     farthest = pose(session, state)[:3, 3]
     state = at_rest(session, run(session, state, [step(x=-0.02)]))
     assert pose(session, state)[0, 3] < farthest[0] - 0.01
-
-
-def test_stopped_arm_takes_no_step(session: Session, state: State) -> None:
-    stopped = run(session, state, [cmd.Stop()])
-    after = run(session, stopped, [step(z=0.01)], 100)
-    np.testing.assert_array_equal(after.setpoint, stopped.setpoint)

@@ -110,10 +110,3 @@ def test_mailbox_keeps_only_the_newest_of_a_stream(session: Session, state: Stat
         mailbox.put(each)
         kept = len(mailbox.drain().commands)
         assert kept == (1 if each.traits.stream or each.traits.safety else 2), each
-
-
-def test_stop_drops_waiting_commands(session: Session) -> None:
-    mailbox = Mailbox(session.check)
-    mailbox.put(cmd.Home())
-    mailbox.put(cmd.Stop())
-    assert mailbox.drain().commands == [cmd.Stop()]
