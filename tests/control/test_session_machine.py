@@ -199,7 +199,7 @@ def bounded(quick: int, many: int) -> settings:
 
 
 def test_arm_keeps_its_invariants() -> None:
-    run_state_machine_as_test(ArmRules, settings=bounded(16, 250))
+    run_state_machine_as_test(ArmRules, settings=bounded(12, 250))
 
 
 def test_joints_keep_their_invariants() -> None:

@@ -16,6 +16,7 @@ from katana450.arm.control.stopping import clear_refusal
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import jacobian_body
 from katana450.maths.kinematics.velocity import tool_speed, tool_speed_bound
+from tests.conftest import LONG
 
 TICK = 0.01
 
@@ -63,18 +64,20 @@ def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list
     return found
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_all_commands_keep_the_tool_speed(session: Session, seed: int) -> None:
     found = speeds(session, [each for group in ORDERS.values() for each in group], 3500, seed)
     assert 0.5 * TOOL_SPEED < max(found) <= TOOL_SPEED
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("kind", ["joints", "streams"])
 def test_repeated_jumps_keep_the_tool_speed(session: Session, kind: str) -> None:
     assert 0.8 * TOOL_SPEED < max(speeds(session, ORDERS[kind], 2500, 7)) <= TOOL_SPEED
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("size", "longest", "seed"),
     [
@@ -89,7 +92,7 @@ def test_fast_drags_keep_the_tool_speed(
     """The target leaps by up to ``size`` [m] every few ticks."""
     rng, wait, fastest = np.random.default_rng([450, seed]), 0, 0.0
     state = session.begin(anywhere(rng, session.require_arm()), 0.0, 0.0)
-    for _ in range(2500):
+    for _ in range(2500 if LONG else 1200):
         commands: list[cmd.Command] = []
         if wait == 0:
             commands = [cmd.MoveTool(rng.uniform(-size, size, 3))]
