@@ -106,10 +106,3 @@ def test_unknown_name_is_named() -> None:
 def test_any_text_has_a_finite_value_or_is_refused(text: str) -> None:
     with suppress(ExpressionError):
         assert math.isfinite(evaluate(text, NAMES).value)
-
-
-@given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
-def test_arithmetic_is_that_of_numbers(a: float, b: float) -> None:
-    names = {"a": Quantity(a, LENGTH), "b": Quantity(b, LENGTH)}
-    assert evaluate("a + b", names) == Quantity(a + b, LENGTH)
-    assert evaluate("a - 2 * b", names) == Quantity(a - 2 * b, LENGTH)

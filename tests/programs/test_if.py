@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,8 +10,7 @@ from katana450.arm.control.state import State
 from katana450.extensions.programs import runner
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.compiler import MAX_COPIES, Compiler
-from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
-from katana450.extensions.programs.pour import PourDemo
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
@@ -272,48 +269,6 @@ def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State
     with pytest.raises(ScriptError, match="no object 'jug'") as refused:
         planned(stage, "  - if: {held: jug, then: [home]}\n", empty)
     assert refused.value.problems[0].line == 3
-
-
-@pytest.mark.long
-def test_grasp_before_an_if_is_tried_again(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The basin is so near that it can only be reached at another pitch than the first one."""
-    monkeypatch.setattr(UntimedPath, "timed", lambda self: self)
-    lines = PourDemo(basin=(165.0, 286.0)).text.partition("expect:")[0].splitlines()
-    at = next(number for number, line in enumerate(lines) if line.startswith("  - pour"))
-    inner = [f"    {line}" for line in lines[at:]]
-    text = "\n".join([*lines[:at], "  - if:", "      time: {at_least: 0}", "      then:", *inner])
-    builder = PlanBuilder(stage.plan_context, stage.begin())
-    Compiler(parse(text), builder).all()
-    assert builder.taken is None
-
-
-@pytest.mark.long
-def test_missed_object_is_grasped_again(stage: Stage, empty: State) -> None:
-    """The cup is moved away before the fingers close, and back when they have opened again."""
-    text = (
-        "  - grasp: cup\n  - wait: 1\n"
-        "  - if: {held: cup, then: [{line: {by: {z: 60}}}], else: [{pick: cup}]}\n"
-    )
-    program = planned(stage, text, empty)
-    cup = next(each for each in empty.objects if each.name == "cup")
-    T = cup.T.copy()
-    T[:3, 3] = (0.0, 0.35, 0.0)
-    away = cmd.PlaceObject(replace(cup, T=T))
-    for missed in (True, False):
-        run, state, last = Run(empty.t), empty, ""
-        while run.phase is Phase.RUNNING and state.t < 60.0:
-            name = program.tasks[run.number].name
-            run, commands = runner.step(program, run, state, state.t)
-            if missed and name != last == "grasp cup: open" and run.choices:
-                commands = (cmd.PlaceObject(cup), *commands)
-            elif missed and not run.choices and name != last and name == "grasp cup: close":
-                commands = (away, *commands)
-            last = name
-            state = stage.session.step(state, commands, state.t + TICK)
-            state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
-        assert (run.phase, run.why) == (Phase.DONE, "")
-        assert run.choices == ((2, not missed),)
-        assert state.held is not None
 
 
 @pytest.mark.parametrize(

@@ -12,15 +12,12 @@ from typing import Any
 import pytest
 import yaml
 
-from katana450.cli.main import main
 from katana450.extensions.programs.circle import CircleDemo
 from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.source import Problem, ScriptError
 from tests.conftest import LONG
-from tests.programs.conftest import Stage
 from tests.programs.yaml_core import loaded
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -152,42 +149,3 @@ def test_wrong_fields_and_values_are_refused_with_their_place(name: str) -> None
 def test_damaged_text_is_refused_with_its_place(name: str) -> None:
     random = Random(name)
     assert sum(is_refused(damaged(SCRIPTS[name], random)) for _ in range(MISTAKES)) > 0
-
-
-@pytest.mark.long
-def test_two_hundred_mistakes_end_the_command_with_status_1(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file, report, random = tmp_path / "script.yaml", tmp_path / "report", Random(200)
-    refused = 0
-    while refused < 200:
-        text = mistaken(SCRIPTS[random.choice(sorted(SCRIPTS))], random)
-        problems = problems_of(text)
-        if not problems:
-            continue
-        refused += 1
-        file.write_text(text, encoding="utf-8")
-        assert main(["run", str(file), "--headless", "--report", str(report)]) == 1
-        printed = capsys.readouterr().err
-        first = problems[0]
-        assert f"{first.line}:{first.column}" in printed or f"line {first.line}" in printed, printed
-        # Nothing was run, so there is nothing to report.
-        assert not report.exists()
-
-
-@pytest.mark.long
-def test_places_that_planning_refuses_are_reported_with_their_line(stage: Stage) -> None:
-    random, refused = Random(19), 0
-    for _ in range(200):
-        # Out of reach, in the table, or in the arm's own body.
-        x, y = random.uniform(-900.0, 900.0), random.uniform(-900.0, 900.0)
-        z = random.uniform(-120.0, 30.0)
-        text = f"frame: base\nsteps:\n- speed: 0.5\n- move: {{x: {x}, y: {y}, z: {z}}}\n"
-        try:
-            compiled(parse(text), stage.plan_context, stage.begin())
-        except ScriptError as error:
-            refused += 1
-            (problem,) = error.problems
-            assert problem.line == 4
-            assert len(problem.text) > 40
-    assert refused > 150

@@ -62,36 +62,11 @@ def place(scene_object: SceneObject) -> list[float]:
     return [x, y, z]
 
 
-def yaw(scene_object: SceneObject) -> float:
-    return float(np.degrees(np.arctan2(scene_object.T[1, 0], scene_object.T[0, 0])))
-
-
 @pytest.mark.parametrize("side", ["above", pytest.param("front", marks=pytest.mark.long)])
 def test_box_is_placed_where_the_script_says(stage: Stage, side: str) -> None:
     steps = f"- pick: {{object: part, side: {side}}}\n- place: {{at: {{x: 230, y: -120}}}}\n"
     end = played(stage, steps, box("part", NEAR, yaw=18.0))
     assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
-
-
-@pytest.mark.long
-def test_box_is_turned_as_the_script_says(stage: Stage) -> None:
-    steps = "- pick: part\n- place: {at: {x: 230, y: -120, yaw: 25}}\n"
-    end = played(stage, steps, box("part", NEAR, (30.0, 45.0, 60.0), yaw=50.0))
-    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
-    # Half a turn looks the same.
-    assert yaw(end["part"]) % 180.0 == pytest.approx(25.0, abs=1e-6)
-
-
-@pytest.mark.long
-def test_cylinder_is_placed_in_the_frame_of_the_shoulder(stage: Stage) -> None:
-    z = 1e3 * float(stage.plan_context.T_base_shoulder[2, 3])
-    start = replace(
-        stage.begin(), objects=(box("can", (320.0, 60.0), (20.0, 60.0), shape=Shape.CYLINDER),)
-    )
-    text = f"steps:\n- pick: can\n- place: {{at: {{x: 300, y: -120, z: {-z!r}}}}}\n"
-    program = compiled(parse(text), stage.plan_context, replace(start, poured=None))
-    _, states = stage.play(program, replace(start, poured=None))
-    assert place(states[-1].objects[0]) == pytest.approx([300.0, -120.0, 0.0], abs=1e-6)
 
 
 @pytest.mark.long

@@ -143,23 +143,6 @@ def test_flow_follows_the_rate(stage: Stage) -> None:
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 
-@pytest.mark.long
-def test_all_is_poured_at_a_rate(stage: Stage) -> None:
-    text = PART.format(200, "- pour: {into: basin, rate: 10}\n")
-    program = compiled(parse(text), stage.plan_context, stage.begin())
-    run, states = stage.play(program, stage.begin(), most=20_000)
-    assert run.phase is Phase.DONE
-    assert states[-1].poured is not None
-    assert states[-1].poured.water.basin > 199 * MILLILITRE
-
-
-@pytest.mark.long
-def test_water_is_poured_in_parts(stage: Stage) -> None:
-    water = poured(stage, 180.0, 50.0, 60.0)
-    assert water.basin / MILLILITRE == pytest.approx(110.0, rel=0.02)
-    assert water.spilled == 0
-
-
 @pytest.mark.parametrize(
     ("pour", "message"),
     [

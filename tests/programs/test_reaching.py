@@ -58,11 +58,6 @@ def test_suggested_places_are_reached(builder: PlanBuilder, frame: str) -> None:
     assert points > 20
 
 
-def test_metres_are_suspected(builder: PlanBuilder) -> None:
-    why = refusal(builder, "base", (0.3, 0.0, 0.2), 0.0)
-    assert "Lengths are in mm here" in why
-
-
 @pytest.mark.parametrize(("frame", "name"), [("shoulder", "{S}"), ("base", "the base frame")])
 def test_path_beyond_a_limit_is_reported_in_the_frame_of_the_script(
     stage: Stage, frame: str, name: str

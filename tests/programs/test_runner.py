@@ -125,12 +125,6 @@ def test_every_plan_is_clear_and_joins_the_next(program: Program) -> None:
             q = plan.end
 
 
-def test_a_run_is_the_same_each_time(stage: Stage, program: Program) -> None:
-    one, other = (stage.play(program, stage.begin())[1] for _ in range(2))
-    assert len(one) == len(other)
-    assert all((a.q == b.q).all() for a, b in zip(one, other, strict=True))
-
-
 def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
     stage: Stage, program: Program
 ) -> None:

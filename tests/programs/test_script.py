@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 
-import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from katana450.errors import InputError
 from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.moves import Move
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
-from katana450.extensions.programs.steps import STEPS
 from katana450.extensions.programs.tool_moves import Circle, Line
 
 GOOD = """\
@@ -155,17 +151,6 @@ def test_size_depth_and_repetitions_are_bounded() -> None:
         parse(many)
 
 
-WORDS = st.sampled_from(
-    [*STEPS, "repeat", "steps", "times", "poses", "x", "y", "z", "by", "to", "pitch", "radius"]
-)
-LEAVES = st.none() | st.booleans() | st.floats() | st.integers() | WORDS | st.text(max_size=5)
-TREES = st.recursive(
-    LEAVES,
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(WORDS, inner, max_size=4),
-    max_leaves=12,
-)
-
-
 def wrong_with(text: str) -> tuple[Problem, ...]:
     """Return the problems of a text, none if it is valid; any other exception fails the test."""
     try:
@@ -174,14 +159,6 @@ def wrong_with(text: str) -> tuple[Problem, ...]:
         return error.problems
     # A valid script has at least one step.
     return () if script.steps else (Problem(0, 0, "no steps"),)
-
-
-@settings(max_examples=60)
-@given(TREES)
-def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
-    text = json.dumps({"steps": tree})
-    problems = wrong_with(text)
-    assert all(problem.line >= 1 and problem.column >= 1 for problem in problems)
 
 
 @settings(max_examples=80)
@@ -193,18 +170,3 @@ def test_any_tree_of_values_is_read_or_refused(tree: object) -> None:
 @example("steps: [home]\n---\nsteps: [home]")
 def test_any_text_is_read_or_refused(text: str) -> None:
     assert all(problem.line >= 1 for problem in wrong_with(text))
-
-
-@settings(max_examples=40)
-@given(st.data())
-def test_broken_script_is_reported_with_its_position(data: st.DataObject) -> None:
-    at = data.draw(st.integers(0, len(GOOD) - 1))
-    broken = GOOD[:at] + data.draw(st.text(max_size=3)) + GOOD[at + data.draw(st.integers(0, 9)) :]
-    last = len(broken.splitlines()) + 2
-    assert all(1 <= problem.line <= last for problem in wrong_with(broken))
-
-
-def test_a_script_error_is_an_input_error() -> None:
-    with pytest.raises(InputError):
-        parse("steps: 3")
-    assert np.isfinite(parse(GOOD).speed)

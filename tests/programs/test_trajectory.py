@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -256,37 +254,6 @@ def test_fingers_must_hold_what_is_named(stage: Stage) -> None:
     text = "steps:\n  - gripper: open\n  - gripper: {to: closed, holding: cup}\n"
     with pytest.raises(ScriptError, match="hold nothing instead of cup"):
         compiled(parse(text), stage.plan_context, stage.begin())
-
-
-@pytest.mark.long
-def test_fingers_that_close_on_an_object_hold_it_in_later_steps(stage: Stage) -> None:
-    """The plan after it moves the object with the hand; opening lets it go."""
-    grasp = compiled(parse("steps:\n  - pick: {object: cup}\n"), stage.plan_context, stage.begin())
-    _, states = stage.play(grasp, stage.begin())
-    before = next(state for state in states if state.held is not None)
-    # The state just before the fingers closed.
-    index = states.index(before)
-    start = next(
-        state for state in reversed(states[:index])
-        if state.gripper_setpoint == stage.plan_context.arm.gripper.upper
-    )  # fmt: skip
-    standing = replace(start, mode=stage.begin().mode, goal=start.setpoint)
-    text = (
-        "frame: base\nsteps:\n  - gripper: {to: closed, holding: cup}\n"
-        "  - line: {by: {z: 60}}\n  - line: {by: {z: -54}}\n  - gripper: open\n"
-    )
-    program = compiled(parse(text), stage.plan_context, standing)
-    run, states = stage.play(program, standing)
-    assert run.phase is Phase.DONE, run.why
-    heights = [
-        stage.session.environment.pose(each, state.x_setpoint)[2, 3]
-        for state in states
-        for each in state.objects
-        if each.name == "cup"
-    ]
-    assert max(heights) == pytest.approx(heights[0] + 0.06, abs=1e-3)
-    assert states[-1].held is None
-    assert math.isclose(heights[-1], heights[0], abs_tol=1e-3)
 
 
 def test_example_runs(stage: Stage) -> None:
