@@ -71,17 +71,6 @@ def test_the_table_of_the_run_is_the_circle(out: Path) -> None:
 
 
 @pytest.mark.long
-def test_figures_and_page_are_written(out: Path) -> None:
-    for name in ("tracing.png", "path.png", "joints.png", "speeds.png"):
-        assert (out / name).read_bytes().startswith(b"\x89PNG")
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") == 4
-    assert "Every bound is met." in page
-    assert "viewport" in page
-    assert "http" not in page.replace("http-equiv", "")
-
-
-@pytest.mark.long
 def test_the_same_seed_gives_the_same_report(out: Path, tmp_path: Path) -> None:
     assert main(["demo", "circle", "--headless", "--report", str(tmp_path)]) == 0
 

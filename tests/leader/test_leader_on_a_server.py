@@ -152,31 +152,6 @@ def test_stop_and_unplugging_end_it_until_a_person_presses_enter(
 
 
 @pytest.mark.long
-def test_silent_leader_and_another_driver_end_it(
-    watcher: Client, leader: MovedLeader, command: list[str]
-) -> None:
-    with at_terminal(command) as shown:
-        shown.wait_for("The arm follows the leader.")
-        leader.begin()
-        leader.motors.silent = {3}
-        shown.wait_for("no valid posture")
-        until(lambda: at_rest(watcher), 1.0)
-        leader.motors.silent = set()
-        leader.begun = math.inf
-        assert stays(watcher, 0.5)
-        shown.type("\n")
-        shown.wait_for("The arm follows the leader.")
-        until(lambda: watcher.query(answers.State).holder == "Leader")
-        watcher.ask(requests.Take())
-        shown.wait_for("changed its driver")
-        leader.begin()
-        assert stays(watcher, 0.5)
-        shown.process.send_signal(signal.SIGINT)
-        shown.wait_for("no longer drives")
-        assert shown.process.wait(10.0) == 130
-
-
-@pytest.mark.long
 def test_lag_behind_a_sine(
     watcher: Client, leader: MovedLeader, command: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse import inverse
-from katana450.maths.kinematics.solution import Solution
 from tests.exchange.conftest import GANTRY
 
 Q = np.array([0.3, -1.0, 1.4, 0.3, 0.2])
@@ -234,22 +233,3 @@ def test_pose_in_millimetres_is_asked_about(arm: katana450.Arm) -> None:
 def test_angle_in_degrees_is_asked_about(arm: katana450.Arm) -> None:
     with pytest.raises(katana450.InputError, match=r"Did you mean radians\? 30 deg are 0.5236 rad"):
         arm.line(pitch=30.0)
-
-
-def test_errors_are_measured_when_they_are_read(
-    shoulder_arm: katana450.Arm, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    T, measured = shoulder_arm.fk(Q), []
-    original = Solution._measured
-
-    def noted(solution: Solution) -> tuple[float, float]:
-        measured.append(solution)
-        return original(solution)
-
-    monkeypatch.setattr(Solution, "_measured", noted)
-    found = shoulder_arm.ik(T)
-    assert found.q.shape == (4, 5)
-    assert found.within_limits.any()
-    assert not measured
-    assert found.position_error.min() < 1e-12
-    assert len(measured) >= 4

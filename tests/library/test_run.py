@@ -120,31 +120,3 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
         time.sleep(0.2)
         assert onlooker.query(answers.State).q == at_rest.q
         assert -1.9 < at_rest.q[0] < 1.9
-
-
-def test_stop_ends_the_run_and_nothing_moves_after_it(
-    shoulder_arm: katana450.Arm, client: katana450.Client, server: AppServer
-) -> None:
-    plan = shoulder_arm.plan([2.0, -1.0, 1.4, 0.3, 0.0], [-2.0, -1.0, 1.4, 0.3, 0.0])
-    refused: list[RefusedError] = []
-
-    def run() -> None:
-        with pytest.raises(RefusedError) as raised:
-            plan.run(client)
-        refused.append(raised.value)
-
-    client.joints(plan.start)
-    running = threading.Thread(target=run)
-    running.start()
-    with katana450.connect(server.url, name="Onlooker") as onlooker:
-        for state in onlooker.states():
-            if state.q[0] > -1.5:
-                break
-        onlooker.ask(requests.Stop())
-        running.join(60.0)
-        assert len(refused) == 1
-        client.clear_stop()
-        at_rest = next(each for each in onlooker.states() if not each.moving)
-        time.sleep(0.2)
-        assert onlooker.query(answers.State).q == at_rest.q
-        assert at_rest.q[0] < 1.9

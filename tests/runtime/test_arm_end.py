@@ -259,11 +259,6 @@ def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends)
     np.testing.assert_array_equal(again.state_publisher.snapshot.state.q, q)
 
 
-def test_front_end_notices_a_closed_arm_end(ends: Ends) -> None:
-    ends.arm_end.close()
-    assert ends.front.cut.wait(2.0)
-
-
 def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
     until(lambda: ends.front.state_publisher.loop_timing.ticks > 50)
     assert ends.front.state_publisher.loop_timing.period == 0.01

@@ -54,7 +54,7 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     return worker, sink.commands
 
 
-@pytest.mark.parametrize("elbow", [0.0, 1e-12, 1e-9, -1e-9, 3e-8])
+@pytest.mark.parametrize("elbow", [0.0, -1e-9, 3e-8])
 def test_stretched_elbow_is_on_both_branches(session: Session, elbow: float) -> None:
     worker, commands = planned(session, elbow)
     assert worker.failure == ""

@@ -88,15 +88,6 @@ def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     assert water.spilled == 0
 
 
-def test_inverted_cup_is_emptied_into_the_basin(flow: WaterFlow) -> None:
-    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
-    *_, water = poured(flow, water, turned_to(math.radians(120.0), 1.0), 4.0, 0.01)
-    assert (water.basin + water.cup.kept, water.spilled, water.air) == (water.total, 0, 0)
-    # A part of a millilitre of water stays on the wall, and less than a drop at the lip.
-    assert 0 <= water.cup.volume < DROP_VOLUME
-    assert 0.1 * MILLILITRE < water.cup.film < 0.6 * MILLILITRE
-
-
 def test_stopped_pour_flows_down_to_the_lip(flow: WaterFlow) -> None:
     tilt = math.radians(65.0)
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
@@ -223,16 +214,6 @@ def test_water_stays_in_free_fall_but_not_upside_down(flow: WaterFlow) -> None:
     assert water.cup.volume == water.total
     *_, water = poured(flow, water, lambda _: math.pi, 3.0, 0.01)
     assert water.cup.kept < MILLILITRE
-
-
-def test_water_at_rest_stays_at_rest(flow: WaterFlow) -> None:
-    water = flow.begin(FULL, placed(0.2, -0.3, 0.15, 0.2))
-    after = flow.step(water, {"cup": VesselMove(water.cup.T)}, 0.01)
-    assert (after.cup.volume, after.parcels, after.cup.slosh) == (
-        water.cup.volume,
-        (),
-        water.cup.slosh,
-    )
 
 
 def test_step_of_zero_time_only_moves_the_cup(flow: WaterFlow) -> None:

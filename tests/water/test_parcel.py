@@ -82,20 +82,6 @@ def test_water_beside_the_table_lands_on_the_floor(environment: WaterEnvironment
     assert landing(sunk, environment, 0.0)[:3] == (Ground.FLOOR, 0.0, (west - 0.1, 0.0, floor))
 
 
-def test_falling_water_keeps_its_energy(environment: WaterEnvironment) -> None:
-    """The potential energy that a parcel loses is its kinetic energy at the landing."""
-    x, y, _ = environment.basin.at
-    for height, velocity in ((0.3, (0.2, -0.1, 0.4)), (0.15, (0.0, 0.3, -0.2)), (0.5, (0, 0, 0))):
-        parcel = Parcel(10**12, (x, y, height), velocity, 0.0, 0.01)
-        end = landing(parcel, environment, 0.01)
-        # The path is a parabola, so a central difference of any width is its velocity.
-        before, after = parcel.at(end.age - 0.05), parcel.at(end.age + 0.05)
-        speed = math.dist(before, after) / 0.1
-        lost = GRAVITY * (height - end.point[2])
-        gained = 0.5 * speed**2 - 0.5 * sum(v * v for v in velocity)
-        assert gained == pytest.approx(lost, rel=1e-9)
-
-
 @repeatable
 @given(st.floats(0.0, 0.3), st.floats(0.001, 0.1), st.floats(0.01, 0.15))
 def test_overlap_is_the_common_part_of_two_discs(distance: float, a: float, b: float) -> None:

@@ -12,15 +12,6 @@ from katana450.maths.water.flow import VesselMove, WaterFlow
 from tests.water.motions import over_basin, poured, turned_to
 
 
-def test_pour_into_the_basin_leaves_a_film(flow: WaterFlow) -> None:
-    water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
-    *_, water = poured(flow, water, turned_to(2.0, 1.0), 4.0, 0.01)
-    result = score(water, Course())
-    assert 99.7 < result.emptied_percent < 99.95
-    assert result.in_basin_ml + result.in_cup_ml == pytest.approx(200.0)
-    assert (result.in_air_ml, result.spilled_ml) == (0.0, 0.0)
-
-
 def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
     water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, 0.01)

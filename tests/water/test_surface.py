@@ -105,11 +105,6 @@ def test_interrupted_stream_has_zero_width_there() -> None:
     assert (spread[1:-1][(age[1:-1] < 0.1) | (age[1:-1] > 0.21)] > 0.0).all()
 
 
-def test_single_falling_drop_is_drawn() -> None:
-    drop = Parcel(10**11, (0.1, 0.2, 0.3), (0.0, 0.0, 0.0), 0.0, 0.01)
-    assert np.isfinite(stream([drop], 0.03, 0.2)).all()
-
-
 def test_disc_and_blob_have_their_stated_size() -> None:
     assert trimesh.Trimesh(*disc(), process=False).area == pytest.approx(math.pi, rel=0.005)
     corners, faces = blob()
