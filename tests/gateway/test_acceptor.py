@@ -8,14 +8,30 @@ import logging
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
+from katana450.arm.control.lease import Role
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.server.service.budget import Budgets
+from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
 from katana450.server.web import acceptor as acceptors
 from katana450.server.web.acceptor import Acceptor, _Connection
+from katana450.server.web.access_links import AccessFile
+from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
+from katana450.server.web.channel import CLOSE_FRAME_TIMEOUT, GoneError
+from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
+from katana450.server.web.program_socket import ProgramChannel
+from tests.gateway.client import HOUR, Control
+from tests.gateway.virtual import VirtualServer
 
 WAITING = 4
 
@@ -208,3 +224,122 @@ def test_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard:
     )
     assert int(done.stdout) == min(hard, WANTED_DESCRIPTORS)
     assert ("Raise the limit to" in done.stderr) == (hard < 1024)
+
+
+ASKED = 200
+
+
+class Torrent:
+    """A connection on which all requests have already arrived."""
+
+    def __init__(self) -> None:
+        self.left = ASKED
+        self.arrival = Arrival(None)
+
+    async def receive(self) -> str:
+        if not self.left:
+            await asyncio.Event().wait()
+        self.left -= 1
+        return '{"do": "heartbeat"}'
+
+    async def send(self, _text: str) -> None:
+        return
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        raise GoneError
+
+
+class Deaf(Torrent):
+    """A connection that accepts no data, not even a close frame."""
+
+    async def send(self, _text: str) -> None:
+        await asyncio.Event().wait()
+
+    async def close(self, _code: int, _why: str, /) -> None:
+        await asyncio.Event().wait()
+
+
+def test_flooding_client_does_not_delay_others() -> None:
+    async def ask() -> list[int]:
+        hub, torrent = Hub(time.monotonic), Torrent()
+        program = ProgramChannel(hub, torrent, Budgets(hub.clock).of("a"))
+        window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.notify)
+        asking = asyncio.create_task(program.run(window))
+        taken = [torrent.left]
+        while torrent.left:
+            await asyncio.sleep(0)
+            taken.append(torrent.left)
+        asking.cancel()
+        return taken
+
+    taken = asyncio.run(ask())
+    assert taken[-1] == 0
+    assert max(before - after for before, after in pairwise(taken)) == 1
+
+
+def test_unresponsive_flooder_is_disconnected() -> None:
+    async def ask() -> None:
+        hub, deaf = Hub(time.monotonic), Deaf()
+        deaf.left = 10**9
+        program = ProgramChannel(hub, deaf, Budgets(hub.clock).of("a"))
+        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.notify)
+        async with asyncio.timeout(10.0 * CLOSE_FRAME_TIMEOUT):
+            await program.run(window)
+
+    asyncio.run(ask())
+
+
+def test_reserved_places_are_free_when_all_others_are_taken() -> None:
+    limit = ConnectionLimit(maximum=4, each=3)
+    with ExitStack() as stack:
+
+        def takes(identity: str, reserved: int = 0) -> bool:
+            return stack.enter_context(limit.taken(identity, reserved))
+
+        assert [takes("a") for _ in range(4)] == [True, True, True, False]
+        assert [takes("b") for _ in range(2)] == [True, False]
+        assert [takes("admin", 2) for _ in range(3)] == [True, True, False]
+        # Who already has as many places has no more.
+        assert not takes("a", 2)
+    with limit.taken("b") as free:
+        assert free
+
+
+def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(
+    described: DescribedRobot, tmp_path: Path
+) -> None:
+    file = AccessFile.create(tmp_path / "access.json")
+
+    async def act(server: VirtualServer) -> None:
+        async def cookie(role: Role) -> str:
+            return await server.enter(file.give(role.value, role, time.time() + HOUR))
+
+        async def welcome(cookie: str) -> bool:
+            control = await server.control(cookie)
+            await asyncio.sleep(0.1)
+            crowd.append(control)
+            assert control.socket.close_code in (None, LIMIT_CLOSE_CODE)
+            return control.socket.close_code is None
+
+        crowd: list[Control] = []
+        driver, admin = await cookie(Role.OPERATOR), await cookie(Role.ADMIN)
+        driving = await server.control(driver)
+        await driving.wait(mood="ok")
+        await driving.say("acquire")
+        await driving.wait(mine=True)
+        for _ in range(SOCKETS // SOCKETS_EACH):
+            viewer = await cookie(Role.VIEWER)
+            for _ in range(SOCKETS_EACH):
+                crowd.append(await server.control(viewer))
+        assert not await welcome(await cookie(Role.VIEWER))
+        # An operator who does not drive has no place reserved.
+        assert not await welcome(await cookie(Role.OPERATOR))
+        assert await welcome(admin)
+        assert await welcome(driver)
+        await driving.say("stop")
+        await driving.wait(stop="confirmed")
+        for each in (driving, *crowd):
+            await each.close()
+
+    with VirtualServer(described, access=file) as server:
+        server.run(act(server))

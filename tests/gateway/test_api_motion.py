@@ -1,25 +1,43 @@
-"""Test motions and objects that a program requests of a real server."""
+"""Motions by requests: joints, poses, nudges, streams and detours, and what a state derives."""
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
+from collections.abc import Callable, Iterator
+from typing import Any
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 import pytest
+from msgspec import structs
 
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import Shape
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import Reason
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
+from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
+from katana450.errors import InputError
+from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.plan_builder import PlanContext
+from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.source import ScriptError
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.statics import holding_torques
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import Matrix4
 from tests.gateway.postures import READY, THERE
+from tests.gateway.virtual import VirtualServer
 
 
 def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: MountedArm) -> None:
@@ -152,3 +170,219 @@ def test_objects_are_moved_touched_and_removed(program: Client) -> None:
         with pytest.raises(RefusedError):
             program.ask(wrong)
     program.ask(requests.Place(name="cup", T=_rows(known["cup"].T)))
+
+
+def test_each_joint_names_its_link_and_the_way_to_it(program: Client, robot: Robot) -> None:
+    found = program.query(answers.Arm).links
+    arm = robot.require_arm()
+    by_name = {link.name: link for link in robot.links}
+    assert [each.label for each in found][:2] == ["1 base turn", "2 shoulder"]
+    for each, name in zip(found, arm.chain.names, strict=True):
+        link = by_name[each.path[-1]]
+        assert link.joint is not None
+        assert (link.joint.name, by_name[each.path[0]].parent) == (name, None)
+        assert np.allclose(each.axis, link.joint.axis)
+        for above, below in itertools.pairwise(each.path):
+            assert by_name[below].parent == above
+
+
+def test_nudges_of_one_tick_add_up(session: Session) -> None:
+    before = session.begin(session.ready, 0.0, 0.0)
+    given: list[cmd.Command] = [cmd.Nudge(0, 0.1), cmd.Nudge(0, 0.1), cmd.Nudge(4, -0.2)]
+    after = session.step(before, given, 0.01)
+    moved = np.array((0.2, 0.0, 0.0, 0.0, -0.2))
+    np.testing.assert_allclose(after.goal, session.ready + moved, rtol=0, atol=1e-12)
+    assert after.findings == ()
+
+
+def test_nudge_is_limited_to_the_range_of_the_joint(session: Session) -> None:
+    before = session.begin(session.ready, 0.0, 0.0)
+    after = session.step(before, [cmd.Nudge(1, 9.0)], 0.01)
+    assert after.goal[1] == session.require_arm().chain.upper[1]
+    (found,) = after.findings
+    assert (found.reason, found.axis) == (Reason.AXIS_LIMIT, 1)
+    # The next nudge counts from the limit, not from the requested angle beyond it.
+    back = session.step(after, [cmd.Nudge(1, -0.1)], 0.02)
+    assert back.goal[1] == pytest.approx(session.require_arm().chain.upper[1] - 0.1)
+    assert back.findings == ()
+
+
+@pytest.mark.parametrize("bad", [(5, 0.1), (-1, 0.1), (0, math.nan), (True, 0.1)])
+def test_invalid_nudge_is_refused(session: Session, bad: tuple[int, float]) -> None:
+    with pytest.raises(InputError):
+        session.check(cmd.Nudge(*bad))
+
+
+def test_program_nudges_a_joint_of_a_real_server(program: Client) -> None:
+    start = program.query(answers.State)
+    there = program.nudge(1, 0.1)
+    assert there.why == ""
+    assert there.q[0] == pytest.approx(start.goal[0] + 0.1)
+    assert there.q[1:] == pytest.approx(start.goal[1:])
+    there = program.nudge(1, 10.0)
+    assert "limit" in there.why
+    assert there.q[0] == pytest.approx(program.query(answers.Arm).upper[0])
+    answer = program.ask(requests.Nudge(axis=1, by=1.0))
+    assert isinstance(answer, answers.Done)
+    assert answer.outcome == "limited"
+    assert [found.reason for found in answer.findings] == ["axis limit"]
+    with pytest.raises(RefusedError, match="no axis 9"):
+        program.nudge(9, 0.1)
+
+
+def test_script_step_nudges(session: Session) -> None:
+    plan_context = PlanContext(session, np.eye(4))
+    state = session.begin(session.ready, 0.0, 0.0)
+    script = "steps:\n  - nudge: {axis: 1, by: 20}\n  - nudge: {axis: 1, by: -5}\n"
+    tasks = compiled(parse(script), plan_context, state).tasks
+    plans = [task.action.plan for task in tasks if isinstance(task.action, FollowPlan)]
+    assert len(plans) == 2
+    end = session.ready + np.deg2rad((15.0, 0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(plans[-1].end, end, rtol=0, atol=1e-12)
+    with pytest.raises(ScriptError, match="line 2"):
+        compiled(parse("steps:\n  - nudge: {axis: 2, by: 300}\n"), plan_context, state)
+    with pytest.raises(ScriptError, match="axis"):
+        parse("steps:\n  - nudge: {by: 3}\n")
+
+
+def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
+    began = time.monotonic()
+    while (t := time.monotonic() - began) < 1.5:
+        wave = READY + math.sin(2.0 * t) * np.array((0.2, 0.0, 0.0, 0.0, 0.4))
+        program.send(requests.Servo(q=wave.tolist()))
+        time.sleep(0.02)
+    moving = program.query(answers.State)
+    assert abs(np.array(moving.qd)[0]) > 0.05
+    time.sleep(1.2)
+    rest = program.query(answers.State)
+    assert not rest.moving
+    # The arm braked at once and did not continue to the last target of the stream.
+    assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.2
+    # A target of another kind stays until it is reached.
+    there = program.joints(THERE)
+    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("rates", [False, True])
+def test_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
+    """The stream uses 0.7 of the acceleration."""
+    program.go(requests.Home())
+    began, reached = time.monotonic(), 0.0
+    while (t := time.monotonic() - began) < 6.5:
+        q, qd = READY.copy(), np.zeros(5)
+        q[0], qd[0] = READY[0] + SIZE * math.sin(OMEGA * t), SIZE * OMEGA * math.cos(OMEGA * t)
+        # The answer arrives once the server has the sample.
+        program.ask(requests.Servo(q=q.tolist(), qd=qd.tolist() if rates else None))
+        reached = max(reached, abs(program.query(answers.State).setpoint[0] - READY[0]))
+        time.sleep(max(0.0, began + t + 0.02 - time.monotonic()))
+    assert 0.9 * SIZE < reached < 1.05 * SIZE
+
+
+SIZE, OMEGA = 0.4, math.tau / 3.0
+"""Amplitude [rad] and maximum speed [rad/s] of a sine."""
+
+
+def test_states_arrive_at_the_requested_rate(program: Client) -> None:
+    times = []
+    for state in program.states(hz=50.0):
+        times.append(time.monotonic())
+        assert len(state.q) == 5
+        if len(times) == 60:
+            break
+    assert np.mean(np.diff(times)) == pytest.approx(0.02, abs=1e-3)
+
+
+PLACE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))
+
+
+def test_printed_pose_is_accepted_and_its_rounding_reported(
+    program: Client, arm: MountedArm
+) -> None:
+    for decimals in (6, 5, 4):
+        check_printed(program, forward(arm.chain, PLACE), decimals)
+
+
+def check_printed(program: Client, T: FloatArray, decimals: int) -> None:
+    rounding = 0.5 * 10.0**-decimals
+    printed = T.round(decimals).tolist()
+    accepted = program.ask(requests.Pose(T=printed))
+    assert isinstance(accepted, answers.Done)
+    assert accepted.rotation_misfit is not None
+    assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
+    there = program.go(requests.Pose(T=printed))
+    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
+
+
+def test_object_is_placed_at_a_printed_pose(program: Client) -> None:
+    T = np.eye(4)
+    T[:3, :3] = so3.from_rpy(0.0, 0.0, 0.7)
+    T[:3, 3] = 0.3, -0.3, 0.0
+    printed: Any = T.round(4).tolist()
+    placed = program.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.02] * 3, T=printed))
+    assert isinstance(placed, answers.Done)
+    assert placed.rotation_misfit is not None
+    assert placed.rotation_misfit > 1e-6
+    program.ask(requests.Remove(name="block"))
+
+
+def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:
+    skewed = ((1.0, 2e-3, 0.0, 0.3), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0, 0, 0, 1.0))
+    with pytest.raises(RefusedError, match=r"off orthonormal by 0\.002 \(allowed: 1e-03\)"):
+        program.ask(requests.Pose(T=skewed))
+
+
+def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:
+    ball = requests.Place(name="near", shape=Shape.SPHERE, size=[0.02], can_be_held=True)
+    program.ask(structs.replace(ball, near=(0.1, 0.5)))
+    (found,) = (each for each in program.query(answers.Objects).objects if each.name == "near")
+    np.testing.assert_allclose(np.array(found.T)[:3, 3], (0.1, 0.5, 0.0), rtol=0, atol=1e-9)
+    program.ask(requests.Remove(name="near"))
+    with pytest.raises(RefusedError, match="nothing carries it there"):
+        program.ask(structs.replace(ball, near=(1.3, 1.3)))
+
+
+TARGET = (0.008, 0.025, 0.443)
+"""[m] A point above the shoulder. A drag there from the ready posture ends at limits."""
+
+
+@pytest.fixture
+def local(described: DescribedRobot) -> Iterator[VirtualServer]:
+    """Return a server that offers detours."""
+    with VirtualServer(described, detours=True) as server:
+        yield server
+
+
+def wait_for(program: Client, holds: Callable[[answers.State], bool]) -> answers.State:
+    deadline = time.monotonic() + 60.0
+    while not holds(state := program.query(answers.State)):
+        assert time.monotonic() < deadline, state
+        time.sleep(0.02)
+    return state
+
+
+def held_at_the_gap(program: Client) -> answers.State:
+    """Drag from the ready posture to TARGET, and return the state with a detour on offer."""
+    program.go(requests.Home())
+    program.go(requests.Position(p=TARGET))
+    return wait_for(program, lambda state: state.detour is not None)
+
+
+def distance(state: answers.State) -> float:
+    assert state.T is not None
+    return math.dist([row[3] for row in state.T[:3]], TARGET)
+
+
+def test_offered_detour_is_taken_by_go(program: Client) -> None:
+    state = held_at_the_gap(program)
+    assert state.detour is not None
+    assert state.status == "gap"
+    assert f"Reachable by a {state.detour:.1f} s detour: press Enter or Go" in state.why
+    assert not state.moving
+    assert distance(state) > 0.01
+    program.ask(requests.EndDrag())
+    rested = program.query(answers.State)
+    assert rested.q == state.q
+    arrived = program.go(requests.Go())
+    assert distance(arrived) < 1e-6
+    assert arrived.branch == state.branch
+    assert arrived.detour is None

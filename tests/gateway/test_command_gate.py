@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 import threading
 from argparse import Namespace
 from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 import viser
 
+import katana450
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
 from katana450.arm.control.event_log import LogEntry
@@ -292,3 +295,42 @@ def test_command_counts_though_a_callback_after_its_delivery_fails(
     assert gate.motions == before + 1
     assert noted == [cmd.Home()]
     assert "The callback fails." in caplog.text
+
+
+PACKAGE = Path(katana450.__file__).parent
+
+DELIVERIES = {
+    ("server/service/command_gate.py", "self.arm"),
+    ("server/service/command_gate.py", "arm"),
+    # Behind the gate the handle passes commands on; the worker also adds the planned path.
+    ("server/service/arm_handle.py", "self._sink"),
+    ("arm/runtime/planning_worker.py", "self._arm"),
+    # An offer moves nothing.
+    ("arm/runtime/detour_planner.py", "self._arm"),
+}
+"""Files, and the objects to which they deliver commands."""
+
+
+def uses(name: str) -> set[tuple[str, str]]:
+    """Return each file that uses the attribute ``name``, with the object that has it."""
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    return {
+        (path.relative_to(PACKAGE).as_posix(), ast.unparse(node.value))
+        for path, text in texts.items()
+        if name in text
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.Attribute) and node.attr == name
+    }
+
+
+def test_only_the_gate_delivers_commands() -> None:
+    assert uses("deliver") == DELIVERIES
+
+
+def test_only_the_front_end_makes_command_messages() -> None:
+    made = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in PACKAGE.rglob("*.py")
+        if "CommandMessage(" in path.read_text(encoding="utf-8")
+    }
+    assert made == {"arm/runtime/front_end.py"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -20,8 +21,13 @@ from katana450.arm.control.state import ActiveStop, Finding, Reason, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot
-from katana450.errors import LeaseError
+from katana450.errors import InputError, LeaseError
 from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.api import answers, requests
+from katana450.server.service.arm_handle import ArmHandle
+from katana450.server.service.budget import Budgets
+from katana450.server.service.derived import once
+from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
@@ -378,3 +384,40 @@ def test_no_lease_before_the_arm_is_ready() -> None:
     hub.tick()
     hub.stop(participant.actor)
     hub.move(participant, cmd.ClearStop())
+
+
+def _snapshot() -> Snapshot:
+    return Snapshot(cast(State, Mock()), 0)
+
+
+def test_branches_are_computed_once_per_snapshot() -> None:
+    hub, arm, computed = Hub(lambda: 0.0), Mock(snapshot=_snapshot()), []
+
+    def choices() -> tuple[BranchOption, ...]:
+        computed.append(1)
+        return ()
+
+    arm.choices = choices
+    hub.gate.arm = cast(ArmHandle, arm)
+    budgets = Budgets(hub.clock)
+    for number in range(3):
+        identity = Identity(f"session-{number}", "Viewer", Role.VIEWER)
+        window = hub.join(identity, "a-page", lambda _notice: None)
+        request = requests.Query(at="branches", id=number)
+        answer = Dispatcher(hub).handle(window, request, budgets.of(identity.session))
+        assert answer == answers.Branches(choices=[], id=number)
+    assert len(computed) == 1
+    arm.snapshot = _snapshot()
+    Dispatcher(hub).query("branches")
+    assert len(computed) == 2
+
+
+def test_error_is_not_cached() -> None:
+    snapshot = _snapshot()
+
+    def fail() -> int:
+        raise InputError("no branches")
+
+    with pytest.raises(InputError):
+        once(snapshot, "a", fail)
+    assert once(snapshot, "a", lambda: 1) == 1

@@ -1,8 +1,9 @@
-"""Test what persons can do who are kept out, without a server process."""
+"""People whom a server knows: names, who is shown, forgotten or kept out, and who may stop."""
 
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from argparse import Namespace
 from collections.abc import Callable
@@ -13,21 +14,28 @@ import pytest
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from katana450.arm.control.lease import Role
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
+from katana450.errors import InputError
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests
+from katana450.server.service import people as people_module
+from katana450.server.service import status
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.participants import Participant
+from katana450.server.service.known_pages import MAX_PAGES
+from katana450.server.service.names import MAX_NAME, renamed
+from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import KICKED, LOOPBACK_NAMES, Address, Authenticator
 from katana450.server.web.http_api import Api
 from tests.gateway.client import HOUR
-from tests.gateway.test_hub import FakeArm
+from tests.gateway.test_hub import PAGES, FakeArm, Table
 
 ADDRESS = Address(LOOPBACK_NAMES, any_address=False, secure=False)
 PROGRAM = "a-program-of-this-test"
@@ -152,3 +160,173 @@ def test_http_programs_without_links_are_kept_out_together(
         assert await house.post(b'{"do": "heartbeat"}') == 200
 
     asyncio.run(act())
+
+
+VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")
+ODA = Identity("oda", "Oda", Role.OPERATOR, "Oda")
+
+
+class Room:
+    """A hub with a viewer, an operator, an arm and a clock that tests set."""
+
+    def __init__(self, session: Session) -> None:
+        self.t = 100.0
+        self.hub = Hub(lambda: self.t)
+        self.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
+        self.hub.gate.arm = cast(Any, self.arm)
+        self.vera, self.oda = (self.join(each) for each in (VERA, ODA))
+
+    def join(self, identity: Identity) -> Participant:
+        return self.hub.join(identity, "a-page-of-this-person", lambda _: None)
+
+    def clear(self) -> None:
+        self.hub.move(self.oda, cmd.ClearStop())
+
+
+@pytest.fixture
+def room(session: Session) -> Room:
+    return Room(session)
+
+
+def test_every_press_of_an_absent_person_stops_the_arm(room: Room) -> None:
+    room.hub.people.kick(VERA, 60.0)
+    for _ in range(2):
+        room.hub.stop(actor_of(VERA, CommandChannel.PAGE))
+        assert room.hub.stopped is not None
+        room.clear()
+
+
+def test_people_are_shown_while_they_are_connected_or_kept_out(room: Room) -> None:
+    people = room.hub.people
+    connection = Connection(VERA, ConnectionKind.PAGE, "127.0.0.1")
+
+    def shown() -> list[Identity]:
+        return list(people.shown.values())
+
+    with people.connected(connection):
+        assert shown() == [VERA]
+        assert people.kick(VERA, 60.0) == 1
+        assert connection.kicked.is_set()
+    assert shown() == [VERA]
+    room.t += 59.0
+    assert (people.kept_out("vera"), shown()) == (1.0, [VERA])
+    room.t += 1.0
+    assert (people.kept_out("vera"), shown()) == (0.0, [])
+    people.kick(VERA, math.inf)
+    assert shown() == []
+    # The number stays the same, and is never given again.
+    (number,) = (number for number in range(10) if people.identity(number) == VERA)
+    with people.connected(Connection(ODA, ConnectionKind.PAGE, "127.0.0.1")):
+        assert list(people.shown) == [number + 1]
+
+
+def test_connected_and_absent_people_are_never_forgotten(
+    room: Room, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(people_module, "MAX_REMEMBERED", 3)
+    people = room.hub.people
+    kept = [Identity(name, name, Role.VIEWER) for name in ("present", "absent")]
+    connections = [Connection(each, ConnectionKind.PAGE, "127.0.0.1") for each in kept]
+    for connection in connections:
+        people.add(connection)
+    people.kick(kept[1], 60.0)
+    for connection in connections[1:]:
+        people.remove(connection)
+    for number in range(5):
+        session = f"visitor {number}"
+        visitor = Identity(session, "Visitor", Role.VIEWER)
+        with people.connected(Connection(visitor, ConnectionKind.PAGE, "127.0.0.1")):
+            people.refused(session)
+            # Also those that come late are counted.
+            assert people.refusals(session) == 1
+        assert list(people.shown.values()) == kept
+    assert people.refusals("visitor 0") == 0
+
+
+def test_absences_are_restored_with_their_people(room: Room) -> None:
+    people = room.hub.people
+    people.restore(VERA, -5.0)
+    people.restore(ODA, 30.0)
+    assert list(people.shown.values()) == [ODA]
+    assert (people.kept_out("vera"), people.kept_out("oda")) == (0.0, 30.0)
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    return Table(session.begin(session.ready, 0.0, 0.0))
+
+
+def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) -> None:
+    driver, other = (table.join(page) for page in PAGES)
+    table.touch(driver.person.key)
+    holds, revocations = table.arm.holds, table.hub.gate.revocations
+    table.hub.rename(driver, "  Anna   B. ")
+    assert status.of(table.hub, driver)["name"] == "Anna B."
+    assert status.common(table.hub)["holder"] == "Anna B."
+    assert status.of(table.hub, driver)["mine"]
+    assert (table.arm.holds, table.hub.gate.revocations) == (holds, revocations)
+    table.hub.request(other)
+    table.hub.rename(other, "Ben")
+    assert [each["name"] for each in status.of(table.hub, driver)["asking"]] == ["Ben"]
+    table.hub.move(driver, cmd.Pause())
+    assert table.arm.actors[-1].name == "Anna B."
+    # A page that is reloaded keeps its name.
+    table.hub.leave(driver)
+    assert table.join(PAGES[0]).person.name == "Anna B."
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("", "The name is empty"),
+        ("  ", "The name is empty"),
+        ("x" * (MAX_NAME + 1), f"The maximum is {MAX_NAME}"),
+        ("window 2", "not a name of one person"),
+        ("a\u202eb", "cannot be shown"),
+        ("\u3164", "cannot be shown"),
+        ("a" + "\u0301\u0302\u0303\u0304", "cannot be shown"),
+        ("...", "not a name of one person"),
+        ("You", "not a name of one person"),
+        ("Window 261", "not a name of one person"),
+        ("\uff37indow 3", "not a name of one person"),
+    ],
+)
+def test_unsuitable_name_is_refused_in_words(table: Table, name: str, why: str) -> None:
+    window, _ = (table.join(page) for page in PAGES)
+    with pytest.raises(InputError, match=why):
+        table.hub.rename(window, name)
+    assert window.person.name == "Window 1"
+
+
+def test_name_of_an_access_link_stays() -> None:
+    with pytest.raises(InputError, match="access link"):
+        renamed(Person("key", "Anna", Role.OPERATOR, link="7"), "Ben", ())
+
+
+def test_name_of_somebody_who_is_away_stays_his(table: Table) -> None:
+    first, second = (table.join(page) for page in PAGES)
+    table.hub.rename(first, "Ann")
+    table.hub.leave(first)
+    with pytest.raises(InputError, match="is taken"):
+        table.hub.rename(second, "ann")
+    assert table.join(PAGES[0]).person.name == "Ann"
+    # Saved as it is.
+    table.hub.rename(second, "Window 2")
+
+
+def test_new_name_is_in_the_event_log(table: Table) -> None:
+    table.hub.recorder.enabled = True
+    window = table.join(PAGES[0])
+    table.hub.rename(window, "Ann")
+    notes = [table.hub.recorder.notes.get() for _ in range(table.hub.recorder.notes.qsize())]
+    (note,) = [each for each in notes if each is not None and each.kind == "rename"]
+    assert note.actor is not None
+    assert (note.actor.name, note.what) == ("Window 1", {"name": "Ann"})
+
+
+def test_connected_window_stays_known_among_many(table: Table) -> None:
+    window = table.join(PAGES[0])
+    for number in range(MAX_PAGES + 5):
+        table.hub.leave(table.join(f"page-{number:032}"))
+    table.hub.rename(window, "Ann")
+    assert table.join(PAGES[0]).number == window.number

@@ -1,4 +1,4 @@
-"""Test that silence is measured by the receipt of messages, on a test clock and real sockets."""
+"""Silence and lateness: what stops, pauses and frees the arm, and what counts as a heartbeat."""
 
 from __future__ import annotations
 
@@ -7,18 +7,31 @@ import struct
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.lease import Role
 from katana450.arm.control.session import Session
+from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state import Finding, Reason
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.runtime.readiness import LAST_ACK_RECEIVED, ack_age, data_age
+from katana450.errors import LeaseError
+from katana450.extensions.programs.serve_options import OWNER_SILENCE
+from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service import status
+from katana450.server.service.command_gate import SETTLE_TIME
 from katana450.server.service.heartbeats import MAX_ACK_AGE, Arrival, LastHeartbeat, keep_alive
 from katana450.server.service.hub import TICK
+from katana450.server.service.identity import Identity
+from katana450.server.service.participants import Participant
 from katana450.server.service.stop_state import StopRecord
 from katana450.settings import Settings
 from tests.gateway.test_hub import PAGES, Table, moves
+from tests.gateway.test_program_runner import Staged
 
 LATE = 0.2
 """Interval [s] of the checks of a delayed server, shorter than the heartbeat timeout."""
@@ -213,3 +226,208 @@ def test_arrival_is_when_the_kernel_received_the_message(
     time.sleep(0.2)
     # The end of a connection is not a message.
     assert arrival.newest < sent + margin
+
+
+SERVER_LATE = Finding(Reason.SERVER_SILENT, 0.28)
+PAUSED = Finding(Reason.PAUSED)
+
+
+class LateServer(Staged):
+    """A table whose program was paused because the server was late."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self.owner = self.join(PAGES[0])
+        self.plan(self.owner)
+        self.programs.steer(self.owner, ProgramOrder.RUN)
+        self.wait(0.1, self.owner)
+        self.arm.rest = replace(self.arm.rest, paused=True, findings=(PAUSED, SERVER_LATE))
+
+    @property
+    def resumes(self) -> int:
+        return sum(isinstance(each, cmd.Resume) for each in self.arm.commands)
+
+
+@pytest.fixture
+def late(session: Session) -> LateServer:
+    return LateServer(session)
+
+
+def test_program_resumes_after_what_waited_was_read(late: LateServer) -> None:
+    late.wait(0.9 * SETTLE_TIME, late.owner)
+    assert (late.resumes, late.status) == (0, "paused")
+    late.wait(0.5 * SETTLE_TIME, late.owner)
+    assert late.resumes > 0
+    late.arm.rest = replace(late.arm.rest, paused=False, findings=())
+    late.wait(0.1, late.owner)
+    assert late.status == "running"
+
+
+def test_pause_of_a_person_and_a_stop_last(late: LateServer) -> None:
+    late.arm.rest = replace(late.arm.rest, findings=(PAUSED,))
+    late.wait(3.0, late.owner)
+    assert (late.resumes, late.status) == (0, "paused")
+    late.arm.rest = replace(late.arm.rest, findings=(PAUSED, SERVER_LATE))
+    late.stop("Somebody")
+    late.wait(3.0, late.owner)
+    assert (late.resumes, late.status) == (0, "stopped")
+
+
+def test_lost_owner_ends_the_paused_program(late: LateServer) -> None:
+    late.programs._owner._timeout = 0.5 * SETTLE_TIME
+    late.wait(OWNER_SILENCE)
+    progress = late.programs.progress()
+    assert progress is not None
+    assert (progress.status, "sends no heartbeats" in progress.why) == ("stopped", True)
+
+
+JOG = cmd.SetJoints(np.zeros(5))
+
+
+@pytest.fixture
+def simulated(session: Session) -> Table:
+    simulated = Table(session.begin(session.ready, 0.0, 0.0))
+    simulated.arm.profile = SilenceProfile.SIMULATION
+    return simulated
+
+
+@pytest.fixture
+def driver(simulated: Table) -> Participant:
+    """Return a driver whose arm moves."""
+    driver = simulated.join(PAGES[0])
+    simulated.touch(driver.person.key)
+    simulated.wait(1.0, driver)
+    simulated.arm.moves = True
+    return driver
+
+
+def test_simulated_arm_pauses_and_the_next_command_moves_it(
+    simulated: Table, driver: Participant
+) -> None:
+    drag = simulated.touch(driver.person.key)
+    simulated.wait(Settings.silence - TICK)
+    assert moves(simulated)
+    simulated.wait(2 * TICK)
+    assert not moves(simulated)
+    assert (simulated.hub.stopped, simulated.arm.stops) == (None, 0)
+    assert simulated.arm.cause is not None
+    assert simulated.arm.cause.reason is Reason.DRIVER_SILENT
+    # What waited on the line meanwhile is no new command.
+    assert not simulated.hub.gate.is_current(drag)
+    simulated.wait(1.0)
+    simulated.wait(2 * TICK, driver)
+    with pytest.raises(LeaseError, match="just paused"):
+        simulated.hub.move(driver, JOG)
+    simulated.wait(SETTLE_TIME, driver)
+    simulated.hub.move(driver, JOG)
+    assert simulated.arm.commands[-1] is JOG
+    simulated.wait(2 * PAUSE_TIMEOUT, driver)
+    assert simulated.arm.stops == 0
+
+
+def test_paused_arm_does_not_move_for_a_driver_without_heartbeats(
+    simulated: Table, driver: Participant
+) -> None:
+    simulated.wait(1.0)
+    assert not moves(simulated)
+    for _ in range(15):
+        simulated.wait(0.1)
+        # The control socket stalls, but gestures in the scene arrive.
+        with pytest.raises(LeaseError, match="just paused"):
+            simulated.touch(driver.person.key)
+    simulated.wait(2 * TICK, driver)
+    simulated.wait(SETTLE_TIME, driver)
+    simulated.touch(driver.person.key)
+
+
+def test_pause_becomes_a_stop_after_longer_silence(simulated: Table, driver: Participant) -> None:
+    simulated.wait(PAUSE_TIMEOUT - 5 * TICK)
+    assert simulated.arm.stops == 0
+    simulated.wait(6 * TICK)
+    assert simulated.hub.stopped is not None
+    assert simulated.hub.stopped.why == f"{driver.person.name} was silent for 5 s."
+
+
+@pytest.mark.usefixtures("driver")
+def test_other_driver_ends_the_pause(simulated: Table) -> None:
+    simulated.wait(1.0)
+    other = simulated.join(PAGES[1])
+    simulated.hub.take(other)
+    simulated.wait(SETTLE_TIME + TICK, other)
+    simulated.hub.move(other, JOG)
+    simulated.wait(2 * PAUSE_TIMEOUT, other)
+    assert simulated.hub.stopped is None
+
+
+@pytest.mark.usefixtures("driver")
+@pytest.mark.parametrize("profile", SilenceProfile)
+def test_late_server_is_blamed_instead_of_the_line(
+    simulated: Table, profile: SilenceProfile
+) -> None:
+    simulated.arm.profile = profile
+    simulated.t += 0.2
+    simulated.hub.tick()
+    simulated.wait(0.1)
+    assert not moves(simulated)
+    if profile is SilenceProfile.SIMULATION:
+        assert simulated.arm.cause is not None
+        assert simulated.arm.cause.reason is Reason.MACHINE_BUSY
+    else:
+        assert simulated.hub.stopped is not None
+        assert "This machine is too busy: its server was 0.18 s late." in simulated.hub.stopped.why
+        assert "silent" not in simulated.hub.stopped.why
+
+
+def test_pause_by_the_arm_voids_older_gestures(simulated: Table, driver: Participant) -> None:
+    drag = simulated.touch(driver.person.key)
+    simulated.arm.cause, simulated.arm.moves = Finding(Reason.LOOP_LATE, 0.3), False
+    with pytest.raises(LeaseError, match="just paused"):
+        simulated.hub.move(driver, JOG)
+    assert not simulated.hub.gate.is_current(drag)
+    simulated.wait(SETTLE_TIME + TICK, driver)
+    simulated.arm.cause = None
+    simulated.hub.move(driver, JOG)
+    simulated.wait(1.0, driver)
+    assert simulated.hub.stopped is None
+
+
+@pytest.mark.parametrize("profile", SilenceProfile)
+def test_closed_window_brakes_and_frees_the_arm(
+    simulated: Table, driver: Participant, profile: SilenceProfile
+) -> None:
+    simulated.arm.profile = profile
+    simulated.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
+    assert not moves(simulated)
+    if profile is SilenceProfile.REAL_ARM:
+        assert simulated.hub.stopped is not None
+        assert simulated.hub.stopped.why == "Window 1 closed the window while the arm moved."
+        return
+    assert simulated.arm.cause == Finding(Reason.DRIVER_LEFT)
+    revocations = simulated.hub.gate.revocations
+    other = simulated.join(PAGES[1], Role.OPERATOR)
+    simulated.wait(SETTLE_TIME + TICK)
+    simulated.hub.acquire(other)
+    assert simulated.hub.lease.driver == other.person
+    # What the page before had begun is void.
+    assert simulated.hub.gate.revocations > revocations
+    # Its page has lost the arm when it returns.
+    with pytest.raises(LeaseError, match="Window 2 holds the arm"):
+        simulated.touch(simulated.join(PAGES[0]).person.key)
+    assert driver.person != other.person
+
+
+def test_reloaded_page_keeps_the_arm_that_nobody_took(
+    simulated: Table, driver: Participant
+) -> None:
+    simulated.arm.moves = False
+    simulated.hub.close(Identity("session", None, Role.ADMIN), PAGES[0])
+    simulated.hub.leave(driver)
+    assert status.common(simulated.hub)["holder"] is None
+    simulated.wait(1.0)
+    again = simulated.join(PAGES[0])
+    simulated.wait(TICK, again)
+    assert simulated.hub.lease.driver == driver.person
+    # A window that is unknown or does not drive changes nothing.
+    simulated.hub.close(Identity("session", None, Role.ADMIN), PAGES[1])
+    assert simulated.hub.lease.driver == driver.person
+    assert simulated.hub.stopped is None

@@ -137,7 +137,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
         requests.Give, requests.Decline, requests.Rename,
         requests.ListPeople, requests.Kick,
-        # Refused without a detour on offer; see test_detour_on_a_server.
+        # Refused without a detour on offer; see test_api_motion.
         requests.Go,
         # Refused at a simulated arm.
         requests.OperateArm,

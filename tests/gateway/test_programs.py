@@ -1,17 +1,24 @@
-"""Test programs that the Python client requests, and the command on a real server."""
+"""Programs on a server: run, paused, stepped, continued and ended, and who may."""
 
 from __future__ import annotations
 
+import asyncio
+import json
+import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError
 from katana450.server.api import answers, requests
-from katana450.server.api.program_requests import Program, ProgramOrder, Steer
+from katana450.server.api.program_requests import Breakpoints, Program, ProgramOrder, Steer
+from tests.gateway.client import Control
+from tests.gateway.postures import FAR
 from tests.gateway.virtual import VirtualServer
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -117,3 +124,294 @@ def test_script_that_is_too_long_is_refused(arm: Client) -> None:
         arm.ask(Program(text=part, more=True))
     with pytest.raises(RefusedError, match="at most 64 KB"):
         arm.ask(Program(text=part, more=True))
+
+
+SCRIPT = """\
+name: Three steps
+steps:
+  - joints: [12, -64, 85, 8, 0]
+  - joints: [24, -64, 85, 8, 0]
+  - joints: [12, -68, 85, 8, 0]
+"""
+
+END = np.deg2rad((12.0, -68.0, 85.0, 8.0, 0.0))
+
+
+@pytest.fixture
+def ready(local: VirtualServer) -> Iterator[Client]:
+    with local.connect("Test") as ready:
+        assert planned(ready, SCRIPT).status == "ready"
+        yield ready
+
+
+def posture(ready: Client) -> np.ndarray:
+    return np.array(ready.query(answers.State).q)
+
+
+def ended(ready: Client) -> answers.Progress:
+    """Return the progress at the end of the run, which comes after its planning."""
+    return wait(ready, lambda each: each.status in ("done", "failed", "refused", "stopped"))
+
+
+def test_stopped_program_is_continued_after_the_stop_is_cleared(ready: Client) -> None:
+    ready.ask(Steer(order=ProgramOrder.RUN))
+    with pytest.raises(RefusedError, match="`resume` ends a pause"):
+        ready.ask(Steer(order=ProgramOrder.CONTINUE))
+    wait(ready, lambda each: each.step == 2 and each.fraction > 0.3)
+    ready.stop()
+    assert wait(ready, lambda each: each.status == "stopped").can_continue
+    with pytest.raises(RefusedError, match="clear the stop"):
+        ready.ask(Steer(order=ProgramOrder.CONTINUE))
+    ready.clear_stop()
+    stood = posture(ready)
+    time.sleep(0.3)
+    # Only the order moves it.
+    assert np.array_equal(posture(ready), stood)
+    ready.ask(Steer(order=ProgramOrder.CONTINUE))
+    steps = set()
+    while (now := ready.query(answers.State).program) is not None and now.status != "done":
+        assert now.status in ("planning", "ready", "running"), now
+        if now.status == "running":
+            steps.add(now.step)
+        time.sleep(0.02)
+    assert steps == {2, 3}
+    assert posture(ready) == pytest.approx(END, abs=1e-9)
+    with pytest.raises(RefusedError, match="No program was interrupted"):
+        ready.ask(Steer(order=ProgramOrder.CONTINUE))
+
+
+def test_continuation_is_refused_after_the_gripper_has_moved(ready: Client) -> None:
+    ready.ask(Steer(order=ProgramOrder.RUN))
+    wait(ready, lambda each: each.step == 1 and each.fraction > 0.2)
+    ready.ask(Steer(order=ProgramOrder.END))
+    ready.go(requests.Gripper(angle=float(np.deg2rad(20.0))))
+    with pytest.raises(RefusedError, match="the gripper has moved"):
+        ready.ask(Steer(order=ProgramOrder.CONTINUE))
+
+
+def test_program_begins_at_a_step_and_pauses_before_another(ready: Client) -> None:
+    ready.ask(Breakpoints(steps=(3,)))
+    ready.ask(Steer(order=ProgramOrder.RUN, at=2))
+    paused = wait(ready, lambda each: each.status == "paused")
+    assert (paused.step, paused.steps, paused.breakpoints) == (3, 3, (3,))
+    assert posture(ready)[0] == pytest.approx(np.deg2rad(24.0), abs=1e-9)
+    # A program that rests may go to another step.
+    ready.ask(Breakpoints(steps=()))
+    ready.ask(Steer(order=ProgramOrder.RUN, at=3))
+    assert ended(ready).status == "done"
+    assert posture(ready) == pytest.approx(END, abs=1e-9)
+
+
+def test_step_that_does_not_exist_is_refused(ready: Client) -> None:
+    ready.ask(Steer(order=ProgramOrder.RUN, at=4))
+    refused = wait(ready, lambda each: each.status == "refused")
+    assert "There is no step 4: Three steps has 3 steps." in refused.why
+    with pytest.raises(RefusedError, match="begin at a step"):
+        ready.ask(Steer(order=ProgramOrder.PAUSE, at=1))
+
+
+LINES = "".join(f"  - line: {{by: {{z: {z}}}}}\n" for z in (20, -20))
+SWEEPS = "".join(f"  - joints: [{angle}, -64, 85, 8, 0]\n" for angle in (60, -60, 50, -50, 40, -40))
+LONG = f"name: Long\ntool: tcp\nsteps:\n{SWEEPS}{LINES * 6}  - home\n"
+"""A script that takes a second or more to plan, and begins with a long motion."""
+
+
+@pytest.fixture
+def owner(local: VirtualServer) -> Iterator[Client]:
+    """Connect a program as owner."""
+    with local.connect("Owner") as owner:
+        yield owner
+
+
+def wait_for_state(
+    owner: Client, until: Callable[[answers.State], bool], seconds: float = 40.0
+) -> answers.State:
+    due = time.monotonic() + seconds
+    while not until(state := owner.query(answers.State)):
+        assert time.monotonic() < due, (state.program, state.why)
+        time.sleep(0.01)
+    return state
+
+
+def status(state: answers.State) -> str:
+    return "" if state.program is None else state.program.status
+
+
+def stays(owner: Client, seconds: float = 1.0) -> None:
+    """Check that the arm does not move for ``seconds``."""
+    before = owner.query(answers.State)
+    time.sleep(seconds)
+    after = owner.query(answers.State)
+    assert after.q == before.q
+    assert not after.moving
+
+
+def test_pause_during_planning_over_http(local: VirtualServer, owner: Client) -> None:
+    for at in range(0, len(LONG), 300):
+        code, _ = local.post(do="program", text=LONG[at : at + 300], more=at + 300 < len(LONG))
+        assert code == 200
+    assert local.post(do="pause")[0] == 200
+    due = time.monotonic() + 40.0
+    while (state := local.post(do="query", at="state")[1])["program"]["status"] == "planning":
+        assert time.monotonic() < due
+        time.sleep(0.05)
+    assert local.post(do="steer", order="run")[0] == 200
+    # Less than the owner may be silent.
+    stays(owner, 0.3)
+    state = local.post(do="query", at="state")[1]
+    assert (state["program"]["status"], state["status"]) == ("paused", "paused")
+    assert local.post(do="speed", value=0.5)[0] == 200
+    code, refused = local.post("another-that-posts", do="resume")
+    assert (code, refused["is"]) == (409, "refused")
+    assert local.post(do="resume")[0] == 200
+    wait_for_state(owner, lambda state: state.moving and state.speed == 0.5, 5.0)
+    assert local.post(do="pause")[0] == 200
+    wait_for_state(owner, lambda state: status(state) == "paused" and not state.moving, 5.0)
+    code, _ = local.post("another-that-posts", do="stop")
+    assert code == 200
+    wait_for_state(
+        owner, lambda state: state.stopped is not None and status(state) == "stopped", 5.0
+    )
+
+
+def test_page_paces_its_program_and_a_stranger_does_not(local: VirtualServer) -> None:
+    async def driven() -> None:
+        control, watching = await local.control(), await local.control()
+        await control.say("program", text="steps:\n  - joints: [60, -64, 85, 8, 0]\n")
+        await control.say("steer", order="run")
+        await control.say("pause")
+        await control.wait(40.0, headline="Paused by you", orders=["end"])
+        await control.say("resume")
+        await control.say("speed", value=0.2)
+        await control.wait(mood="program", speed=0.2)
+        assert not [each for each in control.heard if each["is"] == "refused"]
+        await watching.say("pause")
+        assert "holds the arm" in (await watching.notice("refused"))["why"]
+        await control.wait(mood="program")
+        for each in (control, watching):
+            await each.close()
+
+    local.run(driven())
+
+
+def test_program_key_is_secret_and_required(
+    local: VirtualServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    key = secrets.token_hex(16)
+
+    def do(**request: Any) -> tuple[int, Any]:
+        names = {"X_Program": key, "X_Name": "Sorter"}
+        status, _, body = local.ask("/api/v1/do", data=json.dumps(request).encode(), **names)
+        return status, json.loads(body)
+
+    assert do(do="acquire")[0] == 200
+    pages = [json.loads(local.ask(f"/api/v1/{at}")[2]) for at in ("state", "event_log")]
+    assert pages[0]["holder"] == "Sorter"
+    assert key not in json.dumps(pages)
+    # The name of a program does not serve as its key.
+    assert local.post("Sorter", do="home")[0] == 422
+    assert local.post(secrets.token_hex(16), do="home")[0] == 409
+    assert key not in caplog.text
+    # Reads of other clients, under any name, do not count as its heartbeats.
+    assert do(do="joints", q=FAR.tolist())[0] == 200
+    while (state := local.state()).stopped is None:
+        local.ask("/api/v1/state", X_Program="Sorter", X_Name="Sorter")
+        local.ask("/api/v1/state", X_Program=secrets.token_hex(16))
+    assert state.stopped == "Sorter fell silent while the arm moved."
+    assert state.q[0] < FAR[0] - 0.2
+    # Reads open no windows: only the two programs that posted have one.
+    assert state.participants == 2
+
+
+WAVE = """\
+name: Wave
+speed: 0.2
+steps:
+  - joints: [100, -60, 85, 8, 0]
+  - joints: [-100, -60, 85, 8, 0]
+"""
+
+
+@asynccontextmanager
+async def closed(*controls: Control) -> AsyncIterator[None]:
+    """Close ``controls`` after the block."""
+    yield
+    for each in controls:
+        await each.close()
+
+
+async def until_program(owner: Control, status: str) -> None:
+    async with asyncio.timeout(30.0):
+        while True:
+            await owner.say("query")
+            program = (await owner.notice("state")).get("program") or {}
+            if program.get("status") == status:
+                return
+            await asyncio.sleep(0.05)
+
+
+async def run_program(owner: Control) -> None:
+    await owner.say("program", text=WAVE)
+    await until_program(owner, "ready")
+    await owner.say("steer", order="run")
+    await owner.wait(holder="Wave")
+
+
+def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
+    async def act() -> None:
+        owner, other = await local.control(), await local.control()
+        async with closed(owner, other):
+            await run_program(owner)
+            await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
+            assert not other.status["own_program"]
+            await other.say("ask")
+            await other.wait(asked=True)
+            (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
+            # No other participant may decide.
+            await other.say("decline", to=asking["number"])
+            assert "do not hold" in (await other.notice("refused"))["why"]
+            await owner.say("decline", to=asking["number"])
+            refused = await other.notice("refused")
+            assert refused["why"] == f"{owner.status['name']} declined your request."
+            await other.wait(asked=False)
+            await owner.wait(asking=[], holder="Wave")
+            await other.say("ask")
+            await owner.wait(asking=[asking])
+            await owner.say("give", to=asking["number"])
+            await other.wait(mine=True)
+            await until_program(owner, "stopped")
+            await owner.wait(mine=False, orders=[], holder=other.status["name"])
+
+    local.run(act())
+
+
+async def numbered(owner: Control, other: Control) -> dict[str, Any]:
+    """Return ``other`` as the only entry in the list of requests that ``owner`` gets."""
+    async with asyncio.timeout(5.0):
+        while not owner.status["asking"]:
+            await asyncio.sleep(0.01)
+    (asking,) = owner.status["asking"]
+    assert asking["name"] == other.status["name"]
+    return dict(asking)
+
+
+@pytest.mark.parametrize("by_program", [False, True])
+def test_former_driver_gets_the_name_of_the_new_one(local: VirtualServer, by_program: bool) -> None:
+    async def act() -> None:
+        driver, other = await local.control(), await local.control()
+        async with closed(driver, other):
+            if by_program:
+                await run_program(driver)
+            else:
+                await driver.say("acquire")
+                await driver.wait(mine=True)
+            assert driver.status["taken"] == ""
+            await other.say("take")
+            await other.wait(mine=True, taken="")
+            await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
+            await other.say("release_lease")
+            await driver.wait(holder=None, taken="")
+            await driver.say("acquire")
+            await driver.wait(mine=True, taken="")
+
+    local.run(act())

@@ -23,7 +23,7 @@ from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer, ServerError
 from tests.gateway.client import HOUR, ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
-from tests.gateway.test_isolation import under_way
+from tests.gateway.test_frozen_arm import under_way
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"

@@ -26,7 +26,7 @@ from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask
 from tests.gateway.postures import FAR
-from tests.gateway.test_isolation import process_state
+from tests.gateway.test_frozen_arm import process_state
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
@@ -39,7 +39,7 @@ POST = "#VRML V2.0 utf8\nShape { geometry Box { size 0.04 0.04 0.1 } }"
 FATES = [
     ("arm", signal.SIGKILL),
     pytest.param("arm", signal.SIGSTOP, marks=pytest.mark.long),
-    # A killed front end is in `test_isolation`.
+    # A killed front end is in `test_frozen_arm`.
     pytest.param("front", signal.SIGSTOP, marks=pytest.mark.long),
 ]
 
