@@ -1,4 +1,4 @@
-"""Test the message for a place out of reach: what it suggests can be copied, and is reached."""
+"""Messages about places out of reach and about contacts: what they suggest can be copied."""
 
 from __future__ import annotations
 
@@ -75,3 +75,27 @@ def test_path_beyond_a_limit_is_reported_in_the_frame_of_the_script(
     assert found[4] == name
     assert [float(found[1]), float(found[3])] == pytest.approx([330.0, z], abs=0.1)
     assert -120.0 < float(found[2]) < 120.0
+
+
+ABOVE = "frame: base\ntool: tcp\nsteps:\n  - move: {x: 320, y: 0, z: 150, pitch: 60, roll: 0}\n"
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        (
+            "move: {x: 320, y: 0, z: -50, pitch: 60}",
+            "At the end, right finger and table would overlap by 54.3 mm, and 6 mm are required.",
+        ),
+        (
+            "line: {to: {x: 320, y: 0, z: -50}}",
+            "at (320.0, 0.0, 0.0) mm in the base frame: right finger and table would overlap by",
+        ),
+    ],
+)
+def test_point_below_the_table_is_refused_for_the_finger(
+    stage: Stage, step: str, message: str
+) -> None:
+    with pytest.raises(ScriptError) as refused:
+        compiled(parse(f"{ABOVE}  - {step}\n"), stage.plan_context, stage.begin())
+    assert message in str(refused.value)

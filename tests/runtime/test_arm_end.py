@@ -19,16 +19,22 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import Finding, Reason, Verdict
+from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
 from katana450.arm.control.stopping import clear_refusal
 from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.arm_end import ArmEnd, CommandMessage
+from katana450.arm.runtime.arm_listener import FRONT, Greeting
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
-from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES
+from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes
+from katana450.assembly import running_arm
+from katana450.assembly.robot_session import DescribedRobot
+from katana450.assembly.running_arm import RunningArm
 from katana450.errors import InputError
+from katana450.settings import Settings
 
 SILENCE = 0.3
 
@@ -385,3 +391,95 @@ def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: 
     for each in (old, new):
         each.arm_end.close()
         each.loop.stop()
+
+
+OUTCOME = Outcome(Verdict.ACCEPTED)
+
+
+def test_all_futures_of_a_ticket_receive_its_outcome() -> None:
+    outcomes = Outcomes()
+    first, cancelled, last = (outcomes.of(7) for _ in range(3))
+    cancelled.cancel()
+    assert not first.done()
+    outcomes.note([(7, OUTCOME)])
+    assert first.result(0.0) is OUTCOME
+    assert last.result(0.0) is OUTCOME
+    assert outcomes.of(7).result(0.0) is OUTCOME
+
+
+class Again:
+    """A front end that connects again to its arm."""
+
+    def __init__(self, arm: ArmModel, session: Session) -> None:
+        self.ends = Ends(arm, session)
+        self.arm_ends: list[ArmEnd] = []
+        self.front = FrontEnd(self.connection(), session.check, self.connection)
+
+    def connection(self, number: int = 0) -> Connection:
+        ours, theirs = multiprocessing.Pipe()
+        self.arm_ends.append(ArmEnd(ours, self.ends.loop, self.ends.mailbox, SILENCE, number))
+        self.arm_ends[-1].start()
+        return theirs
+
+    def works_by_a_second_pipe(self) -> None:
+        until(lambda: len(self.arm_ends) == 2 and self.front.age < SILENCE)
+        assert self.arm_ends[0].cut.is_set()
+        ticket = clear_stop(self.front)
+        until(lambda: self.front.state_publisher.snapshot.ticket == ticket)
+        for arm_end in (self.ends.arm_end, *self.arm_ends):
+            arm_end.close()
+        self.ends.loop.stop()
+
+
+@pytest.mark.parametrize("name", ["_outcomes", "_put"])
+def test_error_in_a_thread_of_the_arm_closes_the_pipe(
+    arm: ArmModel, session: Session, name: str
+) -> None:
+    again = Again(arm, session)
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("dictionary changed size during iteration")
+
+    setattr(again.arm_ends[0], name, fail)
+    again.front.start()
+    again.front.deliver(cmd.SetJoint(0, 1.0))
+    # No command can come any more, so the arm stops.
+    until(lambda: again.front.state_publisher.snapshot.state.stopped is not None)
+    again.works_by_a_second_pipe()
+
+
+def test_error_in_the_thread_of_the_front_end_closes_the_pipe(
+    arm: ArmModel, session: Session
+) -> None:
+    again = Again(arm, session)
+
+    def fail() -> None:
+        again.front.on_stop_change = lambda: None
+        raise RuntimeError("a callback met an error")
+
+    again.front.on_stop_change = fail
+    again.front.start()
+    again.front.deliver(cmd.Stop())
+    again.works_by_a_second_pipe()
+
+
+def test_arm_ends_stopped_and_at_rest_although_a_command_has_just_arrived(
+    robot: Robot, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The priority of this process stays.
+    monkeypatch.setattr(running_arm, "raise_priority", lambda: None)
+    arm = RunningArm(Settings(), DescribedRobot(robot, session, ()))
+    arm.start()
+    ours, theirs = multiprocessing.Pipe()
+    arm.attach(ours, Greeting(FRONT))
+    front = FrontEnd(theirs, session.check)
+    front.start()
+    front.deliver(cmd.SetJoint(0, 2.0))
+    arm.stop()
+    state = arm.state_publisher.snapshot.state
+    assert (state.stopped is not None, state.moving, arm.running) == (True, False, False)
+    np.testing.assert_array_equal(state.q, state.setpoint)
+    assert front.cut.wait(5.0)
+    # The front end is disconnected, and sees no stop that nobody pressed.
+    assert front.state_publisher.snapshot.state.stopped is None
+    theirs.close()
