@@ -57,26 +57,6 @@ def test_tool_and_orientation_are_chosen_in_the_line(urdf: Urdf) -> None:
     np.testing.assert_allclose(np.array(pose["T"])[:3, 3], line["p"], atol=1e-9)
 
 
-def test_singular_posture_names_its_axes(urdf: Urdf) -> None:
-    options = ("--urdf", str(urdf("vx300s")))
-    q = [0.2, 0.3, 0.4, 0.1, 0.0, 0.5]
-    (pose,) = ask("fk", [{"q": q}], *options)
-    (found,) = ask("ik", [{"T": pose["T"], "q": q}], *options)
-    here = next(each for each in found["solutions"] if np.allclose(each["q"], q, atol=1e-7))
-    assert here["singular"] == [4, 6]
-
-
-def test_nearest_has_its_reason(urdf: Urdf) -> None:
-    line = {"p": [3.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}
-    (found,) = ask("ik", [line], "--urdf", str(urdf("px100")), "--nearest")
-    assert found["solutions"]
-    assert found["residual_mm"] > 2000.0
-    assert "mm out of reach" in found["nearest"]["reason"]
-    assert found["nearest"]["position_mm"] > 2000.0
-    assert isinstance(found["nearest"]["limits"], list)
-    assert found["nearest"]["held_by"] == ["links"]
-
-
 @pytest.mark.parametrize(
     ("line", "message"),
     [

@@ -284,14 +284,6 @@ def test_branch_that_the_limits_exclude_has_a_reason_and_is_refused_with_it(name
     assert any(refused.values())
 
 
-def test_stretched_elbow_is_on_both_branches() -> None:
-    session = session_of(UR5E)
-    state = session.begin(np.radians([0.0, -60.0, 0.0, -60.0, -90.0, 0.0]), 0.0, 0.0)
-    near = [each for each in session.choices(state) if each.metrics.distance < 1e-6]
-    assert len(near) == 2
-    assert all(each.refusal == "" for each in near)
-
-
 def test_priority_decides_what_is_kept_out_of_reach() -> None:
     session = session_of(UR5E)
     start = begun(session)
@@ -318,22 +310,6 @@ def test_position_only_leaves_the_orientation_free() -> None:
     state = settled(session, start, position_only)
     np.testing.assert_allclose(pose(session, state)[:3, 3], target, atol=1e-6)
     assert state.status is Status.OK
-
-
-def test_stop_pause_and_home_work_during_a_drag() -> None:
-    session = session_of(UR5E)
-    start = begun(session)
-    far = cmd.MoveTool(pose(session, start)[:3, 3] + (0.2, 0.2, 0.1))
-    moving = run(session, start, [far], 15)
-    paused = settled(session, moving, [cmd.Pause()])
-    assert paused.status is Status.PAUSED
-    assert settled(session, paused, [cmd.Resume()]).status is Status.OK
-    stopped = run(session, moving, [cmd.Stop()], 120)
-    assert stopped.motion.at_rest
-    assert run(session, stopped, [far], 5).motion.at_rest
-    free = run(session, stopped, [cmd.ClearStop()], 2)
-    home = settled(session, free, [cmd.Home()])
-    np.testing.assert_allclose(home.q, session.ready, atol=1e-9)
 
 
 def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:

@@ -13,7 +13,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
-from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import exact_chain, links_of
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.extensions.reachability.pose_solver import PoseSolver
@@ -85,36 +84,6 @@ def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: st
             assert np.abs(away).max(axis=1).min() <= 1e-7
         count += len(exact)
     assert count >= 100
-
-
-@pytest.mark.parametrize("name", ["UR5e", "KR 6"])
-def test_many_poses_are_corrected_as_one(tmp_path: Path, name: str) -> None:
-    chain = chain_in(tmp_path, ARMS[name])
-    solver = kinematics_of(chain)
-    assert isinstance(solver, ClosedForm)
-    T = forward_batch(chain, postures(chain, 30))
-    distance, turn = errors_of(chain, solver.inverse_batch(T), T)
-    single = np.array([solver.solve(each) for each in T])
-    alone, _ = errors_of(chain, single, T)
-    assert ((distance <= EXACT) & (turn <= EXACT)).sum() >= 100
-    np.testing.assert_array_equal(distance <= EXACT, alone <= EXACT)
-
-
-def test_second_correction_is_made_only_where_it_is_needed(tmp_path: Path) -> None:
-    chain = chain_in(tmp_path, UR5E)
-    rounding = FileRounding(chain, links_of(chain))
-    solver = kinematics_of(exact_chain(chain, links_of(chain)))
-    assert isinstance(solver, ClosedForm)
-    T = forward_batch(chain, postures(chain, 30))
-    asked = []
-
-    def again(poses: np.ndarray) -> np.ndarray:
-        asked.append(poses)
-        return solver.inverse_batch(poses)[:, 0]
-
-    distance, turn = errors_of(chain, rounding.corrected(again(T), T, again)[:, None], T)
-    assert (np.maximum(distance, turn) <= EXACT).any()
-    assert len(asked) == 2
 
 
 @pytest.mark.parametrize("name", ["UR5e", "KR 6", "Puma 560"])

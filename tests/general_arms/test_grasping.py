@@ -126,23 +126,6 @@ def test_fingers_close_on_the_sides_that_the_grasp_chose(name: str, tmp_path: Pa
     assert max(gaps) - min(gaps) < 1e-4
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "name", ["OpenMANIPULATOR-X", pytest.param("Panda", marks=pytest.mark.long)]
-)
-def test_box_is_stacked_on_another(name: str, tmp_path: Path) -> None:
-    bench, small = BENCHES[name], name == "OpenMANIPULATOR-X"
-    size = (25.0, 25.0, 40.0) if small else (40.0, 40.0, 50.0)
-    yaws = [float(np.degrees(np.arctan2(at[1], at[0]))) for at in (bench.near, bench.to)]
-    boxes = [
-        item("a", "box", size, bench.near, yaws[0]),
-        item("b", "box", size, bench.to, yaws[1]),
-    ]
-    plan = planned(tmp_path, gripping_urdf(name), ["stack: {object: b, on: a}"], *boxes)
-    b = next(each for each in played(plan)[-1].objects if each.name == "b")
-    assert place(b) == pytest.approx([*bench.near, size[2]], abs=1e-6)
-
-
 def test_held_object_keeps_clear_of_a_wall_as_the_arm_does(tmp_path: Path) -> None:
     """The wall is so high that the hand alone would pass over it, but not the tall object."""
     post = item("post", "box", (40.0, 40.0, 160.0), (480.0, 120.0), 14.0)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import so3
 from tests.robot.hands import hand
 from tests.robot.public_arms import PX100, two_sided, written
 
@@ -41,21 +41,6 @@ def test_posture_is_found_again(urdf: Urdf, name: str, frame: str) -> None:
         np.testing.assert_allclose(best.T, T, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_many_poses_are_solved_at_once(urdf: Urdf, name: str) -> None:
-    arm = load(urdf(name))
-    q = np.random.default_rng(2).uniform(arm.lower, arm.upper, (6, arm.n))
-    T = arm.fk(q)
-    found = arm.ik(T)
-    assert found.q.shape == (6, NAMES[name], arm.n)
-    assert found.within_limits.shape == found.position_error.shape == (6, NAMES[name])
-    good = found.within_limits & (found.position_error < 1e-8) & (found.rotation_error < 1e-8)
-    assert good.any(axis=1).all()
-    with pytest.raises(katana450.InputError, match="solutions of 6 poses"):
-        iter(found)
-    assert arm.ik(np.zeros((0, 4, 4))).q.shape[0] == 0
-
-
 def test_frames_agree(urdf: Urdf) -> None:
     shoulder, base = load(urdf("ur5")), load(urdf("ur5"), frame="base")
     q = np.full(6, 0.3)
@@ -63,17 +48,6 @@ def test_frames_agree(urdf: Urdf) -> None:
     # The tool of the published file, turned by nothing.
     home = base.fk(np.zeros(6))
     np.testing.assert_allclose(home[:3, 3], (0.81725, 0.19145, -0.005491), atol=1e-9)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_jacobian_is_the_derivative(urdf: Urdf, name: str) -> None:
-    arm = load(urdf(name), frame="base")
-    q, h = np.full(arm.n, 0.2), 1e-6
-    J = arm.jacobian(q)
-    assert J.shape == (6, arm.n)
-    for axis, step in enumerate(h * np.eye(arm.n)):
-        rate = (arm.fk(q + step) - arm.fk(q - step)) / (2.0 * h)
-        np.testing.assert_allclose(se3.hat(J[:, axis]), rate @ se3.inverse(arm.fk(q)), atol=1e-8)
 
 
 def test_tool_is_chosen_by_its_link(urdf: Urdf) -> None:
@@ -162,19 +136,6 @@ def test_line_of_the_library_is_straight(urdf: Urdf, name: str, frame: str) -> N
     if arm.n != 5:
         back = arm.line(to=samples.points[0], start=plan.end)
         np.testing.assert_allclose(back.end, plan.start, atol=1e-9)
-
-
-@pytest.mark.cases(2)
-@pytest.mark.parametrize("name", ["px100", "vx300s", "ur5", "seven"])
-def test_circle_of_the_library_closes(urdf: Urdf, name: str) -> None:
-    arm = load(urdf(name), frame="base")
-    centre, radius = arm.fk(arm.ready)[:3, 3] - (0.02, 0.0, 0.02), 0.02
-    plan = arm.circle(centre, radius, normal=(1.0, 0.0, 1.0))
-    np.testing.assert_allclose(plan.end, plan.start, atol=1e-9)
-    off = plan.sample().points - centre
-    np.testing.assert_allclose(np.linalg.norm(off, axis=1), radius, atol=1e-9)
-    assert off[0][2] > 0.0
-    assert plan.plot() is not None
 
 
 def test_plan_leads_to_a_pose_and_a_line_turns_to_angles(urdf: Urdf) -> None:

@@ -158,25 +158,6 @@ def _tilt(found: Pour, state: State) -> float:
     return float(np.degrees(np.arccos(np.clip(found.cup(state)[2, 2], -1.0, 1.0))))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("name", "left"), [("UR5e", 140.0), ("four axes", 40.0)])
-def test_part_is_poured(name: str, left: float, tmp_path: Path) -> None:
-    found = poured(tmp_path, name, "{into: basin, ml: 60}")
-    state = found.simulation.states[-1]
-    assert state.poured is not None
-    water = state.poured.water
-    assert water.cup.kept * FEMTOLITRE / ML == pytest.approx(left, abs=0.6)
-    assert water.basin * FEMTOLITRE / ML == pytest.approx(60.0, abs=0.6)
-    assert water.spilled == 0
-
-
-@pytest.mark.long
-def test_cup_that_cannot_be_turned_over_is_not_emptied(tmp_path: Path) -> None:
-    why = "The cup cannot be emptied into basin: The path leaves the reach of the arm"
-    with pytest.raises(ScriptError, match=why):
-        planned(tmp_path, "four axes", "{into: basin, shake: 0}")
-
-
 @pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["four axes", "UR5e"])
 @pytest.mark.parametrize(
@@ -229,15 +210,6 @@ def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path
     assert water is not None
     assert water.water.basin * FEMTOLITRE / ML == pytest.approx(ml, rel=0.01)
     assert water.water.spilled == 0
-
-
-@pytest.mark.long
-def test_all_is_poured_at_a_rate(tmp_path: Path) -> None:
-    found = poured(tmp_path, "UR5e", "{into: basin, rate: 10 ml/s}")
-    state = found.simulation.states[-1]
-    assert state.poured is not None
-    assert state.poured.water.basin * FEMTOLITRE / ML > 199.0
-    assert state.poured.water.spilled == 0
 
 
 START = ToolPose.of(

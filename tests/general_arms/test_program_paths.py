@@ -16,11 +16,9 @@ from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from tests.general_arms.driven import TICK, session_of
 from tests.general_arms.programs import (
-    angles_beside,
     builder,
     every,
     length,
@@ -121,16 +119,3 @@ def test_angles_that_gimbal_lock_hides_are_asked_for() -> None:
     with pytest.raises(InputError, match="`roll`, `pitch` and `yaw` together"):
         made.planning.oriented(target, Angles(yaw=0.3), np.eye(3))
     assert made.planning.oriented(target, Angles(), np.eye(3)) is target
-
-
-def test_curve_is_the_same_for_one_place_and_for_many() -> None:
-    path = (
-        plans(program(UR5E, f"line: {{{angles_beside(UR5E, (0.1, 0.1, 0.1))}}}"))[0]
-        .segments[0]
-        .path
-    )
-    assert isinstance(path, PosePath)
-    sigma = np.linspace(0.0, 1.0, 5)
-    many = path.curve.at(Jet.variable(sigma)).T
-    for number, each in enumerate(sigma.tolist()):
-        np.testing.assert_allclose(path.curve.at(Jet.variable(each)).T[0], many[number], atol=1e-15)

@@ -16,12 +16,11 @@ from katana450.maths.geometry import so3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.path import joint_derivatives
-from tests.general_arms.driven import TICK, begun, pose, session_of, settled
+from tests.general_arms.driven import begun, pose, session_of, settled
 from tests.general_arms.programs import (
     NANOMETRE,
     REST,
     SOME,
-    angles_beside,
     angles_of,
     builder,
     every,
@@ -93,16 +92,6 @@ def test_line_is_straight_and_keeps_the_orientation_at_every_tick(chain: Chain) 
     assert np.linalg.norm(off - np.outer(off @ direction, direction), axis=1).max() < 1e-4
 
 
-@every(SOME, REST)
-def test_run_keeps_the_limits_of_every_joint(chain: Chain) -> None:
-    made = program(chain, f"line: {{by: {{y: {length(chain)}}}}}", "home")
-    q = np.array([state.setpoint for state in played(chain, made)])
-    limits = session_of(chain).require_arm().limits
-    bounds = (limits.speed, limits.acceleration, limits.jerk)
-    for order, most in enumerate(bounds, start=1):
-        assert (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max() <= 1.0 + 1e-6
-
-
 @pytest.mark.cases(2)
 @every(SOME, REST)
 @pytest.mark.parametrize("normal", ["x", "[0.2, 1, 1]"])
@@ -121,22 +110,6 @@ def test_circle_closes_in_the_tool_and_in_the_joints(chain: Chain, normal: str) 
     axis = np.array((1.0, 0.0, 0.0)) if normal == "x" else np.array((0.2, 1.0, 1.0))
     np.testing.assert_allclose(off @ axis, 0.0, atol=NANOMETRE)
     assert path.turned_off(sigma, q).max() < 1e-9
-
-
-@pytest.mark.cases(2)
-@every(SOME, REST)
-def test_derivatives_of_the_joints_are_exact(chain: Chain) -> None:
-    angles = "" if chain.n < 6 else f", {angles_beside(chain, (0.1, -0.1, 0.2))}"
-    made = program(chain, f"line: {{by: {{x: {-0.5 * length(chain)}}}{angles}}}")
-    path = plans(made)[-1].segments[0].path
-    sigma = np.linspace(0.05, 0.95, 9)
-    h = 1e-3
-    q, first, second, third = joint_derivatives(path, sigma)
-    ahead, behind = (joint_derivatives(path, sigma + step) for step in (h, -h))
-    np.testing.assert_allclose(first, (ahead[0] - behind[0]) / (2 * h), atol=1e-4)
-    np.testing.assert_allclose(second, (ahead[1] - behind[1]) / (2 * h), atol=1e-3)
-    np.testing.assert_allclose(third, (ahead[2] - behind[2]) / (2 * h), atol=2e-2)
-    np.testing.assert_allclose(q, (ahead[0] + behind[0]) / 2 - h * h / 2 * second, atol=1e-8)
 
 
 @pytest.mark.cases(1)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
 from contextlib import redirect_stdout
 from io import StringIO
@@ -15,18 +13,16 @@ import viser
 from jsonschema import Draft202012Validator
 
 from katana450.errors import KatanaError
-from katana450.extensions.media.measures import bounds, measurements
 from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.script_schema import script_schema
 from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.server.traces import Traces, coloured
-from katana450.extensions.programs.source import ScriptError
 from katana450.maths.kinematics.chain import Chain
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
-from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA
+from tests.general_arms.published_arms import OPENMANIPULATOR_X
 from tests.programs.yaml_core import loaded
 from tests.viser_bridge import internals
 
@@ -45,20 +41,6 @@ def test_example_is_valid_for_editors() -> None:
     text = SCRIPT.read_text(encoding="utf-8")
     assert Draft202012Validator(script_schema()).is_valid(loaded(text))
     assert "$schema=../script.schema.json" in text
-
-
-@pytest.mark.long
-def test_example_keeps_to_its_curves_and_limits(ur5e_file: Path) -> None:
-    plan = plan_script(parse(script_text(SCRIPT)), ur5e_file)
-    simulation = run_by_clock(plan)
-    arm = plan.robot.require_arm()
-    values = measurements(plan.program, arm, simulation.trace)
-    assert [str(each) for each in bounds(plan.script, values) if not each.held] == []
-    assert values["nearest_clearance_mm"] is not None
-    between = values["between_ticks_error_mm"]
-    assert between is not None
-    assert between < 0.1
-    np.testing.assert_allclose(simulation.states[-1].q, plan.session.ready, atol=1e-9)
 
 
 def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
@@ -91,46 +73,6 @@ def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
     finally:
         with redirect_stdout(StringIO()):
             server.stop()
-
-
-@pytest.mark.long
-def test_example_runs_at_the_terminal_with_a_report(ur5e_file: Path, tmp_path: Path) -> None:
-    command = ("run", str(SCRIPT), "--urdf", str(ur5e_file), "--report", "out", "--headless")
-    done = subprocess.run(
-        [sys.executable, "-m", "katana450", *command],
-        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "Max position error" in done.stdout
-    found = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"report.html", "trace.csv", "path.png", "speeds.png", "tracing.png"} <= found
-
-
-@pytest.mark.cases(1)
-@pytest.mark.parametrize(
-    "chain",
-    [
-        pytest.param(OPENMANIPULATOR_X, id="OpenMANIPULATOR-X"),
-        pytest.param(KR_6, id="KR 6", marks=pytest.mark.long),
-        pytest.param(PANDA, id="Panda", marks=pytest.mark.long),
-    ],
-)
-def test_line_stops_short_of_what_stands_in_its_way(chain: Chain, tmp_path: Path) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(chain_urdf("arm", chain), encoding="utf-8")
-    free = plan_script(parse("frame: base\nsteps:\n  - wait: 0\n"), path)
-    tool = free.robot.require_arm().kinematics.target_at(free.start.q).position
-    base = free.robot.require_arm().T_base_shoulder
-    x, y, z = (1e3 * (base[:3, :3] @ tool + base[:3, 3])).tolist()
-    length = 40.0 if chain.n == 4 else 150.0
-    line = f"frame: base\nsteps:\n  - line: {{by: {{y: {length}}}}}\n"
-    plan_script(parse(line), path)
-    scene = (
-        f"scene:\n  - {{name: post, shape: box, size: [20, 20, {z + 40}], "
-        f"pose: [{x}, {y + 0.6 * length}, 0, 0, 0, 0]}}\n"
-    )
-    with pytest.raises(ScriptError, match=r"blocked \d+ % along it, .* post would"):
-        plan_script(parse(scene + line), path)
 
 
 def test_robot_without_a_tool_runs_no_script(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import find_robot
-from katana450.client import Client, RefusedError
+from katana450.client import Client
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -27,7 +27,7 @@ from tests.gateway.virtual import VirtualServer
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.gripping_arms import gripping_urdf
 from tests.general_arms.links_of_arms import openmanipulator_x, ur5e
-from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, UR5E
+from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
 from tests.general_arms.published_hands import ROBOTIQ_2F_85, hand_urdf
 
 STOP = 0.005
@@ -194,49 +194,6 @@ def test_drag_slider_jog_and_script_keep_clear_of_a_wall(chain: Chain, tmp_path:
                 break
         assert status(now) == "done"
         assert abs(now.q[0] - pan) < 1e-6
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("chain", [PANDA, KR_6, OPENMANIPULATOR_X], ids=["Panda", "KR 6", "OpenX"])
-def test_script_pauses_on_its_line_and_continues_after_a_stop(chain: Chain, tmp_path: Path) -> None:
-    with served(tmp_path, chain_urdf("arm", chain)) as (arm, _):
-        start, d = pose(arm), 40.0 if chain.n == 4 else 120.0
-        x, y, z = (1e3 * start[:3, 3]).tolist()
-        started(
-            arm,
-            "frame: shoulder\nspeed: 0.4\nsteps:\n"
-            f"  - line: {{by: {{y: {d}}}}}\n"
-            f"  - line: {{by: {{y: {-d}}}}}\n"
-            f"  - circle: {{centre: [{x}, {y}, {z - 0.3 * d}], normal: x, radius: {0.3 * d}}}\n",
-        )
-
-        def check_line(now: answers.State) -> float:
-            T = np.array(now.T)
-            along, *off = (T[:3, 3] - start[:3, 3])[[1, 0, 2]].tolist()
-            np.testing.assert_allclose(off, 0.0, atol=1e-9)
-            assert -1e-9 < along < 1e-3 * d + 1e-9
-            if chain.n >= 6:
-                assert so3.angle(T[:3, :3], start[:3, :3]) < 1e-8
-            return float(along)
-
-        until(arm, lambda now: check_line(now) > 0.4e-3 * d)
-        arm.ask(Steer(order=ProgramOrder.PAUSE))
-        paused = until(arm, lambda now: not now.moving)
-        assert status(paused) == "paused"
-        assert check_line(paused) < 1e-3 * (d - 1.0)
-        arm.ask(Steer(order=ProgramOrder.RESUME))
-        until(arm, lambda now: now.program is not None and now.program.step == 3 and now.moving)
-        arm.stop()
-        stopped = until(arm, lambda now: not now.moving)
-        assert (bool(stopped.stopped), status(stopped)) == (True, "stopped")
-        with pytest.raises(RefusedError):
-            arm.ask(Steer(order=ProgramOrder.CONTINUE))
-        np.testing.assert_array_equal(state(arm).q, stopped.q)
-        arm.clear_stop()
-        arm.ask(Steer(order=ProgramOrder.CONTINUE))
-        until(arm, lambda now: status(now) == "done")
-        # The highest point of the circle is where the lines began.
-        np.testing.assert_allclose(pose(arm), start, atol=1e-8)
 
 
 @pytest.mark.long
