@@ -19,8 +19,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, set_speed, take
 from tests.browser.test_app import Robot
-from tests.gateway.delayed_link import DelayedLink
-from tests.gateway.slow_link import SlowLink
+from tests.gateway.slow_link import DelayedLink, SlowLink
 
 
 def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefacts: Path) -> None:

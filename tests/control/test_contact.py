@@ -81,19 +81,6 @@ def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> 
 
 
 @pytest.mark.parametrize("what", INTO)
-def test_arm_without_collision_world_collides(
-    session: Session, world: CollisionWorld, what: str
-) -> None:
-    start, commands, _ = INTO[what]
-    state = session.step(standing(session, start), commands, TICK)
-    deepest = clearance(world, state)
-    while state.moving:
-        state = session.step(state, [], state.t + TICK)
-        deepest = min(deepest, clearance(world, state))
-    assert deepest < 0.0
-
-
-@pytest.mark.parametrize("what", INTO)
 def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None:
     start, commands, _ = INTO[what]
     blocked, _ = run(guarded, standing(guarded, start), commands)
@@ -141,14 +128,6 @@ def test_end_of_a_drag_before_a_contact_drops_the_rest_of_the_path(guarded: Sess
     assert isinstance(let_go.target, JointTarget)
     assert not let_go.under_way
     assert let_go.findings[0].reason is Reason.CONTACT
-
-
-def test_hold_clears_the_contact_finding(guarded: Session) -> None:
-    start, commands, _ = INTO["table"]
-    blocked, _ = run(guarded, standing(guarded, start), commands)
-    held = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
-    assert held.findings == ()
-    assert held.status is Status.OK
 
 
 def test_fingers_wait_before_a_cup_until_the_arm_moves_away(guarded: Session) -> None:

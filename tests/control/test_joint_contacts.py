@@ -21,7 +21,7 @@ from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load
 from katana450.errors import InputError
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, STOP
+from katana450.maths.collision.clearance import DISTANCE_ROUNDING, STOP
 from katana450.maths.collision.world import CollisionWorld
 from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
@@ -110,15 +110,6 @@ def test_both_carriages_brake_and_the_blocked_one_continues_once_free(make: Make
     state = after(session, seen[-1], 4.0, made.move(slide_right=0.3))
     np.testing.assert_allclose(state.setpoint, (0.4, 0.3), atol=1e-9)
     assert (state.status, state.findings) == (Status.OK, ())
-
-
-def test_a_joint_moves_away_from_a_contact_at_once(make: Make) -> None:
-    made = make(rail())
-    session = made.session
-    state = after(session, begun(session), 3.0, made.move(slide_left=0.4))
-    away = after(session, state, 3.0, made.move(slide_left=0.0))
-    assert away.setpoint[0] == 0.0
-    assert not away.findings
 
 
 def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> None:
@@ -251,32 +242,6 @@ def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
     state = after(session, state, 3.0, cmd.Remove("block"))
     assert height(state) == pytest.approx(STOP, abs=3e-3)
     assert state.near == {"beam", "table"}
-
-
-def test_an_object_beside_the_beam_stops_its_swing(make: Make) -> None:
-    made = make(column())
-    session = made.session
-    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(y=0.2)))
-    low = after(session, state, 4.0, made.move(lift=-0.28))
-    assert not low.findings
-    swung = after(session, low, 4.0, made.move(swing=1.5))
-    assert 0.3 < swung.setpoint[1] < 0.8
-    assert swung.near == {"beam", "block"}
-    over = after(session, swung, 2.0, made.move(lift=-0.2, swing=swung.setpoint[1]))
-    free = after(session, over, 4.0, made.move(swing=1.5))
-    assert (free.setpoint[1], free.findings) == (1.5, ())
-
-
-def test_an_object_that_is_placed_into_the_beam_can_be_left(make: Make) -> None:
-    made = make(column())
-    session = made.session
-    low = after(session, begun(session), 4.0, made.move(lift=-0.24))
-    state = after(session, low, 0.1, cmd.PlaceObject(block()))
-    deeper = after(session, state, 1.0, made.move(lift=-0.3))
-    assert abs(deeper.setpoint[0] - low.setpoint[0]) < 2.0 * DEPTH_ROUNDING
-    assert deeper.near == {"beam", "block"}
-    up = after(session, deeper, 3.0, made.move(lift=0.0))
-    assert (up.setpoint[0], up.findings) == (0.0, ())
 
 
 def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:

@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait, DisplayMode
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.session import MAX_STEP_TIME, Session
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
-from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 
 DT = 0.01
@@ -178,13 +177,3 @@ def test_command_for_other_joints_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         session.check(command)
-
-
-def test_late_tick_makes_no_leap_and_internal_error_holds(session: Session, state: State) -> None:
-    moving = after(session, state, 0.5, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
-    late = session.step(moving, (), moving.t + 5.0)
-    on_time = session.step(moving, (), moving.t + MAX_STEP_TIME)
-    np.testing.assert_array_equal(late.setpoint, on_time.setpoint)
-    held = failed(moving, [])
-    assert held.status is Status.FAULT
-    np.testing.assert_array_equal(after(session, held, 1.0).q, moving.setpoint)

@@ -11,9 +11,8 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.modes import JointTarget, PoseTarget
-from katana450.arm.control.session import MAX_STEP_TIME, Session
+from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, Verdict
-from katana450.arm.runtime.tick import failed
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -54,11 +53,6 @@ def test_far_target_is_approached_at_maximum_speed(arm: ArmModel, state: State) 
     v, a, j = (limit[0] for limit in (arm.chain.speed, arm.limits.acceleration, arm.limits.jerk))
     assert ticks * TICK == pytest.approx(2.0 / v + v / a + a / j, abs=2 * TICK)
     assert state.setpoint[0] == 2.0
-
-
-def test_late_tick_makes_no_leap(arm: ArmModel, session: Session, state: State) -> None:
-    after = session.step(state, [cmd.SetJoint(0, 2.0)], 60.0)
-    assert after.setpoint[0] <= arm.chain.speed[0] * MAX_STEP_TIME * (1 + 1e-12)
 
 
 def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: State) -> None:
@@ -194,12 +188,6 @@ def test_joint_stops_at_its_limit_and_reports_it(
     assert finding.amount == limit
 
 
-def test_sliders_may_change_the_branch(session: Session, state: State) -> None:
-    assert str(state.branch) == "front-up"
-    state = run(session, state, [cmd.SetJoint(2, -0.5)])
-    assert str(state.branch) == "front-down"
-
-
 def test_zero_posture_hold_and_home(session: Session, state: State) -> None:
     state = run(session, state, [cmd.GoToZero()])
     assert (state.goal == 0.0).all()
@@ -252,15 +240,6 @@ def test_unsupported_request_changes_nothing(
     with pytest.raises(InputError, match=message):
         session.step(state, [cmd.SetJoint(0, 1.0), command], TICK)
     assert (state.goal == session.ready).all()
-
-
-def test_arm_holds_after_a_failure(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.SetJoint(0, 2.0)], ticks=5)
-    held = failed(moving, [])
-    assert held.status is Status.FAULT
-    after = run(session, held, [], ticks=5)
-    assert (after.setpoint == moving.setpoint).all()
-    assert run(session, after, [cmd.Home()]).status is Status.OK
 
 
 def test_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.client import Client
 from katana450.resources import URDF_PATH
+from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.browser.shared_server import SharedServer
@@ -25,6 +27,19 @@ def described() -> DescribedRobot:
 def local(described: DescribedRobot) -> Iterator[VirtualServer]:
     """Return a new server in this process. Its clock is that of the test."""
     with VirtualServer(described) as server:
+        yield server
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> AccessFile:
+    """Return a new file of access links."""
+    return AccessFile.create(tmp_path / "access.json")
+
+
+@pytest.fixture
+def guarded(described: DescribedRobot, file: AccessFile) -> Iterator[VirtualServer]:
+    """Return a new server in this process that requires links."""
+    with VirtualServer(described, access=file) as server:
         yield server
 
 

@@ -16,7 +16,41 @@ from tests.gateway.client import ask
 AT = re.compile(r"JSON lines on 127\.0\.0\.1:(\d+)")
 
 
-class Lines:
+class JsonProgram:
+    """A simple program that sends and receives JSON texts; subclasses have connection and clock."""
+
+    def raw(self, data: bytes) -> None:
+        """Send any text."""
+        raise NotImplementedError
+
+    def hear(self) -> dict[str, Any]:
+        """Return the next message."""
+        raise NotImplementedError
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def say(self, **request: Any) -> None:
+        """Send a request."""
+        self.raw(json.dumps(request).encode() + b"\n")
+
+    def answer(self, **request: Any) -> dict[str, Any]:
+        """Send a request and return its answer."""
+        self.say(**request, id="x")
+        while (heard := self.hear()).get("id") != "x":
+            pass
+        return heard
+
+    def clear_stop(self) -> dict[str, Any]:
+        """Clear the stop once that is possible, and return the answer."""
+        for _ in range(1000):
+            if self.answer(do="query")["clearable"]:
+                return self.answer(do="clear_stop")
+            self.sleep(0.02)
+        raise AssertionError("the stop cannot be cleared")
+
+
+class Lines(JsonProgram):
     """A program on the TCP port of a server with ``--lines``."""
 
     def __init__(self, server: AppServer) -> None:
@@ -32,9 +66,6 @@ class Lines:
         assert found is not None
         return int(found[1])
 
-    def say(self, **request: Any) -> None:
-        self.raw(json.dumps(request).encode() + b"\n")
-
     def raw(self, data: bytes) -> None:
         self.socket.sendall(data)
 
@@ -43,20 +74,6 @@ class Lines:
         assert line, "the line was closed"
         heard: dict[str, Any] = json.loads(line)
         return heard
-
-    def answer(self, **request: Any) -> dict[str, Any]:
-        self.say(**request, id="x")
-        while (heard := self.hear()).get("id") != "x":
-            pass
-        return heard
-
-    def clear_stop(self) -> dict[str, Any]:
-        """Clear the stop once that is possible, and return the answer."""
-        end = time.monotonic() + 20.0
-        while not self.answer(do="query")["clearable"]:
-            assert time.monotonic() < end
-            time.sleep(0.02)
-        return self.answer(do="clear_stop")
 
     def ends(self) -> bool:
         with suppress(ConnectionError):

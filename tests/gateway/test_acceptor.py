@@ -12,12 +12,10 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
@@ -306,10 +304,8 @@ def test_reserved_places_are_free_when_all_others_are_taken() -> None:
 
 
 def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(
-    described: DescribedRobot, tmp_path: Path
+    guarded: VirtualServer, file: AccessFile
 ) -> None:
-    file = AccessFile.create(tmp_path / "access.json")
-
     async def act(server: VirtualServer) -> None:
         async def cookie(role: Role) -> str:
             return await server.enter(file.give(role.value, role, time.time() + HOUR))
@@ -341,5 +337,4 @@ def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(
         for each in (driving, *crowd):
             await each.close()
 
-    with VirtualServer(described, access=file) as server:
-        server.run(act(server))
+    guarded.run(act(guarded))

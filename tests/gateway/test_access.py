@@ -12,30 +12,17 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.cli.main import main
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, ROOT, AppServer, free_port
 from tests.gateway.client import HOUR
 from tests.gateway.virtual import VirtualServer
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> AccessFile:
-    return AccessFile.create(tmp_path / "access.json")
-
-
-@pytest.fixture
-def guarded(described: DescribedRobot, file: AccessFile) -> Iterator[VirtualServer]:
-    """Start a server that requires links."""
-    with VirtualServer(described, access=file) as server:
-        yield server
 
 
 def give(file: AccessFile, role: Role, seconds: float = HOUR) -> str:
@@ -243,9 +230,8 @@ def a_folder(path: Path) -> None:
 
 @pytest.mark.parametrize("fault", [removed, open_to_others, cut_off, a_folder])
 def test_last_readable_links_stay_valid_and_the_error_is_logged_once(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, fault: Callable[[Path], None]
+    file: AccessFile, caplog: pytest.LogCaptureFixture, fault: Callable[[Path], None]
 ) -> None:
-    file = AccessFile.create(tmp_path / "access.json")
     token = file.give("Anna", Role.OPERATOR, YEARS)
     served = AccessFile.open(file.path)
     fault(file.path)
@@ -258,8 +244,7 @@ def test_last_readable_links_stay_valid_and_the_error_is_logged_once(
     assert len(caplog.records) == 1
 
 
-def test_links_are_read_again_once_the_file_is_repaired(tmp_path: Path) -> None:
-    file = AccessFile.create(tmp_path / "access.json")
+def test_links_are_read_again_once_the_file_is_repaired(file: AccessFile) -> None:
     token = file.give("Anna", Role.OPERATOR, YEARS)
     served = AccessFile.open(file.path)
     open_to_others(file.path)
@@ -271,19 +256,18 @@ def test_links_are_read_again_once_the_file_is_repaired(tmp_path: Path) -> None:
 
 
 def test_stop_works_with_an_unreadable_access_file(
-    described: DescribedRobot, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    guarded: VirtualServer, file: AccessFile, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = tmp_path / "access.json"
-    access = AccessFile.create(path)
-    token = access.give("Vera", Role.VIEWER, YEARS)
-    with VirtualServer(described, access=access) as local:
-        cookie = local.run(local.enter(token))
-        path.write_text("{")
-        status, _, body = local.ask("/stop", data=b"", Cookie=cookie, Origin=local.url)
-        assert (status, body) == (204, b"")
-        bearer = f"Bearer {token}"
-        assert local.ask("/api/v1/stop", data=b"", Authorization=bearer)[0] == 204
-        state = json.loads(local.ask("/api/v1/state", Authorization=bearer)[2])
-        assert state["stopped"] == "Vera pressed STOP."
-        assert local.ask("/stop", data=b"", Cookie="x=y", Origin=local.url)[0] == 401
+    token = file.give("Vera", Role.VIEWER, YEARS)
+    cookie = guarded.run(guarded.enter(token))
+    file.path.write_text("{")
+    status, _, body = guarded.ask("/stop", data=b"", Cookie=cookie, Origin=guarded.url)
+    assert (status, body) == (204, b"")
+    bearer = f"Bearer {token}"
+    assert guarded.ask("/api/v1/stop", data=b"", Authorization=bearer)[0] == 204
+    state = json.loads(guarded.ask("/api/v1/state", Authorization=bearer)[2])
+    assert state["stopped"] == "Vera pressed STOP."
+    assert guarded.ask("/stop", data=b"", Cookie="x=y", Origin=guarded.url)[0] == 401
+
+
     assert caplog.text.count("The last links that could be read stay valid") == 1

@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 import time
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError, connect
 from katana450.extensions.api_description.messages import kinds
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
@@ -105,10 +103,10 @@ def test_repeated_invalid_requests_close_the_connection(local: VirtualServer) ->
         for text in ("{", "[]", '{"do":"fly"}', '{"do":"joints","q":[NaN,0,0,0,0]}',
                      '{"do":"joints","q":[1e999,0,0,0,0],"id":4}', '{"do":"watch","hz":-1}',
                      '{"do":"joints"}', '{"do":"stop","now":true}'):  # fmt: skip
-            rows.raw(text)
+            rows.raw(text.encode())
             assert rows.hear()["is"] == "refused"
         for _ in range(60):
-            rows.raw("{")
+            rows.raw(b"{")
         assert rows.ends() == 1008
     after = local.state()
     assert (after.q, after.holder, after.stopped) == (before.q, before.holder, before.stopped)
@@ -153,23 +151,21 @@ def test_openapi_lists_every_route(local: VirtualServer) -> None:
 
 
 def test_program_needs_a_token_if_the_server_requires_links(
-    described: DescribedRobot, tmp_path: Path
+    guarded: VirtualServer, file: AccessFile
 ) -> None:
-    file = AccessFile.create(tmp_path / "access.json")
     viewer, operator = (
         file.give(role.value, role, time.time() + HOUR) for role in (Role.VIEWER, Role.OPERATOR)
     )
-    with VirtualServer(described, access=file) as local:
-        for token in ("", "guess"):
-            with pytest.raises(RefusedError), local.connect(token=token):
-                pass
-        assert local.ask("/api/v1/state")[0] == 401
-        assert local.ask("/api/v1/stop", data=b"", Authorization="Bearer x")[0] == 401
-        with local.connect("script", viewer) as watcher:
-            assert (watcher.welcome.name, watcher.welcome.role) == ("viewer, script", "viewer")
-            with pytest.raises(RefusedError, match="may only watch"):
-                watcher.ask(requests.Home())
-            with local.connect("script", operator) as driver:
-                assert driver.joints(THERE).status == "ok"
-                with pytest.raises(RefusedError):
-                    driver.ask(requests.Take())
+    for token in ("", "guess"):
+        with pytest.raises(RefusedError), guarded.connect(token=token):
+            pass
+    assert guarded.ask("/api/v1/state")[0] == 401
+    assert guarded.ask("/api/v1/stop", data=b"", Authorization="Bearer x")[0] == 401
+    with guarded.connect("script", viewer) as watcher:
+        assert (watcher.welcome.name, watcher.welcome.role) == ("viewer, script", "viewer")
+        with pytest.raises(RefusedError, match="may only watch"):
+            watcher.ask(requests.Home())
+        with guarded.connect("script", operator) as driver:
+            assert driver.joints(THERE).status == "ok"
+            with pytest.raises(RefusedError):
+                driver.ask(requests.Take())

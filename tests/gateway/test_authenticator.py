@@ -22,11 +22,6 @@ from katana450.server.web.authenticator import Address, Authenticator, public_or
 from tests.gateway.client import HOUR
 
 
-@pytest.fixture
-def file(tmp_path: Path) -> AccessFile:
-    return AccessFile.create(tmp_path / "access.json")
-
-
 def test_link_is_valid_for_its_person_until_it_expires(file: AccessFile) -> None:
     token = file.give("Anna", Role.OPERATOR, 1000.0)
     found = file.check(token, 999.0)

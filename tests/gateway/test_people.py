@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from katana450.arm.control.lease import Role
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.server.api import answers, requests
@@ -27,18 +25,6 @@ from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
 
 KICKED = "An admin has disconnected you."
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> AccessFile:
-    return AccessFile.create(tmp_path / "access.json")
-
-
-@pytest.fixture
-def site(described: DescribedRobot, file: AccessFile) -> Iterator[VirtualServer]:
-    """Start a server that requires links."""
-    with VirtualServer(described, access=file) as server:
-        yield server
 
 
 def link(file: AccessFile, name: str, role: Role) -> str:
@@ -72,17 +58,19 @@ async def ends(control: Control) -> int | None:
     return control.socket.close_code
 
 
-def test_admin_sees_everybody_with_all_connections(site: VirtualServer, file: AccessFile) -> None:
+def test_admin_sees_everybody_with_all_connections(
+    guarded: VirtualServer, file: AccessFile
+) -> None:
     viewer, operator = link(file, "Vera", Role.VIEWER), link(file, "Oda", Role.OPERATOR)
     boss = link(file, "Ada", Role.ADMIN)
 
     async def act() -> None:
-        cookie = await site.enter(viewer)
-        admin = await site.control(await site.enter(boss))
-        watcher = await site.control(cookie)
-        driver = await site.control(await site.enter(operator))
-        program = await site.program_socket("Sorter", operator)
-        other = await site.program_socket("Lathe", operator)
+        cookie = await guarded.enter(viewer)
+        admin = await guarded.control(await guarded.enter(boss))
+        watcher = await guarded.control(cookie)
+        driver = await guarded.control(await guarded.enter(operator))
+        program = await guarded.program_socket("Sorter", operator)
+        other = await guarded.program_socket("Lathe", operator)
         await program.send('{"do": "acquire"}')
         await admin.wait(holder="Oda, Sorter")
         people = await listed(admin)
@@ -108,19 +96,19 @@ def test_admin_sees_everybody_with_all_connections(site: VirtualServer, file: Ac
             await each.close()
         await program.close()
 
-    site.run(act())
+    guarded.run(act())
 
 
 def test_kicked_person_is_disconnected_and_comes_back_later(
-    site: VirtualServer, file: AccessFile
+    guarded: VirtualServer, file: AccessFile
 ) -> None:
     token, boss = link(file, "Kai", Role.OPERATOR), link(file, "Ada", Role.ADMIN)
 
     async def act() -> None:
-        cookie = await site.enter(token)
-        admin = await site.control(await site.enter(boss))
-        control = await site.control(cookie)
-        program = await site.program_socket("Kai's", token)
+        cookie = await guarded.enter(token)
+        admin = await guarded.control(await guarded.enter(boss))
+        control = await guarded.control(cookie)
+        program = await guarded.program_socket("Kai's", token)
         await control.wait(mood="ok")
         kai = (await listed(admin))["Kai"]["person"]
         assert (await asked(admin, "kick", person=kai, seconds=60))["is"] == "done"
@@ -131,32 +119,34 @@ def test_kicked_person_is_disconnected_and_comes_back_later(
         assert people["Kai"]["connections"] == []
         assert 59.0 < people["Kai"]["kept_out"] <= 60.0
         # Neither cookie nor link lets Kai in, but STOP works.
-        assert (await site.request("/api/v1/state", Cookie=cookie))[0] == 403
+        assert (await guarded.request("/api/v1/state", Cookie=cookie))[0] == 403
         body = json.dumps({"token": token}).encode()
-        status, _, why = await site.request("/enter", body, Origin=site.url)
+        status, _, why = await guarded.request("/enter", body, Origin=guarded.url)
         assert (status, why[:30]) == (403, KICKED[:30].encode())
         with pytest.raises(ConnectionClosed, match=KICKED):
-            await site.program_socket("Kai's", token)
+            await guarded.program_socket("Kai's", token)
         await admin.say("acquire")
-        assert (await site.request("/stop", b"", Cookie=cookie, Origin=site.url))[0] == 204
+        assert (await guarded.request("/stop", b"", Cookie=cookie, Origin=guarded.url))[0] == 204
         await admin.wait(stopped="Kai pressed STOP.")
         await admin.clear_stop()
         assert (await asked(admin, "kick", person=kai, seconds=0))["is"] == "done"
-        await (await site.control(await site.enter(token))).wait(role="operator")
+        await (await guarded.control(await guarded.enter(token))).wait(role="operator")
         assert (await asked(admin, "kick", person=kai, seconds=0.5))["is"] == "done"
         await asyncio.sleep(0.6)
-        assert await site.enter(token)
+        assert await guarded.enter(token)
         await admin.close()
 
-    site.run(act())
+    guarded.run(act())
 
 
-def test_revoked_link_is_gone_from_the_access_file(site: VirtualServer, file: AccessFile) -> None:
+def test_revoked_link_is_gone_from_the_access_file(
+    guarded: VirtualServer, file: AccessFile
+) -> None:
     boss, token = link(file, "Ada", Role.ADMIN), link(file, "Rita", Role.VIEWER)
 
     async def act() -> None:
-        admin = await site.control(await site.enter(boss))
-        control = await site.control(await site.enter(token))
+        admin = await guarded.control(await guarded.enter(boss))
+        control = await guarded.control(await guarded.enter(token))
         await control.wait()
         people = await listed(admin)
         rita, me = people["Rita"], people["Ada"]["person"]
@@ -168,10 +158,10 @@ def test_revoked_link_is_gone_from_the_access_file(site: VirtualServer, file: Ac
         assert rita["link"] not in AccessFile.open(file.path).grants
         assert "Rita" not in await listed(admin)
         bearer = f"Bearer {token}"
-        assert (await site.request("/api/v1/stop", b"", Authorization=bearer))[0] == 401
+        assert (await guarded.request("/api/v1/stop", b"", Authorization=bearer))[0] == 401
         await admin.close()
 
-    site.run(act())
+    guarded.run(act())
 
 
 def poll(program: Client) -> None:
@@ -181,9 +171,9 @@ def poll(program: Client) -> None:
         time.sleep(0.1)
 
 
-def test_program_of_an_admin_lists_and_kicks(site: VirtualServer, file: AccessFile) -> None:
+def test_program_of_an_admin_lists_and_kicks(guarded: VirtualServer, file: AccessFile) -> None:
     boss, viewer = link(file, "Ada", Role.ADMIN), link(file, "Paul", Role.VIEWER)
-    with site.connect("Guard", boss) as guard, site.connect("Watch", viewer) as watch:
+    with guarded.connect("Guard", boss) as guard, guarded.connect("Watch", viewer) as watch:
         people = {each.name: each for each in guard.people()}
         assert people["Paul"].connections[0].name == "Paul, Watch"
         with pytest.raises(RefusedError, match="Only an admin"):

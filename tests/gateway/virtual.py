@@ -60,6 +60,7 @@ from katana450.server.web.http_api import Api
 from katana450.server.web.security import SecurityMiddleware
 from katana450.settings import Settings
 from tests.gateway.client import Control, page_name
+from tests.gateway.lines import JsonProgram
 from tests.gateway.virtual_clock import PERIOD, VirtualClock, VirtualLoop
 
 T = TypeVar("T")
@@ -241,38 +242,22 @@ async def _with_trip(work: Coroutine[Any, Any, T]) -> T:
     return result
 
 
-class Rows:
-    """A simple program that sends and receives JSON texts."""
+class Rows(JsonProgram):
+    """A simple program on a websocket."""
 
     def __init__(self, server: VirtualServer, name: str, token: str = "") -> None:
         self._server = server
         self._socket = server.run(server.program_socket(name, token))
 
-    def say(self, **request: Any) -> None:
-        """Send a request."""
-        self.raw(json.dumps(request))
-
-    def raw(self, text: str) -> None:
-        """Send any text."""
-        self._server.run(self._socket.send(text))
+    def raw(self, data: bytes) -> None:
+        self._server.run(self._socket.send(data.decode()))
 
     def hear(self) -> dict[str, Any]:
-        """Return the next message."""
         heard: dict[str, Any] = json.loads(self._server.run(_with_trip(self._socket.recv())))
         return heard
 
-    def answer(self, **request: Any) -> dict[str, Any]:
-        """Send a request and return its answer."""
-        self.say(**request, id="x")
-        while (heard := self.hear()).get("id") != "x":
-            pass
-        return heard
-
-    def clear_stop(self) -> dict[str, Any]:
-        """Clear the stop once that is possible, and return the answer."""
-        while not self.answer(do="query")["clearable"]:
-            self._server.sleep(0.02)
-        return self.answer(do="clear_stop")
+    def sleep(self, seconds: float) -> None:
+        self._server.sleep(seconds)
 
     def ends(self) -> int | None:
         """Wait until the server closes the connection, and return its code."""

@@ -125,45 +125,6 @@ def refusal(stage: Stage, steps: str, frame: str = "base") -> str:
     return str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("step", "reason"),
-    [
-        ("line: {by: {x: 400}%s}", "the arm is stretched"),
-        pytest.param(
-            "line: {by: {x: -150, z: -150}%s}",
-            "axis 3, elbow, is at its limit",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "arc: {centre: {x: 0, y: 0, z: 300}, axis: z, angle: 300%s}",
-            "axis 1, base turn, is at its limit of 165.65 deg",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "circle: {centre: {x: 350, y: 0, z: 300}, normal: x, radius: 150%s}",
-            "axis 3, elbow, is at its limit of 127.3 deg",
-            marks=pytest.mark.long,
-        ),
-    ],
-)
-def test_suggestion_for_a_path_plans(stage: Stage, step: str, reason: str) -> None:
-    why = refusal(stage, f"{START}  - {step % ''}\n")
-    amount = re.search(r"Farthest out of reach is (.*?) in the base frame, .*?: (\S+) mm", why)
-    assert amount is not None
-    assert float(amount[2]) > 1.0
-    assert reason in why
-    fixes = re.findall(r"`(\w+): ([^`]+)`", why.partition("It can be followed")[2])
-    assert fixes
-    for name, value in fixes:
-        fixed = step % f", {name}: {value}" if name == "pitch" else step % ""
-        if name == "to":
-            fixed = f"line: {{to: {value}}}"
-        elif name != "pitch":
-            fixed = re.sub(rf"{name}: \d+", f"{name}: {value}", fixed)
-        text = f"frame: base\nsteps:\n{START}  - {fixed}\n"
-        assert compiled(parse(text), stage.plan_context, stage.begin()).tasks
-
-
 def test_place_of_lines_out_of_reach_is_named(stage: Stage) -> None:
     steps = "  - lines: {through: [{x: 420, y: 0, z: 300}, {x: 730, y: 0, z: 180}]}\n"
     why = refusal(stage, START + steps)

@@ -9,7 +9,6 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs import runner
@@ -17,7 +16,6 @@ from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.server.step_list import steps_of
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.planning.plan import MARGIN
@@ -60,13 +58,6 @@ def place(scene_object: SceneObject) -> list[float]:
     assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-12)
     x, y, z = (1e3 * scene_object.T[:3, 3]).tolist()
     return [x, y, z]
-
-
-@pytest.mark.parametrize("side", ["above", pytest.param("front", marks=pytest.mark.long)])
-def test_box_is_placed_where_the_script_says(stage: Stage, side: str) -> None:
-    steps = f"- pick: {{object: part, side: {side}}}\n- place: {{at: {{x: 230, y: -120}}}}\n"
-    end = played(stage, steps, box("part", NEAR, yaw=18.0))
-    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)
 
 
 @pytest.mark.long
@@ -224,20 +215,6 @@ def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
     assert list(map(summary, program.tasks)) == list(map(summary, free.tasks))
 
 
-@pytest.mark.long
-def test_arm_that_reaches_over_its_shoulder_grasps_from_home(stage: Stage) -> None:
-    backwards = np.radians((-169.0, -122.0, 123.0, -112.0, 167.0))
-    start = replace(stage.session.begin(backwards, 0.0, 0.0), objects=(box("box", (330.0, 0.0)),))
-    script = parse("frame: base\nsteps:\n  - grasp: {object: box, side: front}\n")
-    program = compiled(script, stage.plan_context, start)
-    names = [task.name for task in program.tasks]
-    assert [step.name for step in steps_of(program)] == ["grasp box"]
-    opened = names.index("grasp box: open")
-    assert names[opened + 1 : opened + 3] == ["grasp box: home", "grasp box: approach"]
-    begun = compiled(script, stage.plan_context, replace(stage.begin(), objects=start.objects))
-    assert "grasp box: home" not in [task.name for task in begun.tasks]
-
-
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("checked", [False, True])
 def test_run_fails_if_the_fingers_close_on_nothing(stage: Stage, checked: bool) -> None:
@@ -291,20 +268,3 @@ def test_cup_is_poured_only_if_held_from_the_front(stage: Stage) -> None:
     text = "frame: base\nsteps:\n- pick: {object: cup, side: above}\n"
     with pytest.raises(ScriptError, match="from above the wrist could not pour it"):
         compiled(parse(text), stage.plan_context, stage.begin())
-
-
-@pytest.mark.long
-def test_imported_mesh_is_picked_and_placed(stage: Stage) -> None:
-    size = (0.036, 0.04, 0.06)
-    x, y, z = np.array(size) / (2.0, 2.0, 1.0)
-    body = np.array([(i * x, j * y, k * z) for i in (-1, 1) for j in (-1, 1) for k in (0, 1)])
-    # Narrower at the top, as many castings are.
-    body[body[:, 2] > 0.0, :2] *= 0.9
-    part = replace(
-        box("part", NEAR, (36.0, 40.0, 60.0), yaw=18.0),
-        shape=Shape.MESH,
-        size=(),
-        solid=Solid("part", size, body),
-    )
-    end = played(stage, "- pick: part\n- place: {at: {x: 230, y: -120}}\n", part)
-    assert place(end["part"]) == pytest.approx([*AT, 0.0], abs=1e-6)

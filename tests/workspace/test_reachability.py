@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.reachability.reachability import MAX_STEPS, Reachability
-from katana450.maths.geometry import screws, se3, so3
+from katana450.maths.geometry import screws, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames
-from katana450.maths.kinematics.projection import project
-from tests.kinematics.family import member, random_offsets
 from tests.workspace.base_frame import in_base
-
-ARMS = Path(__file__).resolve().parents[1] / "robot" / "arms"
 
 
 def reachability(
@@ -61,78 +53,6 @@ def test_orientations_from_forward_kinematics_are_counted(
     outward = (T[:, :2, 0] * T[:, :2, 3]).sum(axis=1) > 0.0
     assert outward.sum() > 20
     assert (level.count(in_base(level, T[outward, :3, 3])) == 1).all()
-
-
-def of_the_katana(arm: MountedArm, tool: str) -> Reachability:
-    return reachability(arm, tool=tool, table=-1.0)
-
-
-def of_another_arm(name: str) -> Reachability:
-    return reachability(load(ARMS / name).require_arm(), tool="", table=-1.0)
-
-
-def of_a_member(seed: int, *, beside: bool = False) -> Reachability:
-    """Return a member of the family with every offset, and with limits of its own.
-
-    The tool is offset from the roll axis too.
-    """
-    rng = np.random.default_rng(seed)
-    stand = se3.from_rotation_translation(so3.rotation_z(0.7), np.array([0.1, -0.2, 0.3]))
-    turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
-    if beside:
-        turned[1:3, 3] = 0.05, -0.03
-    offsets = dataclasses.replace(
-        random_offsets(rng, lateral=True), radial=0.04, lateral=0.05, roll_offset=-0.03
-    )
-    chain = member(offsets, stand, turned)
-    lower, upper = rng.uniform(-2.9, -1.2, 5), rng.uniform(1.2, 2.9, 5)
-    limited = dataclasses.replace(chain, lower=lower, upper=upper)
-    return Reachability(limited, se3.inverse(stand), -2.0, 8, 6)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "made",
-    [
-        lambda arm: of_the_katana(arm, "tcp"),
-        lambda arm: of_the_katana(arm, "flange"),
-        lambda _: of_another_arm("pincherx_150.urdf"),
-        lambda _: of_another_arm("youbot_arm.urdf"),
-        lambda _: of_a_member(1),
-        lambda _: of_a_member(2),
-        lambda _: of_a_member(3),
-        lambda _: of_a_member(1, beside=True),
-        lambda _: of_a_member(4, beside=True),
-    ],
-    ids=[
-        "katana tcp",
-        "katana flange",
-        "pincher",
-        "youbot",
-        *("member 1", "member 2", "member 3"),
-        *("tool beside the roll axis", "another beside it"),
-    ],
-)
-def test_the_count_is_that_of_poses_unchanged_by_the_projection(
-    made: Callable[[MountedArm], Reachability], arm: MountedArm
-) -> None:
-    """The count has neither false orientations nor missing ones."""
-    every = made(arm)
-    chain, canonical = every.chain, arm_of(every.chain)
-    q = postures_inside(chain, 5, 7)
-    inside = np.array([forward(chain, each)[:3, 3] for each in q])
-    points = np.concatenate([inside, [[0.3, 0.2, 0.2], [-0.2, 0.01, 0.1], [0.9, 0.0, 0.0]]])
-    in_canonical = points @ canonical.T_C_S[:3, :3].T + canonical.T_C_S[:3, 3]
-    for p, count in zip(in_canonical, every.count(in_base(every, points)), strict=True):
-        possible = np.zeros((every.pitches, every.rolls), dtype=bool)
-        for number in range(every.rolls):
-            for poses in every.tool_poses(p[None], number):
-                for pitch, T in enumerate(poses[0]):
-                    nearest = project(chain, T)
-                    exact = nearest.position_error < 1e-8 and nearest.rotation_error < 1e-8
-                    possible[pitch, number] |= exact
-        assert count == possible.sum()
-    assert every.count(in_base(every, inside)).max() > 0
 
 
 def test_a_point_on_axis_1_can_be_counted(arm: MountedArm) -> None:
