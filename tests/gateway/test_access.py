@@ -269,5 +269,4 @@ def test_stop_works_with_an_unreadable_access_file(
     assert state["stopped"] == "Vera pressed STOP."
     assert guarded.ask("/stop", data=b"", Cookie="x=y", Origin=guarded.url)[0] == 401
 
-
     assert caplog.text.count("The last links that could be read stay valid") == 1
