@@ -76,7 +76,7 @@ def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     flow: WaterFlow, rate: float, final: float, dt: float
 ) -> None:
     water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
-    for after in poured(flow, water, turned_to(final, rate), final / rate + 2.5, dt):
+    for after in poured(flow, water, turned_to(final, rate), final / rate + 3.5, dt):
         checked(water, after, flow)
         assert after.cup.kept <= water.cup.kept
         water = after
