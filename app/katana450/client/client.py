@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import threading
-from collections.abc import AsyncGenerator, Coroutine, Iterator
+from collections.abc import AsyncGenerator, Callable, Coroutine, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, TypeVar
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
-import numpy.typing as npt
-
-from katana450.client.asynchronous import ANSWER_TIMEOUT, FOLLOW_RATE, AsyncClient, aconnect
+from katana450.client.asynchronous import FOLLOW_RATE, AsyncClient, aconnect
 from katana450.client.episodes import EpisodeClient
-from katana450.server.api import answers, requests
+from katana450.server.api import answers
 
 T = TypeVar("T")
+P = ParamSpec("P")
 A = TypeVar("A", bound=answers.Answer)
 
 
+def _blocking(
+    method: Callable[Concatenate[AsyncClient, P], Coroutine[Any, Any, T]],
+) -> Callable[Concatenate[Client, P], T]:
+    """Return the method of ``Client`` that waits for the result of ``method``."""
+
+    @wraps(method)
+    def blocking(client: Client, /, *args: P.args, **fields: P.kwargs) -> T:
+        return client._wait(method(client._client, *args, **fields))
+
+    return blocking
+
+
 class Client:
-    """One connection, made by ``connect``. A separate thread sends its heartbeats."""
+    """One connection, made by ``connect``. A separate thread sends its heartbeats.
+
+    Its methods are those of ``AsyncClient``. Each waits for its result.
+    """
 
     def __init__(self, client: AsyncClient, loop: asyncio.AbstractEventLoop) -> None:
         self._client = client
@@ -32,74 +45,30 @@ class Client:
         """Greeting of the server, which contains the identity of this client."""
         return self._client.welcome
 
-    def ask(self, request: requests.Request) -> answers.Answer:
-        """See ``AsyncClient.ask``."""
-        return self._wait(self._client.ask(request))
-
-    def send(self, request: requests.Request) -> None:
-        """See ``AsyncClient.send``."""
-        self._wait(self._client.send(request))
-
-    def stop(self) -> str:
-        """See ``AsyncClient.stop``."""
-        return self._wait(self._client.stop())
-
-    def clear_stop(self, seconds: float = ANSWER_TIMEOUT) -> None:
-        """See ``AsyncClient.clear_stop``."""
-        self._wait(self._client.clear_stop(seconds))
-
-    def query(self, kind: type[A]) -> A:
-        """See ``AsyncClient.query``."""
-        return self._wait(self._client.query(kind))
-
-    def go(self, request: requests.Request, seconds: float = 60.0) -> answers.State:
-        """See ``AsyncClient.go``."""
-        return self._wait(self._client.go(request, seconds))
-
-    def joints(self, q: npt.ArrayLike) -> answers.State:
-        """See ``AsyncClient.joints``."""
-        return self._wait(self._client.joints(q))
-
-    def nudge(self, axis: int, by: float) -> answers.State:
-        """See ``AsyncClient.nudge``."""
-        return self._wait(self._client.nudge(axis, by))
-
-    def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
-        """See ``AsyncClient.upload``."""
-        return self._wait(self._client.upload(file, unit))
-
-    def save_scene(self) -> bytes:
-        """See ``AsyncClient.save_scene``."""
-        return self._wait(self._client.save_scene())
-
-    def load_scene(self, data: bytes) -> answers.Scene:
-        """See ``AsyncClient.load_scene``."""
-        return self._wait(self._client.load_scene(data))
-
-    def send_script(self, text: str, speed: float = 1.0) -> None:
-        """See ``AsyncClient.send_script``."""
-        self._wait(self._client.send_script(text, speed))
-
-    def run(self, script: str | Path, speed: float = 1.0) -> answers.State:
-        """See ``AsyncClient.run``."""
-        return self._wait(self._client.run(script, speed))
-
     @property
     def episodes(self) -> EpisodeClient:
         """Episodes of the server: record, judge and list them."""
         return self._client.episodes
 
-    def recording(self, last: float = math.inf) -> bytes:
-        """See ``AsyncClient.recording``."""
-        return self._wait(self._client.recording(last))
+    ask = _blocking(AsyncClient.ask)
+    send = _blocking(AsyncClient.send)
+    stop = _blocking(AsyncClient.stop)
+    clear_stop = _blocking(AsyncClient.clear_stop)
+    go = _blocking(AsyncClient.go)
+    joints = _blocking(AsyncClient.joints)
+    nudge = _blocking(AsyncClient.nudge)
+    upload = _blocking(AsyncClient.upload)
+    save_scene = _blocking(AsyncClient.save_scene)
+    load_scene = _blocking(AsyncClient.load_scene)
+    send_script = _blocking(AsyncClient.send_script)
+    run = _blocking(AsyncClient.run)
+    recording = _blocking(AsyncClient.recording)
+    people = _blocking(AsyncClient.people)
+    kick = _blocking(AsyncClient.kick)
 
-    def people(self) -> tuple[answers.ConnectedPerson, ...]:
-        """See ``AsyncClient.people``."""
-        return self._wait(self._client.people())
-
-    def kick(self, person: int, seconds: float = 60.0, *, revoke: bool = False) -> None:
-        """See ``AsyncClient.kick``."""
-        self._wait(self._client.kick(person, seconds, revoke=revoke))
+    def query(self, kind: type[A]) -> A:
+        """See ``AsyncClient.query``."""
+        return self._wait(self._client.query(kind))
 
     def states(self, hz: float = FOLLOW_RATE) -> Iterator[answers.State]:
         """See ``AsyncClient.states``."""
