@@ -68,7 +68,7 @@ async def swing(arm: AsyncClient) -> None:
         with suppress(KeyError):
             now = time.monotonic()
             q = ready + SWING * math.sin(math.tau * now / PERIOD)
-            await arm.send(requests.Servo(q=q.tolist()))
+            await arm.send(requests.Servo(q=q))
             await asyncio.sleep(0.02)
 
 

@@ -148,7 +148,7 @@ def swing(arm: Client, seconds: float) -> None:
     while time.monotonic() < end:
         if not arm.query(answers.State).moving:
             with suppress(RefusedError):
-                arm.ask(requests.Joints(q=list(ENDS[swings % 2])))
+                arm.ask(requests.Joints(q=np.array(ENDS[swings % 2])))
                 swings += 1
         time.sleep(POLL)
 
@@ -160,7 +160,7 @@ def drag(arm: Client, seconds: float) -> None:
     end = due + seconds
     while due < end:
         with suppress(RefusedError):
-            arm.ask(requests.Position(p=at.tolist()))
+            arm.ask(requests.Position(p=at))
         at = np.clip(at + DRAG_STEP * rng.normal(size=3), *DRAG_ENDS)
         due += DRAG_PERIOD
         time.sleep(max(due - time.monotonic(), 0.0))

@@ -11,10 +11,11 @@ from typing import Any
 
 import msgspec
 
+from katana450.arm.control.act import Request, tag_of
+from katana450.arm.control.checked import field_schema
 from katana450.extension import extensions, load
 from katana450.extensions.api_description.messages import documentation, kinds
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Request, tag_of
 
 PAGE = Path(__file__).with_name("api.md")
 
@@ -175,15 +176,15 @@ Without `wait` the answer comes at once. Then a moving arm stops, or pauses if i
 def page() -> str:
     """Return the text of the page."""
     parts = [PREFACE.format(version=requests.VERSION)]
-    for title, union, tag in (
-        ("Requests", requests.AnyRequest, "do"),
-        ("Answers", answers.AnyAnswer, "is"),
+    for title, listed, tag in (
+        ("Requests", sorted(requests.CORE, key=lambda kind: kind.__name__), "do"),
+        ("Answers", kinds(answers.AnyAnswer), "is"),
     ):
         parts.append(f"## {title}\n")
-        parts += [_kind(kind, tag) for kind in kinds(union)]
+        parts += [_kind(kind, tag) for kind in listed]
         if tag == "do":
             for name, added in added_requests().items():
-                ours = added[0].__name__ in requests.__all__
+                ours = added[0] in requests.EVERY
                 module = requests.__name__ if ours else added[0].__module__
                 parts.append(f"## Requests of the extension `{name}`\n")
                 parts.append(
@@ -208,7 +209,8 @@ def page() -> str:
 
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
     """Return the requests of extensions, by the name of the extension, as a server has them."""
-    classes = {each.name: each.runner or each.handler for each in extensions()}
+    parts = sorted(extensions(), key=lambda extension: not extension.runner)
+    classes = {each.name: each.runner or each.handler for each in parts}
     return {name: load(target).request_types for name, target in classes.items() if target}
 
 
@@ -216,7 +218,7 @@ def _kind(kind: type[msgspec.Struct], tag: str | None) -> str:
     heading = kind.__name__ if tag is None else f'`"{tag}": "{tag_of(kind.__name__)}"`'
     text, fields = documentation(kind)
     lines = [f"### {heading}\n", text, ""]
-    described = msgspec.json.schema_components([kind])[1][kind.__name__]
+    described = msgspec.json.schema_components([kind], schema_hook=field_schema)[1][kind.__name__]
     for field in msgspec.structs.fields(kind):
         if field.name == "id" or (tag == "do" and field.name in ("revocations", "made", "wait")):
             continue
@@ -247,10 +249,10 @@ def _shape(schema: dict[str, Any]) -> str:
     if "enum" in schema:
         return " or ".join(f'`"{each}"`' for each in schema["enum"])
     if schema.get("type") == "array":
-        if "prefixItems" in schema:
-            items = [_shape(each) for each in schema["prefixItems"]]
-            return f"{len(items)} of {items[0]}"
-        return f"list of {_shape(schema['items'])}"
+        item = schema["items"] or schema["prefixItems"][0]
+        length = schema.get("minItems")
+        alike = length is not None and length == schema.get("maxItems")
+        return f"{length if alike else 'list'} of {_shape(item)}"
     if schema.get("type") == "object" and "additionalProperties" in schema:
         return f"by name, {_shape(schema['additionalProperties'])}"
     low, high = schema.get("minimum"), schema.get("maximum")

@@ -23,7 +23,7 @@ with katana450.connect(url, name="drive_by_api.py") as client:
     print(f"At the posture: {state.why or 'as requested'}.")
 
     # Move the tool point. Pitch and roll stay the same.
-    state = client.go(requests.Position(p=(0.40, 0.0, 0.0)))
+    state = client.go(requests.Position(p=np.array((0.40, 0.0, 0.0))))
     print(f"At the point: {state.why or 'as requested'}.")
 
     # Plan a path here and let the arm of the server follow it. A STOP on the page ends it.

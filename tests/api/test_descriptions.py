@@ -15,10 +15,10 @@ from typing import Any
 import jsonschema
 import pytest
 
+from katana450.arm.control.act import tag_of
 from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.api_description.openapi import openapi_json
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import tag_of
 from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.exchange.tools import OPENAPI_VALIDATOR, needs_package

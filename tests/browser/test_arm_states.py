@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
-from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_commands import ArmAct, OperateArm
 from katana450.client import Client, connect
 from katana450.server.api import answers, requests
-from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import APP, AppServer
 from tests.browser.session import READY
 from tests.gateway.client import enter
@@ -108,7 +107,7 @@ def test_stop_is_shown_as_measured_and_a_lost_arm_as_one_that_may_move(
     engaged(arm, program)
     assert arm.page.locator("#arm button.main").count() == 0, "a working arm needs no act"
     program.ask(requests.Speed(value=0.5))
-    program.ask(requests.Joints(q=READY.tolist()))
+    program.ask(requests.Joints(q=READY))
     arm.shows("Arm moving")
     begun = program.query(answers.State).q
     end = time.monotonic() + 10.0
@@ -137,7 +136,7 @@ def test_stop_is_shown_as_measured_and_a_lost_arm_as_one_that_may_move(
     arm.page.wait_for_function(
         "() => document.querySelector('#arm summary').innerText === 'Arm holding'"
     )
-    program.ask(requests.Joints(q=READY.tolist()))
+    program.ask(requests.Joints(q=READY))
     arm.shows("Arm moving")
     arm.emulator.kill()
     arm.shows("Arm lost")

@@ -62,7 +62,7 @@ def server(folder: Path) -> Iterator[AppServer]:
     with AppServer((*RECORDING_APP, "--record", str(folder))) as server:
         with connect(server.url, "Ada") as arm:
             for angle in TURNS:
-                arm.ask(requests.Joints(q=[angle, -1.0, 1.4, 0.3, 0.0]))
+                arm.ask(requests.Joints(q=np.array([angle, -1.0, 1.4, 0.3, 0.0])))
                 rest(arm)
                 if angle is TURNS[0]:
                     arm.stop()

@@ -59,14 +59,14 @@ def server(folder: Path) -> Iterator[AppServer]:
             assert time.monotonic() < deadline, "the process that records is not ready"
             time.sleep(0.3)
         with connect(server.url, "Ada") as arm:
-            arm.ask(requests.Joints(q=[9.0, -1.0, 1.4, 0.3, 0.0]))
+            arm.ask(requests.Joints(q=np.array([9.0, -1.0, 1.4, 0.3, 0.0])))
             rest(arm)
             arm.stop()
             time.sleep(1.2)
             arm.clear_stop()
             arm.ask(requests.Home(wait=30))
             with suppress(RefusedError):
-                arm.ask(requests.Position(p=(0.3, 0.0, -0.4), wait=30))
+                arm.ask(requests.Position(p=np.array((0.3, 0.0, -0.4)), wait=30))
             arm.ask(requests.Home(wait=30))
             episodes.stop("success")
             assert arm.run(SCRIPT).program is not None
@@ -228,7 +228,7 @@ def test_another_arm_is_played_back_and_runs_again(
             arm.ask(requests.Home(wait=30))
             home = np.array(arm.query(answers.State).q)
             for by in (0.6, -0.3):
-                arm.ask(requests.Joints(q=[home[0] + by, *home[1:].tolist()], wait=30))
+                arm.ask(requests.Joints(q=np.array([home[0] + by, *home[1:].tolist()]), wait=30))
             end = np.array(arm.query(answers.State).q)
         page = open_page(server.url, nodes=("/arm",))
         run = PlaybackRun(lambda: recordings_in(folder))

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
 from katana450.client import Client, connect
+from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 
@@ -54,7 +56,7 @@ INK = """(map) => {
 def arm(server: AppServer) -> Iterator[Client]:
     """Return a program that drives, with a rod that stands between the open fingers."""
     x, y = ROD_AT
-    T = ((1.0, 0.0, 0.0, x), (0.0, 1.0, 0.0, y), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+    T = se3.from_rotation_translation(np.eye(3), np.array((x, y, 0.0)))
     with connect(server.url, "Tester") as arm:
         grip(arm, OPEN)
         shape = requests.Shape.CYLINDER

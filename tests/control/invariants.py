@@ -37,7 +37,7 @@ MAX_MOTION_SECONDS = 60.0
 MOTIONS = tuple(kind for kind, row in TABLE.items() if row.begins is not None)
 """Commands after which the arm may move. A stop and its end also begin a mode, but no motion."""
 
-RESTS = (cmd.Stop, cmd.ClearStop, cmd.Hold, cmd.EndDrag, cmd.SetTool)
+RESTS = (cmd.Stop, cmd.ClearStop, cmd.Hold, cmd.EndDrag, cmd.Tool)
 """Commands among MOTIONS that never begin a motion."""
 
 SESSIONS: dict[str, Session] = {}
@@ -103,12 +103,12 @@ class JointRules(RuleBasedStateMachine):
 
     @rule(axis=st.integers(0, 2), part=fractions(1), ticks=ticks)
     def set_joint(self, axis: int, part: FloatArray, ticks: int) -> None:
-        self.run([cmd.SetJoint(axis, 3.5 * float(part[0]))], ticks)
+        self.run([cmd.Joint(axis + 1, 3.5 * float(part[0]))], ticks)
 
     @rule(data=st.data(), ticks=ticks)
     def set_joints(self, data: st.DataObject, ticks: int) -> None:
         off = data.draw(fractions(len(self.state.q)))
-        self.run([cmd.SetJoints(self.state.setpoint + off)], ticks)
+        self.run([cmd.Joints(self.state.setpoint + off)], ticks)
 
     @rule(data=st.data(), ticks=ticks, every=st.integers(1, 3), jump=st.booleans())
     def servo(self, data: st.DataObject, ticks: int, every: int, jump: bool) -> None:
@@ -160,12 +160,12 @@ class JointRules(RuleBasedStateMachine):
 
     @rule(speed=st.sampled_from([0.05, 0.3, 0.7, 1.0]))
     def set_speed(self, speed: float) -> None:
-        self.run([cmd.SpeedScale(speed)], 1)
+        self.run([cmd.Speed(speed)], 1)
         assert self.state.speed == speed
 
     @rule(speed=st.sampled_from([0.4, 1.0]), last=st.sampled_from([cmd.Home(), cmd.Hold()]))
     def batch(self, speed: float, last: cmd.Command) -> None:
-        self.run([cmd.Batch((cmd.SpeedScale(speed), last))], 1)
+        self.run([cmd.Batch((cmd.Speed(speed), last))], 1)
 
     # The tick, and the invariants after it.
 
@@ -218,7 +218,7 @@ class JointRules(RuleBasedStateMachine):
                 self.may_clear and any(isinstance(c, cmd.ClearStop) for c in commands)
             ):
                 self.may_move |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
-                self.fingers_may_move |= isinstance(each, cmd.SetGripper)
+                self.fingers_may_move |= isinstance(each, cmd.Gripper)
 
     def check_limits(self, before: State, state: State) -> None:
         """Check position, speed, acceleration and jerk, and that setpoints agree with rates."""
@@ -299,7 +299,7 @@ class JointRules(RuleBasedStateMachine):
         """Check that every motion ends, and that a replay gives the same state."""
         if not self.tick_completed:
             return
-        self.wait_and_clear(30, cmd.Resume(), cmd.SpeedScale(1.0))
+        self.wait_and_clear(30, cmd.Resume(), cmd.Speed(1.0))
         for _ in range(round(MAX_MOTION_SECONDS / DT)):
             if not self.state.moving:
                 break

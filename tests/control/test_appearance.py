@@ -104,14 +104,14 @@ def test_batch_is_executed_in_one_tick_or_not_at_all(session: Session) -> None:
     q = session.ready + np.array((0.1, 0.0, 0.05, 0.0, 0.0))
     batch = cmd.Batch(
         (
-            cmd.SetAxes(((0, float(q[0])), (2, float(q[2])))),
+            cmd.SetAxes(((1, float(q[0])), (3, float(q[2])))),
             cmd.SetAppearance("pan_link", AppearanceTrait.CHOICE, -1),
         )
     )
     state = session.step(state, [batch], 0.01)
     np.testing.assert_array_equal(state.goal, q)
     assert state.appearance.of("pan_link").choice is DisplayMode.HIDDEN
-    for bad in (cmd.SetAxes(((5, 0.0),)), cmd.SetTool("spoon")):
+    for bad in (cmd.SetAxes(((6, 0.0),)), cmd.Tool("spoon")):
         with pytest.raises(InputError):
             session.check(
                 cmd.Batch((cmd.SetAppearance("pan_link", AppearanceTrait.CHOICE, 0), bad))
@@ -119,13 +119,13 @@ def test_batch_is_executed_in_one_tick_or_not_at_all(session: Session) -> None:
     with pytest.raises(InputError, match="singly"):
         cmd.Batch((batch,))
     with pytest.raises(InputError, match="finite"):
-        cmd.SetAxes(((0, math.nan),))
+        cmd.SetAxes(((1, math.nan),))
 
 
 def test_stopped_arm_accepts_paint_but_no_motion(session: Session) -> None:
     state = session.step(session.begin(session.ready, 0.0, 0.0), [cmd.Stop()], 0.01)
     batch = cmd.Batch(
-        (cmd.SetAxes(((0, 0.5),)), cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1))
+        (cmd.SetAxes(((1, 0.5),)), cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1))
     )
     state = session.step(state, [batch], 0.02)
     np.testing.assert_array_equal(state.goal, session.ready)

@@ -44,10 +44,10 @@ def point(arm: ArmModel, q: FloatArray) -> FloatArray:
 def at_the_edge(session: Session, state: State) -> State:
     """Return the state of a slow drag to the place where the limits stop the pitch."""
     T = se3.from_rotation_translation(so3.rotation_y(SPLIT_PITCH), SPLIT - 0.02 * ACROSS)
-    before = take(session, state, cmd.SetPose(T), cmd.EndDrag())
+    before = take(session, state, cmd.Pose(T), cmd.EndDrag())
     assert before.status is Status.OK
     for along in np.arange(-0.02, 0.02, 5e-4):
-        before = take(session, before, cmd.MoveTool(SPLIT + along * ACROSS))
+        before = take(session, before, cmd.Position(SPLIT + along * ACROSS))
     return before
 
 
@@ -64,7 +64,7 @@ def test_gap_is_reported_with_axis_and_leap(session: Session, state: State) -> N
 
 def test_branch_change_crosses_a_gap(arm: ArmModel, session: Session, state: State) -> None:
     held = at_the_edge(session, state)
-    across = take(session, held, cmd.TakeBranch(held.branch))
+    across = take(session, held, cmd.Branch(name=str(held.branch)))
     assert across.branch == held.branch
     assert np.abs(across.goal - held.goal).max() > 1.0
     desired = SPLIT + 0.0195 * ACROSS
@@ -72,7 +72,7 @@ def test_branch_change_crosses_a_gap(arm: ArmModel, session: Session, state: Sta
     assert across.status is Status.LIMITED
     assert isinstance(across.target, ToolTarget)
     # The drag continues from there.
-    on = take(session, across, cmd.MoveTool(desired + 0.001 * ACROSS))
+    on = take(session, across, cmd.Position(desired + 0.001 * ACROSS))
     assert np.abs(on.goal - across.goal).max() < 0.1
     assert on.status is not Status.GAP
 
@@ -83,7 +83,7 @@ def test_typed_poses_and_joints_are_reached_at_joint_speed(
     held = at_the_edge(session, state)
     R = so3.rotation_y(SPLIT_PITCH)
     T = se3.from_rotation_translation(R, SPLIT + 0.0195 * ACROSS)
-    typed = take(session, held, cmd.SetPose(T))
+    typed = take(session, held, cmd.Pose(T))
     assert np.allclose(point(arm, typed.goal), T[:3, 3], atol=1e-9)
     assert np.abs(typed.goal - held.goal).max() > 1.0
     assert (np.abs(typed.setpoint - held.setpoint) <= arm.chain.speed * TICK * (1 + 1e-9)).all()
@@ -95,9 +95,9 @@ def test_branch_change_keeps_limits_and_joint_speed(
 ) -> None:
     """The place high over the base is reached by all four branches."""
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
-    state = take(session, state, cmd.SetPose(T), cmd.EndDrag())
+    state = take(session, state, cmd.Pose(T), cmd.EndDrag())
     metrics = branch_options(arm, state)[BRANCHES.index(branch)].metrics
-    taken = take(session, state, cmd.TakeBranch(branch))
+    taken = take(session, state, cmd.Branch(name=str(branch)))
     assert taken.branch == branch
     assert isinstance(taken.target, JointTarget)
     assert np.allclose(taken.goal, metrics.q, atol=1e-12)
@@ -110,7 +110,7 @@ def test_branch_change_keeps_limits_and_joint_speed(
     on = branch_of(arm.chain, taken.setpoint)
     assert on == branch
     # Later drags keep the new branch.
-    dragged = take(session, taken, cmd.MoveTool(point(arm, taken.goal) - 0.01 * UP))
+    dragged = take(session, taken, cmd.Position(point(arm, taken.goal) - 0.01 * UP))
     assert dragged.branch == branch
     assert branch_of(arm.chain, dragged.goal) == branch
 
@@ -122,9 +122,9 @@ def test_target_is_kept_on_the_other_shoulder(
     desired = np.array([0.05, 0.02, 0.40])
     for fraction in np.linspace(0.05, 1.0, 20):
         start = point(arm, session.ready)
-        state = take(session, state, cmd.MoveTool(start + fraction * (desired - start)))
+        state = take(session, state, cmd.Position(start + fraction * (desired - start)))
     assert isinstance(state.target, ToolTarget)
-    back = take(session, state, cmd.TakeBranch(Branch("back", "up")))
+    back = take(session, state, cmd.Branch("back", "up"))
     assert isinstance(back.target, ToolTarget)
     for each in (state, back):
         assert isinstance(each.target, ToolTarget)
@@ -138,11 +138,11 @@ def test_target_is_kept_on_the_other_shoulder(
 def test_branch_options_predict_the_result_of_taking_them(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    state = take(session, state, cmd.MoveTool(point(arm, state.goal) + 0.05 * UP))
+    state = take(session, state, cmd.Position(point(arm, state.goal) + 0.05 * UP))
     for branch, found in zip(BRANCHES, branch_options(arm, state), strict=True):
         metrics = found.metrics
         assert found.contact is None
-        taken = take(session, state, cmd.TakeBranch(branch))
+        taken = take(session, state, cmd.Branch(name=str(branch)))
         assert metrics.branch == branch
         assert np.allclose(taken.goal, metrics.q, atol=1e-12)
         assert metrics.within_limits
@@ -171,7 +171,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
     given_up: set[Reason],
 ) -> None:
     T = se3.from_rotation_translation(SIDEWAYS, FAR_OUT)
-    state = take(session, state, cmd.SetPriority(priority), cmd.SetPose(T))
+    state = take(session, state, cmd.SetPriority(priority), cmd.Pose(T))
     assert state.priority is priority
     assert given_up <= set(reasons(state))
     assert set(reasons(state)) <= given_up | {Reason.AXIS_LIMIT, Reason.LINKS}
@@ -194,7 +194,7 @@ def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
     target = point(arm, state.goal)
     for _ in range(20):
         target = target + 0.006 * OUT
-        state = take(session, state, cmd.MoveTool(target))
+        state = take(session, state, cmd.Position(target))
     # 0.6 m out and level with the shoulder, the arm is nearly stretched.
     tilted = abs(pitch_and_roll(session.require_arm().chain, state.goal)[0] - pitch)
     short = math.dist(point(arm, state.goal), target)
@@ -215,7 +215,7 @@ def test_new_priority_reapplies_the_target_or_changes_nothing(
     assert (reread.goal == state.goal).all()
     assert not reread.moving
     T = se3.from_rotation_translation(SIDEWAYS, FAR_OUT)
-    posed = take(session, state, cmd.SetPose(T))
+    posed = take(session, state, cmd.Pose(T))
     reread = take(session, posed, cmd.SetPriority(Priority.PITCH))
     assert reread.target is posed.target
     assert pitch_and_roll(session.require_arm().chain, reread.goal)[0] == pytest.approx(
@@ -229,7 +229,7 @@ def test_roll_beyond_its_limit_is_reported_as_roll(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     _, roll = pitch_and_roll(session.require_arm().chain, state.goal)
-    turn = cmd.TurnTool(pitch_and_roll(session.require_arm().chain, state.goal)[0], roll + 3.05)
+    turn = cmd.Turn(pitch_and_roll(session.require_arm().chain, state.goal)[0], roll + 3.05)
     state = take(session, state, turn)
     while state.since is not None:
         state = take(session, state)

@@ -17,32 +17,32 @@ NAN = math.nan
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: cmd.SetJoint(0, NAN), "axis 1 must be a finite number"),
-        (lambda: cmd.SetJoint(2, math.inf), "axis 3"),
-        (lambda: cmd.SetJoint(-1, 0.0), "whole number from 0"),
-        (lambda: cmd.SetJoint(True, 0.0), "whole number from 0"),
-        (lambda: cmd.SetJoint(0, "1"), "finite number"),  # type: ignore[arg-type]
-        (lambda: cmd.SetJoints(np.array([0.0, NAN])), "finite"),
-        (lambda: cmd.SetJoints(np.zeros((2, 2))), "flat list"),
-        (lambda: cmd.SetJoints(np.array([])), "flat list"),
-        (lambda: cmd.SetJoints([[1.0], [2.0, 3.0]]), "list of numbers"),  # type: ignore[arg-type]
-        (lambda: cmd.MoveTool(np.zeros(2)), "3 numbers"),
-        (lambda: cmd.MoveTool(np.array([0.0, 0.0, NAN])), "finite"),
-        (lambda: cmd.MoveTool("abc"), "list of numbers"),  # type: ignore[arg-type]
-        (lambda: cmd.TurnTool(NAN, 0.0), "pitch"),
+        (lambda: cmd.Joint(1, NAN), "axis 1 must be a finite number"),
+        (lambda: cmd.Joint(3, math.inf), "axis 3"),
+        (lambda: cmd.Joint(0, 0.0), "whole number from 1"),
+        (lambda: cmd.Joint(True, 0.0), "whole number from 1"),
+        (lambda: cmd.Joint(1, "1"), "finite number"),  # type: ignore[arg-type]
+        (lambda: cmd.Joints(np.array([0.0, NAN])), "finite"),
+        (lambda: cmd.Joints(np.zeros((2, 2))), "flat list"),
+        (lambda: cmd.Joints(np.array([])), "flat list"),
+        (lambda: cmd.Joints([[1.0], [2.0, 3.0]]), "list of numbers"),  # type: ignore[arg-type]
+        (lambda: cmd.Position(np.zeros(2)), "3 numbers"),
+        (lambda: cmd.Position(np.array([0.0, 0.0, NAN])), "finite"),
+        (lambda: cmd.Position("abc"), "list of numbers"),  # type: ignore[arg-type]
+        (lambda: cmd.Turn(NAN, 0.0), "pitch"),
         (lambda: cmd.StepTool(np.zeros(3)), "5 or 6 numbers"),
         (lambda: cmd.StepTool(np.zeros(5), "tool"), "JogFrame"),  # type: ignore[arg-type]
-        (lambda: cmd.TurnTool(0.0, -math.inf), "roll"),
-        (lambda: cmd.SetPose(np.zeros((4, 4))), "T"),
-        (lambda: cmd.SetPose(np.diag([1.0, 1.0, 2.0, 1.0])), "rotation"),
-        (lambda: cmd.SetPose(np.full((4, 4), NAN)), "finite"),
-        (lambda: cmd.SetPose(np.eye(3)), "shape"),
-        (lambda: cmd.SetGripper(NAN), "finger"),
+        (lambda: cmd.Turn(0.0, -math.inf), "roll"),
+        (lambda: cmd.Pose(np.zeros((4, 4))), "T"),
+        (lambda: cmd.Pose(np.diag([1.0, 1.0, 2.0, 1.0])), "rotation"),
+        (lambda: cmd.Pose(np.full((4, 4), NAN)), "finite"),
+        (lambda: cmd.Pose(np.eye(3)), "shape"),
+        (lambda: cmd.Gripper(NAN), "finger"),
         (lambda: cmd.SetPriority("pose"), "Priority.POSE"),  # type: ignore[arg-type]
         (lambda: cmd.SetPriority([]), "Priority.POSE"),  # type: ignore[arg-type]
-        (lambda: cmd.TakeBranch(3), "one of the arm"),  # type: ignore[arg-type]
-        (lambda: cmd.TakeBranch(None), "one of the arm"),  # type: ignore[arg-type]
-        (lambda: cmd.OrientTool(np.ones((3, 3))), "rotation"),
+        (lambda: cmd.Branch("front"), "or a name"),
+        (cmd.Branch, "or a name"),
+        (lambda: cmd.Orient(np.ones((3, 3))), "rotation"),
     ],
 )
 def test_invalid_command_is_refused_with_the_reason(
@@ -54,7 +54,7 @@ def test_invalid_command_is_refused_with_the_reason(
 
 def test_command_copies_its_array() -> None:
     q = np.zeros(5)
-    command = cmd.SetJoints(q)
+    command = cmd.Joints(q)
     q[0] = 1.0
     assert command.q[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):

@@ -54,13 +54,13 @@ def standing(session: Session, q: FloatArray, gripper: float = 0.0) -> State:
 
 
 INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
-    "table": (LOW, [cmd.SetJoint(1, 0.13)], {"table"}),
+    "table": (LOW, [cmd.Joint(2, 0.13)], {"table"}),
     "base": (
         np.radians((0.0, -120.0, 100.0, 0.0, 0.0)),
-        [cmd.SetJoint(3, np.radians(107.0)), cmd.SetJoint(2, np.radians(127.0))],
+        [cmd.Joint(4, np.radians(107.0)), cmd.Joint(3, np.radians(127.0))],
         {"base_link", "arm_base_link", "pan_link", "upper_arm_link"},
     ),
-    "cup": (LOW, [cmd.SetJoint(0, -0.6)], {"cup"}),
+    "cup": (LOW, [cmd.Joint(1, -0.6)], {"cup"}),
 }
 
 
@@ -84,7 +84,7 @@ def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> 
 def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None:
     start, commands, _ = INTO[what]
     blocked, _ = run(guarded, standing(guarded, start), commands)
-    back = cmd.SetJoints(start)
+    back = cmd.Joints(start)
     state, near = run(guarded, blocked, [back])
     assert (state.setpoint == start).all()
     assert state.findings == ()
@@ -121,7 +121,7 @@ def test_blocked_arm_continues_once_its_path_is_clear(
 
 def test_end_of_a_drag_before_a_contact_drops_the_rest_of_the_path(guarded: Session) -> None:
     state = standing(guarded, LOW)
-    blocked, _ = run(guarded, state, [cmd.MoveTool(np.array([0.40, 0.23, -0.35]))])
+    blocked, _ = run(guarded, state, [cmd.Position(np.array([0.40, 0.23, -0.35]))])
     assert blocked.blocked
     let_go = guarded.step(blocked, [cmd.EndDrag()], blocked.t + TICK)
     assert (let_go.goal == blocked.setpoint).all()
@@ -135,12 +135,12 @@ def test_fingers_wait_before_a_cup_until_the_arm_moves_away(guarded: Session) ->
     start, commands, _ = INTO["cup"]
     blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
     at_cup = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
-    state, near = run(guarded, at_cup, [cmd.SetGripper(0.30)])
+    state, near = run(guarded, at_cup, [cmd.Gripper(0.30)])
     assert state.blocked
     assert state.gripper_setpoint < 0.30
     assert min(near) >= STOP - SLIGHTLY
     assert "cup" in (state.findings[0].parts or ())
-    state, near = run(guarded, state, [cmd.SetJoint(0, 0.5)])
+    state, near = run(guarded, state, [cmd.Joint(1, 0.5)])
     assert state.setpoint[0] == 0.5
     assert state.gripper_setpoint == 0.30
     assert min(near) >= STOP - SLIGHTLY
@@ -152,10 +152,10 @@ def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWo
     state = standing(guarded, inside)
     depth = clearance(world, state)
     assert depth < 0.0
-    deeper, near = run(guarded, state, [cmd.SetJoint(1, 0.0)])
+    deeper, near = run(guarded, state, [cmd.Joint(2, 0.0)])
     assert deeper.blocked
     assert min(near) >= depth - SLIGHTLY
-    state, near = run(guarded, deeper, [cmd.SetJoint(1, np.radians(-70.0))])
+    state, near = run(guarded, deeper, [cmd.Joint(2, np.radians(-70.0))])
     assert state.status is Status.OK
     assert near[-1] > STOP
 
@@ -171,7 +171,7 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
     for choice in met:
         assert choice.contact is not None
         assert choice.contact.distance < STOP
-        taken, near = run(guarded, state, [cmd.TakeBranch(choice.metrics.branch)], 2000)
+        taken, near = run(guarded, state, [cmd.Branch(name=str(choice.metrics.branch))], 2000)
         assert taken.status is Status.BLOCKED
         assert min(near) > 0.0
 
@@ -181,7 +181,7 @@ def test_braking_arm_with_a_new_target_keeps_its_finding(guarded: Session) -> No
     state = standing(guarded, guarded.ready)
     named = set()
     for tick, angle in enumerate(np.radians(np.linspace(-60.0, 5.0, 150))):
-        commands = [] if tick % 4 else [cmd.SetJoint(1, float(angle))]
+        commands = [] if tick % 4 else [cmd.Joint(2, float(angle))]
         state = guarded.step(state, commands, state.t + TICK)
         named |= {f.parts for f in state.findings if f.reason is Reason.CONTACT}
     state, _ = run(guarded, state, [])

@@ -42,7 +42,7 @@ def offer(session: Session, state: State) -> cmd.OfferDetour:
 @pytest.fixture
 def held(shipped: Session) -> State:
     """The shipped arm at the edge of a gap, with the hand still on the handle."""
-    state = settled(shipped, shipped.begin(shipped.ready, 0.0, 0.0), cmd.MoveTool(TARGET))
+    state = settled(shipped, shipped.begin(shipped.ready, 0.0, 0.0), cmd.Position(TARGET))
     assert state.status is Status.GAP
     assert state.detour is None
     return state
@@ -81,7 +81,7 @@ def test_offer_is_in_the_same_sentence_and_moves_nothing(shipped: Session, offer
         after = shipped.step(after, (), after.t + TICK)
     np.testing.assert_array_equal(after.setpoint, offered.setpoint)
     assert after.detour is offered.detour
-    slow = shipped.step(after, [cmd.SpeedScale(0.5)], after.t + TICK)
+    slow = shipped.step(after, [cmd.Speed(0.5)], after.t + TICK)
     assert f"a {2.0 * seconds:.1f} s detour" in sentence(slow)
 
 
@@ -113,15 +113,15 @@ def test_detour_can_be_offered_after_the_drag_ended(shipped: Session, held: Stat
 
 
 CHANGES: list[cmd.Command] = [
-    cmd.SetGripper(0.2),
-    cmd.SetTool("flange"),
+    cmd.Gripper(0.2),
+    cmd.Tool("flange"),
     cmd.SetPriority(Priority.POSITION),
     cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
     cmd.Remove("basin"),
     cmd.Pause(),
-    cmd.MoveTool(TARGET + 0.01),
-    cmd.TurnTool(0.3, 0.1),
-    cmd.Nudge(0, 0.1),
+    cmd.Position(TARGET + 0.01),
+    cmd.Turn(0.3, 0.1),
+    cmd.Nudge(1, 0.1),
     cmd.Home(),
     cmd.Hold(),
     cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
@@ -147,7 +147,7 @@ def test_any_change_withdraws_the_offer(
 
 def test_appearance_and_speed_leave_the_offer(shipped: Session, offered: State) -> None:
     dressed = cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1)
-    for command in (dressed, cmd.SpeedScale(0.7)):
+    for command in (dressed, cmd.Speed(0.7)):
         state = shipped.step(offered, [command], offered.t + TICK)
         assert state.detour is offered.detour
 
@@ -164,7 +164,7 @@ def test_go_without_an_offer_is_refused_with_the_reason(shipped: Session, held: 
 def test_offer_of_another_state_is_refused(shipped: Session, held: State) -> None:
     arm = shipped.require_arm()
     elsewhere = plan_to(arm, None, held, shipped.ready)
-    moving = shipped.step(held, [cmd.MoveTool(TARGET - 0.05)], held.t + TICK)
+    moving = shipped.step(held, [cmd.Position(TARGET - 0.05)], held.t + TICK)
     idle = shipped.begin(shipped.ready, 0.0, 0.0)
     stopped = shipped.step(held, [cmd.Stop()], held.t + TICK)
     good = offer(shipped, held)

@@ -28,9 +28,9 @@ def run(
 
 
 FAULTS: dict[Reason, list[cmd.Command]] = {
-    Reason.AXIS_LIMIT: [cmd.SetJoint(0, 4.0)],
-    Reason.GRIPPER_LIMIT: [cmd.SetGripper(2.0)],
-    Reason.OUT_OF_REACH: [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))],
+    Reason.AXIS_LIMIT: [cmd.Joint(1, 4.0)],
+    Reason.GRIPPER_LIMIT: [cmd.Gripper(2.0)],
+    Reason.OUT_OF_REACH: [cmd.Position(np.array([0.9, 0.0, 0.1]))],
     Reason.STOPPED: [cmd.Stop()],
     Reason.PAUSED: [cmd.Pause()],
 }
@@ -53,8 +53,8 @@ def test_end_of_a_finding_is_logged(session: Session, state: State) -> None:
 
 
 def test_changed_amount_makes_no_entry(session: Session, state: State) -> None:
-    far, _ = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.1]))], 40)
-    farther, more = run(session, far, [cmd.MoveTool(np.array([0.95, 0.0, 0.1]))], 40)
+    far, _ = run(session, state, [cmd.Position(np.array([0.9, 0.0, 0.1]))], 40)
+    farther, more = run(session, far, [cmd.Position(np.array([0.95, 0.0, 0.1]))], 40)
     assert farther.findings[0].reason is Reason.OUT_OF_REACH
     assert [entry for entry in more if entry.finding.reason is Reason.OUT_OF_REACH] == []
 

@@ -151,11 +151,11 @@ def test_cup_stays_level_and_on_its_path_under_any_pacing(
                 cmd.Resume(),
                 cmd.GoAlong(float(random.uniform())),
                 cmd.GoAlong(float(random.integers(2))),
-                cmd.SpeedScale(float(random.uniform(0.05, 1.0))),
+                cmd.Speed(float(random.uniform(0.05, 1.0))),
             )[random.integers(6)]
         ]
     last = max(commands)
-    commands[last + 1] = [cmd.Resume(), cmd.SpeedScale(1.0), cmd.GoAlong(1.0)]
+    commands[last + 1] = [cmd.Resume(), cmd.Speed(1.0), cmd.GoAlong(1.0)]
     start = session.begin(poured.start, 0.0, 0.0)
     states = trace(session, start, commands, last + 1100)
     assert states[-1].setpoint == pytest.approx(poured.end, abs=0.0)
@@ -203,7 +203,7 @@ def test_plan_from_another_posture_is_refused(session: Session, poured: Plan) ->
     assert finding.axis == 4
     assert after.following is None
     assert not after.moving
-    gone = session.step(after, [cmd.SetJoints(poured.start)], 2 * TICK)
+    gone = session.step(after, [cmd.Joints(poured.start)], 2 * TICK)
     assert gone.findings == ()
 
 
@@ -226,9 +226,9 @@ def test_plan_for_another_arm_is_refused(arm: ArmModel, session: Session, poured
 @pytest.mark.parametrize(
     "command",
     [
-        cmd.SetJoint(0, 0.3),
+        cmd.Joint(1, 0.3),
         cmd.Home(),
-        cmd.MoveTool(np.array([0.3, 0.1, 0.0])),
+        cmd.Position(np.array([0.3, 0.1, 0.0])),
         cmd.Jog(np.array([0.05, 0.0, 0.0, 0.0, 0.0])),
         cmd.Hold(),
     ],
@@ -251,7 +251,7 @@ def test_other_motion_ends_the_plan_inside_the_limits(
 
 def test_tool_and_gripper_commands_do_not_end_the_plan(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
-    commands: list[cmd.Command] = [cmd.SetGripper(0.2), cmd.SetTool("grasp"), cmd.EndDrag()]
+    commands: list[cmd.Command] = [cmd.Gripper(0.2), cmd.Tool("grasp"), cmd.EndDrag()]
     states = trace(session, start, {0: [cmd.Follow(poured)], 50: commands}, 900)
     assert (states[-1].setpoint == poured.end).all()
     assert states[-1].gripper_setpoint == 0.2

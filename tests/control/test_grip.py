@@ -95,13 +95,13 @@ def before_cup(
 def holding(session: Session, arm: MountedArm) -> State:
     """The state with the cup between the fingers, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
-    state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    state = run(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     before = before_cup(session, arm, state, BEFORE)
     state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
     at = before_cup(session, arm, state, AT)
     state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, at)))
     np.testing.assert_allclose(state.q, at, rtol=0, atol=1e-9)
-    return run(session, state, cmd.SetGripper(-0.44))
+    return run(session, state, cmd.Gripper(-0.44))
 
 
 def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) -> None:
@@ -146,7 +146,7 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, up.q)
-    down = run(session, up, cmd.MoveTool(at.position - [0.0, 0.0, 0.2]))
+    down = run(session, up, cmd.Position(at.position - [0.0, 0.0, 0.2]))
     (met,) = (f for f in down.findings if f.reason is Reason.CONTACT)
     assert met.parts is not None
     assert set(met.parts) == {"cup", "table"}
@@ -160,12 +160,12 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
 def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
     session: Session, holding: State
 ) -> None:
-    tight = run(session, holding, cmd.SetGripper(-0.44))
+    tight = run(session, holding, cmd.Gripper(-0.44))
     assert tight.gripper == holding.grip
     hand = session.environment.hand
     assert hand is not None
     assert touching(hand, tight) == hand.fingers
-    stopped = run(session, session.step(tight, [cmd.SetJoint(0, 0.3)], tight.t + 0.01), cmd.Stop())
+    stopped = run(session, session.step(tight, [cmd.Joint(1, 0.3)], tight.t + 0.01), cmd.Stop())
     cup, _ = cup_of(session, stopped)
     assert cup.held
     assert stopped.stopped is not None
@@ -176,7 +176,7 @@ def test_opened_fingers_leave_the_cup_on_the_table(
 ) -> None:
     up = lifted(session, arm, holding, 0.03)
     _, T_up = cup_of(session, up)
-    left = run(session, up, cmd.SetGripper(OPEN))
+    left = run(session, up, cmd.Gripper(OPEN))
     cup, T = cup_of(session, left)
     assert not cup.held
     assert left.grip is None
@@ -185,7 +185,7 @@ def test_opened_fingers_leave_the_cup_on_the_table(
     np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
     # The arm may move away from an object between its open fingers.
     back = before_cup(session, arm, left, BEFORE)
-    away = run(session, left, cmd.SetJoints(back))
+    away = run(session, left, cmd.Joints(back))
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
@@ -193,12 +193,12 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
     session: Session, arm: MountedArm
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    state = run(session, state, cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    state = run(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back, beside=0.008)
         plan = plan_to(arm, session.world_at(state), state, q)
         state = run(session, state, cmd.Follow(plan))
-    closed = run(session, state, cmd.SetGripper(-0.44))
+    closed = run(session, state, cmd.Gripper(-0.44))
     assert not cup_of(session, closed)[0].held
     (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
     assert lopsided.parts is not None
@@ -207,7 +207,7 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
     hand = session.environment.hand
     assert hand is not None
     assert {*touching(hand, closed), lopsided.parts[0]} == set(hand.fingers)
-    opened = run(session, closed, cmd.SetGripper(OPEN))
+    opened = run(session, closed, cmd.Gripper(OPEN))
     assert not any(f.reason is Reason.LOPSIDED for f in opened.findings)
     assert touching(hand, opened) == ()
 

@@ -153,7 +153,7 @@ def test_hold_drops_the_jog_and_reports_its_cause(session: Session) -> None:
     course, cause = begun(session, "ready"), Finding(Reason.DRIVER_SILENT)
     for _ in range(60):
         course.run(jog(0.1 * AXES["y"]))
-    state = course.run(cmd.Hold(finding=cause))
+    state = course.run(cmd.HoldFor(cause))
     assert state.jogging is not None
     assert not state.jogging.rates.any()
     course.rest()

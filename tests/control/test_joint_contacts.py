@@ -38,7 +38,7 @@ class Made(NamedTuple):
 
     def move(self, **values: float) -> cmd.SetAxes:
         """Return the command that moves the named joints [rad or m]."""
-        return cmd.SetAxes(tuple((self.joints.names.index(n), q) for n, q in values.items()))
+        return cmd.SetAxes(tuple((self.joints.names.index(n) + 1, q) for n, q in values.items()))
 
 
 Make = Callable[[str], Made]
@@ -118,7 +118,7 @@ def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> N
     state = begun(session)
     for number in range(200):
         t = state.t + DT
-        sample = cmd.Servo(np.array((min(0.3, 0.004 * number), 0.0)), t=t)
+        sample = cmd.Servo(np.array((min(0.3, 0.004 * number), 0.0))).timed(t)
         state = session.step(state, (sample,), t)
         state = session.observe(state, state.setpoint, 0.0)
         assert excess(world, state) >= -DISTANCE_ROUNDING
@@ -168,7 +168,7 @@ def test_no_motion_of_a_hand_brings_its_parts_too_near(
     state = begun(session)
     for q, seconds in wanted:
         goal = made.joints.clamp(np.array(q))
-        seen = list(ticks(session, state, seconds, cmd.SetJoints(goal)))
+        seen = list(ticks(session, state, seconds, cmd.Joints(goal)))
         assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
         state = seen[-1]
     stopping = ticks(session, state, 0.5, cmd.Stop())
@@ -251,11 +251,11 @@ def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:
         with pytest.raises(InputError, match="Nothing can be fixed to a hand: there is no arm"):
             session.check(command)
     with pytest.raises(InputError, match="There is no cup to fill"):
-        session.check(cmd.Fill(1e-5))
+        session.check(cmd.Fill(10.0))
     with pytest.raises(InputError, match="There is no cup to fill"):
         session.check(cmd.Batch((cmd.ReplaceScene((block(),), 1e-5),)))
     with pytest.raises(InputError, match="Only its joints can be driven"):
-        session.check(cmd.SetTool("tcp"))
+        session.check(cmd.Tool("tcp"))
 
 
 def test_an_object_is_put_down_on_the_table_below_the_base(make: Make) -> None:

@@ -74,10 +74,10 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
     targets: list[tuple[tuple[float, float, float], float]], fraction: float
 ) -> None:
     rules = Session(JOINTS, JOINTS.ready)
-    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.SpeedScale(fraction))
+    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.Speed(fraction))
     limits, seen = JOINTS.limits, [state]
     for target, seconds in targets:
-        seen += ticks(rules, state, seconds, cmd.SetJoints(np.array(target)))
+        seen += ticks(rules, state, seconds, cmd.Joints(np.array(target)))
         state = seen[-1]
     state = after(rules, state, 20.0)
     goal = np.clip(targets[-1][0], limits.lower, limits.upper)
@@ -92,17 +92,17 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
 
 
 def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
-    there = after(session, state, DT, cmd.SetAxes(((0, 9.0), (1, 9.0), (2, 0.1))))
+    there = after(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))
     findings = [(f.reason, f.axis, f.amount) for f in there.findings]
     assert findings == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
     assert there.status is Status.LIMITED
-    assert after(session, there, 10.0, cmd.SetAxes(((0, 0.1), (1, 0.0)))).findings == ()
+    assert after(session, there, 10.0, cmd.SetAxes(((1, 0.1), (2, 0.0)))).findings == ()
 
 
 def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     session: Session, state: State
 ) -> None:
-    moving = after(session, state, 0.8, cmd.SetJoints(np.array((0.4, 3.0, 0.3))))
+    moving = after(session, state, 0.8, cmd.Joints(np.array((0.4, 3.0, 0.3))))
     stopped = after(session, moving, DT, cmd.Stop())
     assert stopped.stopped is not None
     rest = after(session, stopped, stopped.stopped.time)
@@ -123,7 +123,7 @@ def test_stop_takes_the_reported_distance_and_holds_until_cleared(
 
 def test_pause_keeps_the_goal_and_hold_drops_it(session: Session, state: State) -> None:
     goal = np.array((0.3, 2.0, 0.1))
-    moving = after(session, state, 0.8, cmd.SetJoints(goal))
+    moving = after(session, state, 0.8, cmd.Joints(goal))
     paused = after(session, moving, 3.0, cmd.Pause())
     assert paused.status is Status.PAUSED
     assert not paused.moving
@@ -151,9 +151,9 @@ def test_stream_is_followed_and_ends_at_rest(session: Session, state: State) -> 
 @pytest.mark.parametrize(
     "command",
     [
-        cmd.SetPose(np.eye(4)), cmd.MoveTool(np.zeros(3)), cmd.TurnTool(0.0, 0.0),
-        cmd.SetTool("tcp"), cmd.SetGripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.ones(5)),
-        cmd.Batch((cmd.Home(), cmd.SetGripper(0.0))),
+        cmd.Pose(np.eye(4)), cmd.Position(np.zeros(3)), cmd.Turn(0.0, 0.0),
+        cmd.Tool("tcp"), cmd.Gripper(0.1), cmd.GoAlong(0.5), cmd.Jog(np.full(5, 0.1)),
+        cmd.Batch((cmd.Home(), cmd.Gripper(0.0))),
     ],
 )  # fmt: skip
 def test_tool_command_without_an_arm_is_refused_with_the_reason(
@@ -166,9 +166,9 @@ def test_tool_command_without_an_arm_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (cmd.SetJoint(3, 0.0), "axis 4: the robot has 3"),
-        (cmd.SetAxes(((0, 0.1), (7, 0.0))), "axis 8"),
-        (cmd.SetJoints(np.zeros(5)), "3 driven joints, but the command has 5"),
+        (cmd.Joint(4, 0.0), "axis 4: the robot has 3"),
+        (cmd.SetAxes(((1, 0.1), (8, 0.0))), "axis 8"),
+        (cmd.Joints(np.zeros(5)), "3 driven joints, but the command has 5"),
         (cmd.Servo(np.zeros(2)), "3 driven joints, but the command has 2"),
     ],
 )

@@ -27,7 +27,7 @@ LEVEL = 1e-6
 def typed(session: Session, q: FloatArray, T: FloatArray) -> State:
     """Return the state just after ``T`` (4, 4) is typed with the arm at ``q`` (5,) [rad]."""
     state = session.begin(q, 0.0, 0.0)
-    return session.step(state, (cmd.SetPriority(Priority.PITCH), cmd.SetPose(T)), 0.01)
+    return session.step(state, (cmd.SetPriority(Priority.PITCH), cmd.Pose(T)), 0.01)
 
 
 def tilt(session: Session, q: FloatArray) -> float:

@@ -19,7 +19,7 @@ TICK = 0.01
 
 JOG = cmd.Jog(np.array([0.0, 0.08, 0.0, 0.0, 0.0]))
 
-FAR_DRAG = cmd.MoveTool(np.array([-0.2, 0.35, 0.1]))
+FAR_DRAG = cmd.Position(np.array([-0.2, 0.35, 0.1]))
 """A target farther than one tick can track."""
 
 
@@ -50,13 +50,13 @@ def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
     dragged = run(session, state, FAR_DRAG)
     assert dragged.jogging is None
     dragged = run(session, dragged, None, 300)
-    desired = FAR_DRAG.position
+    desired = FAR_DRAG.p
     np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
     # The next drag moves the goal along its own line.
     settled = run(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
     for fraction in np.linspace(0.05, 1.0, 20):
-        settled = run(session, settled, cmd.MoveTool(start + fraction * way))
+        settled = run(session, settled, cmd.Position(start + fraction * way))
         off = point(session, settled.goal) - start
         assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
 
@@ -82,7 +82,7 @@ def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(
 ) -> None:
     random = np.random.default_rng(450)
     for _ in range(20):
-        away = cmd.SetJoints(session.ready + random.uniform(-0.5, 0.5, 5))
+        away = cmd.Joints(session.ready + random.uniform(-0.5, 0.5, 5))
         braking = run(session, run(session, state, away), None, int(random.integers(5, 40)))
         braking = run(session, run(session, braking, cmd.Hold()), None, int(random.integers(1, 8)))
         rested = run(session, run(session, braking, cmd.Pause()), None, 150)

@@ -52,7 +52,7 @@ def test_stop_brings_the_arm_to_rest_and_reports_its_distance(
     session: Session, state: State
 ) -> None:
     chain = session.require_arm().chain
-    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    moving = run(session, state, [cmd.Joints(FAR)], 60)
     assert speed(chain, moving.motion) > 0.1
     stopped = run(session, moving, [cmd.Stop()])
     assert stopped.status is Status.STOPPED
@@ -73,8 +73,8 @@ def test_stop_brings_the_arm_to_rest_and_reports_its_distance(
 
 def test_stop_overrides_motion_in_the_same_tick(session: Session, state: State) -> None:
     batches: list[list[cmd.Command]] = [
-        [cmd.Stop(), cmd.SetJoints(FAR)],
-        [cmd.SetJoints(FAR), cmd.Stop()],
+        [cmd.Stop(), cmd.Joints(FAR)],
+        [cmd.Joints(FAR), cmd.Stop()],
     ]
     for batch in batches:
         after = run(session, state, batch, 100)
@@ -83,7 +83,7 @@ def test_stop_overrides_motion_in_the_same_tick(session: Session, state: State) 
 
 
 def test_second_stop_leaves_the_brake_as_it_is(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    moving = run(session, state, [cmd.Joints(FAR)], 60)
     once = run(session, moving, [cmd.Stop()], 20)
     twice = run(session, once, [cmd.Stop()])
     assert twice.findings == once.findings
@@ -96,7 +96,7 @@ def test_second_stop_leaves_the_brake_as_it_is(session: Session, state: State) -
 
 def test_pause_stays_on_the_path_and_resume_continues(session: Session, state: State) -> None:
     start = state.setpoint
-    moving = run(session, state, [cmd.SetJoints(FAR)], 60)
+    moving = run(session, state, [cmd.Joints(FAR)], 60)
     paused = run(session, moving, [cmd.Pause()], 150)
     assert paused.status is Status.PAUSED
     assert not paused.moving
@@ -123,7 +123,7 @@ def test_elbow_that_is_too_fast_for_its_branch_brakes_beyond_it(
     q, qd = np.array(state.setpoint), np.zeros(5)
     q[2], qd[2] = 0.002, -0.4
     goal = q + np.array([0.0, 0.0, 0.5, 0.0, 0.0])
-    begun = run(session, state, [cmd.SetJoints(goal)])
+    begun = run(session, state, [cmd.Joints(goal)])
     moving = replace(begun, motion=JointMotion(frozen(q), frozen(qd), frozen(np.zeros(5))))
     assert moving.branch.elbow == state.branch.elbow  # type: ignore[union-attr]
     after = session.step(moving, [command], moving.t + TICK)
@@ -133,19 +133,19 @@ def test_elbow_that_is_too_fast_for_its_branch_brakes_beyond_it(
 
 
 def test_speed_scale_applies_at_once_to_every_joint(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.SetJoints(FAR)], 70)
-    slow = run(session, moving, [cmd.SpeedScale(0.1)], 120)
+    moving = run(session, state, [cmd.Joints(FAR)], 70)
+    slow = run(session, moving, [cmd.Speed(0.1)], 120)
     limits = session.require_arm().limits
     assert (np.abs(slow.motion.qd) <= 0.1 * limits.speed * (1 + 1e-9)).all()
     assert (np.abs(slow.motion.qd) / limits.speed).max() > 0.09
-    fast = run(session, slow, [cmd.SpeedScale(1.0)], 600)
+    fast = run(session, slow, [cmd.Speed(1.0)], 600)
     assert (fast.setpoint == FAR).all()
 
 
 @pytest.mark.parametrize("fraction", [0.0, -0.1, 1.1, math.nan, math.inf, True, "1"])
 def test_invalid_speed_is_refused(fraction: float) -> None:
     with pytest.raises(InputError, match="speed"):
-        cmd.SpeedScale(fraction)
+        cmd.Speed(fraction)
 
 
 JOGS: dict[str, tuple[list[float], JogFrame]] = {

@@ -51,7 +51,7 @@ def tick(session: Session, state: State, *commands: cmd.Command, times: int = 1)
 
 @pytest.fixture
 def full(session: Session) -> State:
-    return tick(session, session.begin(session.ready, 0.0, 0.0), cmd.Fill(200.0 * ML))
+    return tick(session, session.begin(session.ready, 0.0, 0.0), cmd.Fill(200.0))
 
 
 def held_level(session: Session, state: State) -> State:
@@ -64,7 +64,7 @@ def held_level(session: Session, state: State) -> State:
     objects: tuple[SceneObject, ...] = tuple(
         held if each is cup else each for each in state.objects
     )
-    return tick(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0 * ML))
+    return tick(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0))
 
 
 def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:
@@ -86,7 +86,7 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
         assert state.poured is not None
         seen.append(state.poured.water)
     assert 9 <= sum(a is not b for a, b in pairwise(seen)) <= 12
-    moving = tick(session, state, cmd.SetJoint(0, 0.1), times=2)
+    moving = tick(session, state, cmd.Joint(1, 0.1), times=2)
     assert moving.poured is not None
     assert session.pouring is not None
     flow = WaterFlow(session.pouring.water_environment(state.objects))
@@ -112,7 +112,7 @@ def test_overturned_cup_loses_all_its_water_and_volume_is_conserved(
     session: Session, full: State
 ) -> None:
     state = held_level(session, full)
-    state = tick(session, state, cmd.SetJoint(4, 2.6), times=600)
+    state = tick(session, state, cmd.Joint(5, 2.6), times=600)
     assert state.poured is not None
     water = state.poured.water
     assert water.total == FULL
@@ -124,7 +124,7 @@ def test_stop_during_a_pour_leaves_the_water_that_the_tilt_holds(
     session: Session, full: State
 ) -> None:
     state = held_level(session, full)
-    state = tick(session, state, cmd.SpeedScale(0.2), cmd.SetJoint(4, 2.6))
+    state = tick(session, state, cmd.Speed(0.2), cmd.Joint(5, 2.6))
     while state.poured is not None and state.poured.water.cup.volume > 0.8 * FULL:
         assert state.moving
         state = tick(session, state)
@@ -142,7 +142,7 @@ def test_stop_during_a_pour_leaves_the_water_that_the_tilt_holds(
 
 
 def test_volume_above_the_capacity_is_refused(session: Session) -> None:
-    for volume in (300.0 * ML, -1.0):
+    for volume in (300.0, -1.0):
         with pytest.raises(InputError, match="cannot hold"):
             session.check(cmd.Fill(volume))
     with pytest.raises(InputError):
@@ -152,12 +152,12 @@ def test_volume_above_the_capacity_is_refused(session: Session) -> None:
 def test_fill_without_a_cup_is_refused(session: Session, full: State) -> None:
     gone = tick(session, full, cmd.Remove("cup"), times=2)
     assert gone.poured is None
-    assert tick(session, gone, cmd.Fill(100.0 * ML)).poured is None
+    assert tick(session, gone, cmd.Fill(100.0)).poured is None
 
 
 def swing(session: Session, state: State, steps: tuple[float, ...]) -> tuple[float, float]:
     """Return the peak acceleration [m/s^2] and the peak jerk [m/s^3] of the cup in a swing."""
-    commands: tuple[cmd.Command, ...] = (cmd.SetJoint(0, 0.8),)
+    commands: tuple[cmd.Command, ...] = (cmd.Joint(1, 0.8),)
     peak, end, number = 0.0, state.t + 1.0, 0
     while state.t < end:
         state = session.step(state, commands, state.t + steps[number % len(steps)])

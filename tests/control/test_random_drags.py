@@ -214,7 +214,7 @@ def check_drag(session: Session, regions: Regions, number: int, seen: Counter[st
     target = forward(chain, end)[:3, 3]
     state = session.begin(start, 0.0, 0.0)
     branch = state.branch
-    state = settled(session, session.step(state, [cmd.MoveTool(target)], state.t + TICK))
+    state = settled(session, session.step(state, [cmd.Position(target)], state.t + TICK))
     away = float(np.linalg.norm(forward(chain, state.setpoint)[:3, 3] - target))
     seen["arrived" if away <= ON_TARGET else "held"] += 1
     if followed_by_newton(chain, start, target) is not None:

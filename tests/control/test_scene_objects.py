@@ -99,7 +99,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
     )
     low = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
     state = session.step(session.begin(low, 0.0, 0.0), [cmd.ReplaceScene((scene_object,))], TICK)
-    states = run(session, state, [cmd.SetJoint(0, -0.6)])
+    states = run(session, state, [cmd.Joint(1, -0.6)])
     (finding,) = states[-1].findings
     assert finding.reason is Reason.CONTACT
     assert "knot" in (finding.parts or ())
@@ -115,7 +115,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
             local = (points - poses[mover][:3, 3]) @ poses[mover][:3, :3]
             assert (local @ normals.T - heights).max(axis=1).min() > 0.0
     bare = session.begin(low, 0.0, 0.0)
-    bare = session.step(bare, [cmd.ReplaceScene(()), cmd.SetJoint(0, -0.6)], TICK)
+    bare = session.step(bare, [cmd.ReplaceScene(()), cmd.Joint(1, -0.6)], TICK)
     assert run(session, bare, [])[-1].findings == ()
 
 
@@ -129,7 +129,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     assert fixed.fixed
     assert not fixed.held
     np.testing.assert_allclose(session.environment.pose(fixed, x_of(state)), before, atol=1e-12)
-    moved = run(session, state, [cmd.SetJoint(0, 0.4), cmd.SetGripper(0.3)])[-1]
+    moved = run(session, state, [cmd.Joint(1, 0.4), cmd.Gripper(0.3)])[-1]
     assert moved.gripper_setpoint == 0.3
     (carried,) = moved.objects
     assert carried is fixed
@@ -143,7 +143,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     hand = session.environment.hand
     assert hand is not None
     assert all(world.gap(x_of(moved), "knot", finger) == np.inf for finger in hand.fingers)
-    low = run(session, moved, [cmd.SetJoint(1, 0.3)])[-1]
+    low = run(session, moved, [cmd.Joint(2, 0.3)])[-1]
     (finding,) = (each for each in low.findings if each.reason is Reason.CONTACT)
     assert set(finding.parts or ()) == {"knot", "table"}
 

@@ -74,7 +74,7 @@ def arriving(
         while due < len(sent) and arrived[due] <= t:
             s = float(sent[due])
             qd = (stream(s + 1e-6) - stream(s - 1e-6)) / 2e-6 if rates else None
-            commands.append(cmd.Servo(stream(s), qd, float(arrived[due])))
+            commands.append(cmd.Servo(stream(s), qd).timed(float(arrived[due])))
             due += 1
         state = session.step(states[-1], commands, t)
         before, now = states[-1].motion, state.motion
@@ -170,20 +170,20 @@ def test_samples_that_arrive_together_make_no_leap(session: Session) -> None:
     for tick in range(1, 900):
         t, commands = tick * DT, []
         if tick % 2 == 0 and tick % 100 > 10:
-            commands = [cmd.Servo(stream(t), None, t)]
+            commands = [cmd.Servo(stream(t)).timed(t)]
         if tick % 100 == 10:
-            commands = [cmd.Servo(stream(t - late), None, t) for late in (0.08, 0.04, 0.0)]
+            commands = [cmd.Servo(stream(t - late)).timed(t) for late in (0.08, 0.04, 0.0)]
         state = session.step(state, commands, t)
         assert abs(state.setpoint[0]) <= 0.4 * 1.05
 
 
 def test_time_of_another_clock_is_ignored(session: Session, state: State) -> None:
     for t in (-5.0, 1e6):
-        after = session.step(state, [cmd.Servo(session.ready, None, t)], DT)
+        after = session.step(state, [cmd.Servo(session.ready).timed(t)], DT)
         assert after.servo is not None
         assert after.servo.t == DT
     with pytest.raises(InputError, match="time"):
-        cmd.Servo(session.ready, None, math.nan)
+        cmd.Servo(session.ready).timed(math.nan)
 
 
 @pytest.mark.cases(2)
@@ -261,7 +261,7 @@ def test_arm_that_has_not_followed_rests_where_the_stream_ends(session: Session)
 
 def test_other_command_ends_the_stream(session: Session) -> None:
     _, states = streamed(session, wave(session), 1.0)
-    for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.SetJoint(0, 0.1)):
+    for command in (cmd.Home(), cmd.Hold(), cmd.Stop(), cmd.Joint(1, 0.1)):
         state = session.step(states[-1], [command], states[-1].t + DT)
         assert state.servo is None
 

@@ -42,7 +42,7 @@ def reasons(state: State) -> set[Reason]:
 
 def test_far_target_is_approached_at_maximum_speed(arm: ArmModel, state: State) -> None:
     session = Session(arm, state.setpoint, tool_speed=9.0)
-    state = session.step(state, [cmd.SetJoint(0, 2.0)], TICK)
+    state = session.step(state, [cmd.Joint(1, 2.0)], TICK)
     ticks = 1
     while state.moving:
         before = state.setpoint
@@ -57,7 +57,7 @@ def test_far_target_is_approached_at_maximum_speed(arm: ArmModel, state: State) 
 
 def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: State) -> None:
     for t in (0.0, -5.0):
-        after = session.step(state, [cmd.SetJoint(0, 2.0)], t)
+        after = session.step(state, [cmd.Joint(1, 2.0)], t)
         assert (after.setpoint == state.setpoint).all()
         assert after.t == 0.0
 
@@ -65,9 +65,9 @@ def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: S
 def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    state = run(session, state, [cmd.TurnTool(0.6, 0.4)], ticks=5)
+    state = run(session, state, [cmd.Turn(0.6, 0.4)], ticks=5)
     desired = np.array([0.25, 0.25, -0.05])
-    state = run(session, state, [cmd.MoveTool(desired)], ticks=5)
+    state = run(session, state, [cmd.Position(desired)], ticks=5)
     assert np.allclose(tool_point(arm, state), desired, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.6, 0.4), abs=1e-12
@@ -77,7 +77,7 @@ def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
 
 def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, state: State) -> None:
     before = tool_point(arm, state)
-    state = run(session, state, [cmd.TurnTool(0.55, -1.0)], ticks=5)
+    state = run(session, state, [cmd.Turn(0.55, -1.0)], ticks=5)
     assert np.allclose(tool_point(arm, state), before, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.55, -1.0), abs=1e-12
@@ -87,7 +87,7 @@ def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, st
 def test_lost_yaw_of_a_pose_is_reported(arm: ArmModel, session: Session, state: State) -> None:
     R = so3.rotation_z(math.radians(23.0)) @ so3.rotation_y(0.5)
     T = se3.from_rotation_translation(R, np.array([0.35, 0.0, 0.0]))
-    state = run(session, state, [cmd.SetPose(T)])
+    state = run(session, state, [cmd.Pose(T)])
     assert isinstance(state.target, PoseTarget)
     assert np.allclose(tool_point(arm, state), T[:3, 3], atol=1e-12)
     (yaw,) = (f for f in state.findings if f.reason is Reason.YAW_FIXED)
@@ -99,7 +99,7 @@ def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     far = np.array([0.9, 0.0, 0.1])
-    state = run(session, state, [cmd.MoveTool(far)], ticks=10)
+    state = run(session, state, [cmd.Position(far)], ticks=10)
     reached = tool_point(arm, state)
     lengths = float(np.linalg.norm(arm.tools["tcp"][:3, 3]))
     assert np.linalg.norm(reached) == pytest.approx(lengths, abs=1e-9)
@@ -112,11 +112,11 @@ def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
 
 
 def test_drag_back_into_reach_restores_the_target_pitch(session: Session, state: State) -> None:
-    home = run(session, state, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))], ticks=5)
+    home = run(session, state, [cmd.Position(np.array([0.44, 0.0, 0.0]))], ticks=5)
     pitch, _ = pitch_and_roll(session.require_arm().chain, home.goal)
-    away = run(session, home, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=50)
+    away = run(session, home, [cmd.Position(np.array([0.9, 0.0, 0.0]))], ticks=50)
     assert abs(pitch_and_roll(session.require_arm().chain, away.goal)[0] - pitch) > 0.3
-    back = run(session, away, [cmd.MoveTool(np.array([0.44, 0.0, 0.0]))], ticks=10)
+    back = run(session, away, [cmd.Position(np.array([0.44, 0.0, 0.0]))], ticks=10)
     assert pitch_and_roll(session.require_arm().chain, back.goal)[0] == pytest.approx(
         pitch, abs=1e-12
     )
@@ -125,16 +125,14 @@ def test_drag_back_into_reach_restores_the_target_pitch(session: Session, state:
 def test_end_of_a_drag_makes_the_goal_the_target_and_keeps_the_finding(
     session: Session, state: State
 ) -> None:
-    away = run(session, state, [cmd.MoveTool(np.array([0.9, 0.0, 0.0]))], ticks=10)
+    away = run(session, state, [cmd.Position(np.array([0.9, 0.0, 0.0]))], ticks=10)
     assert not isinstance(away.target, JointTarget)
     away = run(session, away, [cmd.EndDrag()])
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
     assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
     # The next target starts from the posture of the arm, and clears the reason.
-    back = run(
-        session, away, [cmd.TurnTool(*pitch_and_roll(session.require_arm().chain, away.goal))]
-    )
+    back = run(session, away, [cmd.Turn(*pitch_and_roll(session.require_arm().chain, away.goal))])
     assert np.allclose(back.goal, away.goal, atol=1e-6)
     assert reasons(back) == set()
 
@@ -144,7 +142,7 @@ def test_drag_that_ends_at_once_still_reaches_its_target(
 ) -> None:
     """One tick cannot track all of the path; the target remains after the end of the drag."""
     desired = np.array([-0.2, 0.35, 0.1])
-    released = run(session, state, [cmd.MoveTool(desired), cmd.EndDrag()])
+    released = run(session, state, [cmd.Position(desired), cmd.EndDrag()])
     assert released.since is not None
     assert released.findings == ()
     assert math.dist(tool_point(arm, released), desired) > 0.1
@@ -154,11 +152,11 @@ def test_drag_that_ends_at_once_still_reaches_its_target(
     assert isinstance(there.target, JointTarget)
     assert there.target.q is there.goal
     # A new drag on the way replaces the target.
-    again = run(session, released, [cmd.MoveTool(desired)], ticks=15)
+    again = run(session, released, [cmd.Position(desired)], ticks=15)
     assert np.allclose(tool_point(arm, again), desired, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
     # Any other command ends the drag.
-    for command in (cmd.Hold(), cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetTool("flange")):
+    for command in (cmd.Hold(), cmd.Home(), cmd.Joint(1, 0.1), cmd.Tool("flange")):
         ended = run(session, released, [command])
         assert ended.since is None
         assert isinstance(ended.target, JointTarget)
@@ -170,7 +168,7 @@ def test_slider_at_its_end_makes_no_finding(
     arm: ArmModel, session: Session, state: State, axis: int
 ) -> None:
     end = math.radians(math.degrees(arm.chain.upper[axis]))
-    state = run(session, state, [cmd.SetJoint(axis, math.nextafter(end, math.inf))])
+    state = run(session, state, [cmd.Joint(axis + 1, math.nextafter(end, math.inf))])
     assert state.findings == ()
     assert state.goal[axis] <= arm.chain.upper[axis]
 
@@ -180,7 +178,7 @@ def test_slider_at_its_end_makes_no_finding(
 def test_joint_stops_at_its_limit_and_reports_it(
     arm: ArmModel, session: Session, state: State, axis: int, side: float
 ) -> None:
-    state = run(session, state, [cmd.SetJoint(axis, side * 4.0)])
+    state = run(session, state, [cmd.Joint(axis + 1, side * 4.0)])
     limit = (arm.chain.upper if side > 0 else arm.chain.lower)[axis]
     assert state.goal[axis] == limit
     (finding,) = state.findings
@@ -201,17 +199,17 @@ def test_zero_posture_hold_and_home(session: Session, state: State) -> None:
 
 
 def test_tool_change_moves_nothing(arm: ArmModel, session: Session, state: State) -> None:
-    changed = run(session, state, [cmd.SetTool("flange")])
+    changed = run(session, state, [cmd.Tool("flange")])
     assert (changed.goal == state.goal).all()
     assert not changed.moving
-    moved = run(session, changed, [cmd.MoveTool(np.array([0.25, 0.0, 0.05]))], ticks=5)
+    moved = run(session, changed, [cmd.Position(np.array([0.25, 0.0, 0.05]))], ticks=5)
     assert np.allclose(forward(arm.chain_to("flange"), moved.goal)[:3, 3], [0.25, 0.0, 0.05])
 
 
 def test_gripper_moves_at_its_speed_and_stops_at_its_limit(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    state = run(session, state, [cmd.SetGripper(1.0)])
+    state = run(session, state, [cmd.Gripper(1.0)])
     assert state.gripper_goal == arm.gripper.upper
     assert reasons(state) == {Reason.GRIPPER_LIMIT}
     assert 0.0 < state.gripper_setpoint <= arm.gripper.speed * TICK * (1 + 1e-12)
@@ -220,16 +218,16 @@ def test_gripper_moves_at_its_speed_and_stops_at_its_limit(
     # A command of the arm keeps the gripper's finding; a valid gripper command clears it.
     state = run(session, state, [cmd.Home()])
     assert reasons(state) == {Reason.GRIPPER_LIMIT}
-    assert reasons(run(session, state, [cmd.SetGripper(0.0)])) == set()
+    assert reasons(run(session, state, [cmd.Gripper(0.0)])) == set()
 
 
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (cmd.SetJoint(5, 0.0), "no axis 6"),
-        (cmd.SetJoints(np.zeros(6)), "5 joints"),
-        (cmd.SetTool("hammer"), "hammer.*tcp, grasp, flange"),
-        (cmd.SetTool([]), "no tool"),  # type: ignore[arg-type]
+        (cmd.Joint(6, 0.0), "no axis 6"),
+        (cmd.Joints(np.zeros(6)), "5 joints"),
+        (cmd.Tool("hammer"), "hammer.*tcp, grasp, flange"),
+        (cmd.Tool([]), "no tool"),  # type: ignore[arg-type]
     ],
 )
 def test_unsupported_request_changes_nothing(
@@ -238,7 +236,7 @@ def test_unsupported_request_changes_nothing(
     with pytest.raises(InputError, match=message):
         session.check(command)
     with pytest.raises(InputError, match=message):
-        session.step(state, [cmd.SetJoint(0, 1.0), command], TICK)
+        session.step(state, [cmd.Joint(1, 1.0), command], TICK)
     assert (state.goal == session.ready).all()
 
 
@@ -251,8 +249,8 @@ def test_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
 def test_arm_keeps_its_azimuth_over_the_base(
     session: Session, state: State, point: tuple[float, float, float]
 ) -> None:
-    turned = run(session, state, [cmd.SetJoint(0, 0.7)])
-    over = run(session, turned, [cmd.MoveTool(np.array(point))], ticks=10)
+    turned = run(session, state, [cmd.Joint(1, 0.7)])
+    over = run(session, turned, [cmd.Position(np.array(point))], ticks=10)
     assert over.goal[0] == pytest.approx(0.7, abs=1e-9)
     assert np.isfinite(over.goal).all()
 
@@ -260,8 +258,8 @@ def test_arm_keeps_its_azimuth_over_the_base(
 def test_limit_of_a_drag_is_no_outcome_of_the_gripper_or_the_speed(
     session: Session, state: State
 ) -> None:
-    others: list[cmd.Command] = [cmd.SetGripper(0.1), cmd.SpeedScale(0.9)]
-    far = cmd.MoveTool(np.array([0.9, 0.0, 0.1]))
+    others: list[cmd.Command] = [cmd.Gripper(0.1), cmd.Speed(0.9)]
+    far = cmd.Position(np.array([0.9, 0.0, 0.1]))
     verdicts = []
     before = away = run(session, state, [far])
     while away.status is Status.OK:

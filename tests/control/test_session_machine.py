@@ -45,7 +45,7 @@ class ArmRules(JointRules):
         begins = not isinstance(self.state.intent, Tracking)
         for tick in range(1, ticks + 1):
             position = start + 0.02 * tick * step
-            self.tick([cmd.MoveTool(position)])
+            self.tick([cmd.Position(position)])
             if self.state.stopped is None:
                 self.check_drag(position, start if begins else None)
         self.run([cmd.EndDrag()] if let_go else (), 2)
@@ -85,9 +85,9 @@ class ArmRules(JointRules):
                 self.run([cmd.Resume()], 5)
             else:
                 wide = self.state.gripper_setpoint < 0.1
-                self.tick([cmd.SetGripper(0.3 if wide else -0.3)])
+                self.tick([cmd.Gripper(0.3 if wide else -0.3)])
                 self.run([cmd.Stop()], ticks)
-                self.run([cmd.Home(), cmd.SetGripper(0.0)], 2)
+                self.run([cmd.Home(), cmd.Gripper(0.0)], 2)
                 self.wait_and_clear(5)
 
     @precondition(lambda self: self.state.beyond_gap is not None)
@@ -119,7 +119,7 @@ class ArmRules(JointRules):
 
     @rule(pitch=fractions(1), roll=fractions(1), ticks=ticks)
     def turn(self, pitch: FloatArray, roll: FloatArray, ticks: int) -> None:
-        self.run([cmd.TurnTool(1.5 * float(pitch[0]), float(roll[0]))], ticks)
+        self.run([cmd.Turn(1.5 * float(pitch[0]), float(roll[0]))], ticks)
 
     @rule(ticks=ticks)
     def end_drag(self, ticks: int) -> None:
@@ -130,11 +130,11 @@ class ArmRules(JointRules):
         chain = self.session.require_arm().chain_to(self.state.tool)
         T = np.array(forward(chain, self.state.goal))
         T[:3, 3] += 0.1 * off
-        self.run([cmd.SetPose(T)], ticks)
+        self.run([cmd.Pose(T)], ticks)
 
     @rule(branch=st.sampled_from(BRANCHES), ticks=ticks)
     def take_branch(self, branch: Branch, ticks: int) -> None:
-        self.run([cmd.TakeBranch(branch)], ticks)
+        self.run([cmd.Branch(name=str(branch))], ticks)
 
     @rule(priority=st.sampled_from(FIVE_AXIS_PRIORITIES), ticks=ticks)
     def set_priority(self, priority: Priority, ticks: int) -> None:
@@ -143,7 +143,7 @@ class ArmRules(JointRules):
     @rule(data=st.data(), ticks=ticks)
     def set_tool(self, data: st.DataObject, ticks: int) -> None:
         tools = sorted(self.session.require_arm().tools)
-        self.run([cmd.SetTool(data.draw(st.sampled_from(tools)))], ticks)
+        self.run([cmd.Tool(data.draw(st.sampled_from(tools)))], ticks)
 
     @precondition(lambda self: self.state.motion.at_rest)
     @rule(off=fractions(5), ticks=st.integers(1, 60))
@@ -171,7 +171,7 @@ class ArmRules(JointRules):
 
     @rule(angle=st.integers(-3, 9), ticks=ticks)
     def grip(self, angle: int, ticks: int) -> None:
-        self.run([cmd.SetGripper(angle / 8.0)], ticks)
+        self.run([cmd.Gripper(angle / 8.0)], ticks)
 
     @precondition(lambda self: self.name == "shipped")
     @rule(at=fractions(2), ticks=ticks)

@@ -24,17 +24,17 @@ LATE = Finding(Reason.LOOP_LATE, 0.3)
 def test_profile_chooses_between_stop_and_pause() -> None:
     stop = cmd.Stop(StopCause(f"{finding_text(LATE)}."), LATE)
     assert SilenceProfile.REAL_ARM.braking(LATE, 0.3) == stop
-    assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.Hold(finding=LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, 0.3) == cmd.HoldFor(LATE)
     assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT) == stop
     # A program keeps its path, unless somebody may stand beside the arm.
-    assert SilenceProfile.SIMULATION.braking(LATE, 0.3, resumes=True) == cmd.Pause(LATE)
+    assert SilenceProfile.SIMULATION.braking(LATE, 0.3, resumes=True) == cmd.PauseFor(LATE)
     assert SilenceProfile.SIMULATION.braking(LATE, PAUSE_TIMEOUT, resumes=True) == stop
     assert SilenceProfile.REAL_ARM.braking(LATE, 0.3, resumes=True) == stop
 
 
 def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
-    paused = run(session, moving, [cmd.Pause(LATE)], ticks=100)
+    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
+    paused = run(session, moving, [cmd.PauseFor(LATE)], ticks=100)
     assert paused.pause_cause == LATE
     assert not paused.moving
     resumed = run(session, paused, [cmd.Resume()], ticks=300)
@@ -42,7 +42,7 @@ def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state
     assert not resumed.findings
     assert resumed.q[0] == 1.0
     # The pause of a person lasts, whether it came before or after.
-    for pauses in ([cmd.Pause(), cmd.Pause(LATE)], [cmd.Pause(LATE), cmd.Pause()]):
+    for pauses in ([cmd.Pause(), cmd.PauseFor(LATE)], [cmd.PauseFor(LATE), cmd.Pause()]):
         both = run(session, moving, pauses, ticks=100)
         assert both.paused
         assert both.pause_cause is None
@@ -51,16 +51,16 @@ def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state
 @pytest.fixture
 def paused(session: Session, state: State) -> State:
     """Return a state after a pause in a motion."""
-    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
-    return run(session, moving, [cmd.Hold(finding=LATE)], ticks=100)
+    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
+    return run(session, moving, [cmd.HoldFor(LATE)], ticks=100)
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        cmd.SetJoint(0, 1.5),
-        cmd.SetGripper(0.3),
-        cmd.MoveTool(np.array((0.3, 0.0, 0.2))),
+        cmd.Joint(1, 1.5),
+        cmd.Gripper(0.3),
+        cmd.Position(np.array((0.3, 0.0, 0.2))),
         cmd.Hold(),
         cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE),
     ],
@@ -88,13 +88,13 @@ def test_plan_that_begins_elsewhere_keeps_a_pause(
         assert len(paused.findings) == 3
 
 
-@pytest.mark.parametrize("command", [cmd.SpeedScale(0.5), cmd.SetPriority(Priority.PITCH)])
+@pytest.mark.parametrize("command", [cmd.Speed(0.5), cmd.SetPriority(Priority.PITCH)])
 def test_settings_keep_a_pause(session: Session, paused: State, command: cmd.Command) -> None:
     assert run(session, paused, [command]).waits
 
 
 def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.SetJoint(0, 1.0)], ticks=20)
+    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
     stopped = run(session, moving, [cmd.Stop(finding=LATE)], ticks=100)
     assert reasons(stopped) == {Reason.STOPPED, Reason.LOOP_LATE}
     again = run(session, stopped, [cmd.Stop()])
@@ -105,7 +105,7 @@ def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State
 def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(
     session: Session, state: State
 ) -> None:
-    moving = run(session, state, [cmd.SpeedScale(0.5), cmd.SetJoint(0, 1.0)], ticks=20)
+    moving = run(session, state, [cmd.Speed(0.5), cmd.Joint(1, 1.0)], ticks=20)
     assert moving.moving
     kept = at_rest(moving)
     begun = session.begin(kept.q, kept.gripper, 5.0)

@@ -30,8 +30,10 @@ def at_rest(session: Session, state: State) -> State:
     raise AssertionError("the arm does not come to rest")
 
 
-def step(x: float = 0.0, y: float = 0.0, z: float = 0.0, **frame: JogFrame) -> cmd.StepTool:
-    return cmd.StepTool(np.array([x, y, z, 0.0, 0.0]), **frame)
+def step(
+    x: float = 0.0, y: float = 0.0, z: float = 0.0, frame: JogFrame = JogFrame.BASE
+) -> cmd.StepTool:
+    return cmd.StepTool(np.array([x, y, z, 0.0, 0.0]), frame)
 
 
 @pytest.mark.parametrize("length", [1e-4, 1e-3, 1e-2])

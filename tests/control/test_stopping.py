@@ -26,7 +26,7 @@ def run(session: Session, state: State, *commands: cmd.Command, ticks: int = 1) 
 
 
 def test_stop_is_not_cleared_while_the_arm_brakes(session: Session, state: State) -> None:
-    moving = run(session, state, cmd.SetJoints(np.zeros(5)), ticks=60)
+    moving = run(session, state, cmd.Joints(np.zeros(5)), ticks=60)
     stopped = run(session, moving, cmd.Stop(ANNA), ticks=5)
     assert not stopped.motion.at_rest
     early = run(session, stopped, cmd.ClearStop())
@@ -87,7 +87,7 @@ def test_joined_stops_keep_the_newest_presses() -> None:
 
 
 def test_fingers_rest_after_a_stop_and_during_a_pause(session: Session, state: State) -> None:
-    moving = run(session, state, cmd.SetJoints(np.zeros(5)), cmd.SetGripper(0.4), ticks=20)
+    moving = run(session, state, cmd.Joints(np.zeros(5)), cmd.Gripper(0.4), ticks=20)
     assert moving.gripper_setpoint != moving.gripper_goal
     paused = run(session, moving, cmd.Pause(), ticks=20)
     assert paused.gripper_setpoint == moving.gripper_setpoint

@@ -100,7 +100,7 @@ def reasons(state: State) -> list[Reason]:
 def test_arm_that_lags_as_expected_reaches_its_goal(
     session: Session, measured: DelayedArm, state: State
 ) -> None:
-    moving = run(session, measured, state, [cmd.SetJoint(0, 1.0)], 30)
+    moving = run(session, measured, state, [cmd.Joint(1, 1.0)], 30)
     assert np.abs(moving.q - moving.setpoint).max() > math.radians(3.0), "the lag is not a fault"
     assert moving.stopped is None
     assert moving.moving
@@ -114,7 +114,7 @@ def test_arm_that_lags_as_expected_reaches_its_goal(
 def test_arm_moves_until_it_is_measured_at_rest(
     session: Session, measured: DelayedArm, state: State
 ) -> None:
-    moving = run(session, measured, state, [cmd.SetJoint(0, 1.0)])
+    moving = run(session, measured, state, [cmd.Joint(1, 1.0)])
     while not np.array_equal(moving.setpoint, moving.goal):
         moving = run(session, measured, moving, [])
     assert moving.moving, "the setpoint is at the goal, the arm is not"
@@ -127,8 +127,8 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
     session: Session, state: State, mode: ArmMode
 ) -> None:
     measured = DelayedArm(mode, frozen(session.ready + 0.1), note="Hold the arm.")
-    state = run(session, measured, state, [cmd.SetJoint(0, 1.0)])
-    state = run(session, measured, state, [cmd.SetJoint(0, 1.0), cmd.ClearStop()], 200)
+    state = run(session, measured, state, [cmd.Joint(1, 1.0)])
+    state = run(session, measured, state, [cmd.Joint(1, 1.0), cmd.ClearStop()], 200)
     assert state.stopped is not None
     lasting = mode in (ArmMode.COLLIDED, ArmMode.FAULT)
     why = "Hold the arm." if lasting else "The arm was not ready for setpoints."
@@ -144,14 +144,14 @@ def test_arm_that_does_not_follow_is_stopped_until_it_does(
     state = run(session, measured, state, [cmd.ClearStop()], 50)
     assert state.stopped is None
     np.testing.assert_array_equal(state.q, session.ready + 0.1)
-    state = run(session, measured, state, [cmd.SetJoint(0, 0.9)], 400)
+    state = run(session, measured, state, [cmd.Joint(1, 0.9)], 400)
     assert state.q[0] == 0.9
 
 
 def test_stopped_arm_stays_where_it_came_to_rest(
     session: Session, measured: DelayedArm, state: State
 ) -> None:
-    moving = run(session, measured, state, [cmd.SetJoint(0, 1.0)], 40)
+    moving = run(session, measured, state, [cmd.Joint(1, 1.0)], 40)
     ahead = moving.setpoint[0]
     stopped = run(session, measured, moving, [cmd.Stop()], 150)
     rest = stopped.q[0]
@@ -166,7 +166,7 @@ def test_stopped_arm_stays_where_it_came_to_rest(
 def test_measured_stop_replaces_the_computed_one(
     session: Session, measured: DelayedArm, state: State
 ) -> None:
-    moving = run(session, measured, state, [cmd.SetJoint(0, 1.0)], 40)
+    moving = run(session, measured, state, [cmd.Joint(1, 1.0)], 40)
     stopped = run(session, measured, moving, [cmd.Stop()])
     assert "within" not in sentence(stopped), "the stop of the simulation is not that of the arm"
     measured.measured_stop = MeasuredStop(0.21, math.radians(1.3))

@@ -28,11 +28,11 @@ def anywhere(rng: np.random.Generator, arm: ArmModel) -> FloatArray:
 
 
 ORDERS: dict[str, list[Order]] = {
-    "drags": [lambda rng, _: cmd.MoveTool(rng.uniform(-0.6, 0.6, 3))],
+    "drags": [lambda rng, _: cmd.Position(rng.uniform(-0.6, 0.6, 3))],
     "streams": [lambda rng, arm: cmd.Servo(anywhere(rng, arm), rng.uniform(-2.0, 2.0, 5))],
     "jogs": [lambda rng, _: cmd.Jog(rng.uniform(-0.5, 0.5, 5))],
-    "turns": [lambda rng, _: cmd.TurnTool(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0))],
-    "joints": [lambda rng, arm: cmd.SetJoints(anywhere(rng, arm))],
+    "turns": [lambda rng, _: cmd.Turn(rng.uniform(-2.0, 2.0), rng.uniform(-2.0, 2.0))],
+    "joints": [lambda rng, arm: cmd.Joints(anywhere(rng, arm))],
     "pauses": [lambda *_: cmd.Pause(), lambda *_: cmd.Resume(), lambda *_: cmd.Hold()],
     "stops": [lambda *_: cmd.Stop()],
 }
@@ -95,7 +95,7 @@ def test_fast_drags_keep_the_tool_speed(
     for _ in range(2500 if LONG else 1200):
         commands: list[cmd.Command] = []
         if wait == 0:
-            commands = [cmd.MoveTool(rng.uniform(-size, size, 3))]
+            commands = [cmd.Position(rng.uniform(-size, size, 3))]
             wait = int(rng.integers(1, longest))
         else:
             wait -= 1
@@ -112,7 +112,7 @@ def test_lower_tool_speed_is_kept(arm: ArmModel, session: Session) -> None:
 
 def test_leaving_a_plan_keeps_the_tool_speed(arm: ArmModel, session: Session) -> None:
     rng, worst = np.random.default_rng(11), 0.0
-    orders: list[cmd.Command] = [cmd.Stop(), cmd.Home(), cmd.MoveTool(np.array([-0.3, 0.3, 0.2]))]
+    orders: list[cmd.Command] = [cmd.Stop(), cmd.Home(), cmd.Position(np.array([-0.3, 0.3, 0.2]))]
     for number in range(12):
         state = session.begin(anywhere(rng, arm), 0.0, 0.0)
         plan = plan_to(arm, None, state, anywhere(rng, arm))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import classes_of
 from katana450.arm.control.appearance import AppearanceTrait
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
@@ -35,7 +36,7 @@ from tests.control.test_traits import examples
 
 TICK = 0.01
 
-COMMANDS = typing.get_args(cmd.Command)
+COMMANDS = classes_of(cmd.Command)
 
 FAR = np.array([-0.2, 0.35, 0.1])
 """[m] A target farther than a drag moves in one tick."""
@@ -57,7 +58,7 @@ def followed(session: Session, state: State) -> State:
     return run(session, run(session, state, [cmd.Follow(plan)]), [], 60)
 
 
-OF_FIVE_AXES = [each for each in COMMANDS if each is not cmd.OrientTool]
+OF_FIVE_AXES = [each for each in COMMANDS if each is not cmd.Orient]
 """Commands of this arm; tests/general_arms has the other."""
 
 
@@ -68,16 +69,16 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
     assert cup is not None
     pose = forward(session.require_arm().chain_to(state.tool), session.ready)
     found: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
-        cmd.SetJoint: lambda: cmd.SetJoint(0, 0.5),
-        cmd.SetJoints: lambda: cmd.SetJoints(session.ready + 0.1),
+        cmd.Joint: lambda: cmd.Joint(1, 0.5),
+        cmd.Joints: lambda: cmd.Joints(session.ready + 0.1),
         cmd.Servo: lambda: cmd.Servo(np.array(state.setpoint) + 0.002),
-        cmd.MoveTool: lambda: cmd.MoveTool(FAR + 0.01),
-        cmd.TurnTool: lambda: cmd.TurnTool(-0.4, 0.3),
-        cmd.StepTool: lambda: cmd.StepTool(np.array([-0.4, 0.4, 0.0, 0.0, 0.0])),
-        cmd.SetPose: lambda: cmd.SetPose(pose),
-        cmd.SetGripper: lambda: cmd.SetGripper(0.4),
+        cmd.Position: lambda: cmd.Position(FAR + 0.01),
+        cmd.Turn: lambda: cmd.Turn(-0.4, 0.3),
+        cmd.StepTool: lambda: cmd.StepTool(np.array([-0.1, 0.1, -0.1, 1.0, 0.0])),
+        cmd.Pose: lambda: cmd.Pose(pose),
+        cmd.Gripper: lambda: cmd.Gripper(0.4),
         cmd.SetPriority: lambda: cmd.SetPriority(Priority.POSITION),
-        cmd.TakeBranch: lambda: cmd.TakeBranch(BRANCHES[-1]),
+        cmd.Branch: lambda: cmd.Branch(name=str(BRANCHES[-1])),
         cmd.Follow: lambda: cmd.Follow(
             plan_to(session.require_arm(), None, state, session.ready + 0.3)
         ),
@@ -90,7 +91,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.ReplaceScene: lambda: cmd.ReplaceScene(objects),
         cmd.MoveObject: lambda: cmd.MoveObject("cup", np.array([0.3, 0.35, 0.0])),
         cmd.SetAppearance: lambda: cmd.SetAppearance("cup", AppearanceTrait.CHOICE, -1),
-        cmd.Batch: lambda: cmd.Batch((cmd.SpeedScale(0.5),)),
+        cmd.Batch: lambda: cmd.Batch((cmd.Speed(0.5),)),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
     }
     if kind in found:
@@ -118,9 +119,9 @@ def left(session: Session, state: State) -> State:
 BEGINNINGS: dict[type[Mode], Callable[[Session, State], State]] = {
     Idle: lambda _, state: state,
     Positioning: lambda session, state: run(
-        session, state, [example(session, state, cmd.SetPose), cmd.SetJoint(0, 0.9)], 5
+        session, state, [example(session, state, cmd.Pose), cmd.Joint(1, 0.9)], 5
     ),
-    Tracking: lambda session, state: run(session, state, [cmd.MoveTool(FAR)]),
+    Tracking: lambda session, state: run(session, state, [cmd.Position(FAR)]),
     Jogging: lambda session, state: run(session, state, [example(session, state, cmd.Jog)], 5),
     Servoing: streamed,
     Following: followed,
@@ -194,13 +195,13 @@ def test_stop_refuses_all_commands_but_the_listed(
     command = example(shipped, begun[Jogging], kind)
     if kind is cmd.ClearStop:
         stopped = run(shipped, stopped, [], 120)
-    after = run(shipped, stopped, [command, cmd.Batch((cmd.SpeedScale(0.9),))])
+    after = run(shipped, stopped, [command, cmd.Batch((cmd.Speed(0.9),))])
     assert isinstance(after.mode, Idle)
     # Only ClearStop ends a stop.
     assert (after.stopped is None) == (kind is cmd.ClearStop)
     if not kind.traits.while_stopped:
         assert effect_of(command, stopped) is Effect.REFUSED
-        idle = run(shipped, stopped, [cmd.SpeedScale(0.9)])
+        idle = run(shipped, stopped, [cmd.Speed(0.9)])
         assert trace(after) == trace(idle)
 
 
@@ -218,6 +219,6 @@ def test_jog_is_refused_during_a_pause(shipped: Session) -> None:
 def test_batch_has_the_effects_of_its_commands(
     shipped: Session, begun: dict[type[Mode], State]
 ) -> None:
-    after = run(shipped, begun[Jogging], [cmd.Batch((cmd.SpeedScale(0.3), cmd.Home()))])
+    after = run(shipped, begun[Jogging], [cmd.Batch((cmd.Speed(0.3), cmd.Home()))])
     assert after.speed == 0.3
     assert isinstance(after.mode, Positioning)

@@ -28,7 +28,7 @@ def write(
 
 def numbered(count: int) -> list[Record]:
     """Return ``count`` different records."""
-    return [record("command", {"command": "SetJoint", "value": n}) for n in range(count)]
+    return [record("command", {"command": "Joint", "value": n}) for n in range(count)]
 
 
 def records(folder: Path) -> list[Record]:

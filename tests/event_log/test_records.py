@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import Command
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.outcome import refused
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
-from katana450.arm.control.traits import BaseCommand
 from katana450.client import connect
 from katana450.extensions.event_log.compact import MAX_TEXT, compact_command, compact_request
 from katana450.extensions.event_log.record_limits import LIMITS
@@ -38,7 +38,7 @@ BERT = replace(ANNA, person=Person("other/page", "Bert", Role.VIEWER, address="1
 LIMITED = Outcome(Verdict.LIMITED, (Finding(Reason.AXIS_LIMIT, 1.0, 0),))
 
 
-def command(t: float, value: BaseCommand, ticket: int = 0, actor: Actor = ANNA) -> Note:
+def command(t: float, value: Command, ticket: int = 0, actor: Actor = ANNA) -> Note:
     return Note(t, "command", actor, value, "accepted", ticket=ticket)
 
 
@@ -62,24 +62,24 @@ def test_stream_makes_a_record_at_its_start_and_at_its_end() -> None:
 
 
 def test_single_command_of_a_stream_makes_one_record() -> None:
-    assert what(made(command(1.0, cmd.SetJoint(0, 0.5)))) == [("command", "SetJoint", None)]
+    assert what(made(command(1.0, cmd.Joint(1, 0.5)))) == [("command", "Joint", None)]
 
 
 def test_pause_another_joint_and_another_participant_begin_new_streams() -> None:
     later = 0.1 + STREAM_GAP * 1.01
     found = made(
-        command(0.0, cmd.SetJoint(0, 0.1)),
-        command(0.1, cmd.SetJoint(0, 0.2)),
-        command(0.1, cmd.SetJoint(1, 0.2)),
-        command(later, cmd.SetJoint(0, 0.3)),
-        command(later, cmd.SetJoint(0, 0.4), actor=BERT),
+        command(0.0, cmd.Joint(1, 0.1)),
+        command(0.1, cmd.Joint(1, 0.2)),
+        command(0.1, cmd.Joint(2, 0.2)),
+        command(later, cmd.Joint(1, 0.3)),
+        command(later, cmd.Joint(1, 0.4), actor=BERT),
     )
     assert what(found) == [
-        ("command", "SetJoint", None),
-        ("command", "SetJoint", None),
-        ("stream", "SetJoint", 2),
-        ("command", "SetJoint", None),
-        ("command", "SetJoint", None),
+        ("command", "Joint", None),
+        ("command", "Joint", None),
+        ("stream", "Joint", 2),
+        ("command", "Joint", None),
+        ("command", "Joint", None),
     ]
     assert [each["what"].get("axis") for each in found] == [1, 2, None, 1, 1]
 
@@ -106,7 +106,7 @@ def test_long_stream_makes_records_on_the_way() -> None:
 
 
 def test_nudges_are_recorded_one_by_one() -> None:
-    found = made(*(command(n / 50, cmd.Nudge(2, 0.1 * n)) for n in range(5)))
+    found = made(*(command(n / 50, cmd.Nudge(3, 0.1 * n)) for n in range(5)))
     assert [(each["what"]["axis"], each["what"]["by"]) for each in found] == [
         (3, pytest.approx(0.1 * n)) for n in range(5)
     ]
@@ -116,7 +116,7 @@ def test_nudges_are_recorded_one_by_one() -> None:
 def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
     """The thread of the link may be quicker than the one that gave the command."""
     notes = [
-        command(1.0, cmd.Nudge(0, 9.0), 7),
+        command(1.0, cmd.Nudge(1, 9.0), 7),
         Note(1.01, "outcome", None, LIMITED, ticket=7),
     ]
     given, outcome = made(*(notes[::-1] if early else notes))
@@ -128,7 +128,7 @@ def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
 def test_outcomes_of_a_stream_are_counted() -> None:
     notes: list[Note] = []
     for n in range(10):
-        notes.append(command(n / 50, cmd.SetJoint(0, 9.0), n + 1))
+        notes.append(command(n / 50, cmd.Joint(1, 9.0), n + 1))
         notes.append(
             Note(n / 50, "outcome", None, refused("No.") if n % 2 else LIMITED, ticket=n + 1)
         )
@@ -138,7 +138,7 @@ def test_outcomes_of_a_stream_are_counted() -> None:
 
 
 @pytest.mark.parametrize("last", [cmd.EndDrag(), cmd.Jog(np.zeros(5))])
-def test_outcome_after_the_end_of_its_stream_is_recorded(last: BaseCommand) -> None:
+def test_outcome_after_the_end_of_its_stream_is_recorded(last: Command) -> None:
     jogs = [command(n / 50, cmd.Jog(np.array([0.1, 0, 0, 0, 0])), n + 1) for n in range(5)]
     found = made(*jogs, command(0.1, last, 6), Note(0.11, "outcome", None, LIMITED, ticket=5))
     (outcome,) = (each for each in found if each["kind"] == "outcome")
@@ -160,18 +160,18 @@ def test_participant_is_described_without_its_key() -> None:
 def test_values_are_bounded_and_without_secrets() -> None:
     hello = compact_request(requests.Hello(name="x" * 40, token="secret"))
     assert "secret" not in str(hello)
-    assert compact_command(cmd.SetTool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
-    batch = cmd.Batch(tuple(cmd.SetTool("x" * 1000) for _ in range(1000)))
+    assert compact_command(cmd.Tool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
+    batch = cmd.Batch(tuple(cmd.Tool("x" * 1000) for _ in range(1000)))
     person = replace(ANNA.person, name="A\n\u2028\x1b[31m\ud800" * 200_000)
     (found,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
     assert found["what"]["count"] == 1000
     assert len(encoded(1, found)) <= MAX_LINE_BYTES
-    assert compact_command(cmd.SetPose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
+    assert compact_command(cmd.Pose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
 
 
 def test_flood_of_one_participant_is_counted_and_leaves_room_for_others() -> None:
     flood = [Note(n / 1000, "refusal", BERT, {"request": "Home"}) for n in range(20_000)]
-    drive = [command(n / 2, cmd.Nudge(0, 0.1)) for n in range(40)]
+    drive = [command(n / 2, cmd.Nudge(1, 0.1)) for n in range(40)]
     maker = RecordMaker()
     found: list[Record] = []
     for note in sorted((*flood, *drive), key=lambda note: note.t):
@@ -270,4 +270,4 @@ def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
     assert len(stops) + sum(each["what"]["of"]["stop"] for each in more) == 400
     assert "repeated" not in stops[0]["what"]
     commands = [each["what"]["command"] for each in found if each["kind"] in ("command", "clear")]
-    assert commands == ["SpeedScale", "ClearStop", "Nudge"]
+    assert commands == ["Speed", "ClearStop", "Nudge"]

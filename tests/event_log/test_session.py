@@ -168,10 +168,10 @@ sign-in | Otto | page | - | - | accepted
 sign-in | Vera | page | - | - | accepted
 sign-in | Ada | page | - | - | accepted
 lease | Otto | page | acquired Otto | the lease was free | -
-command | Otto | scene | MoveTool | holds the lease | accepted
-stream | Otto | scene | MoveTool # | holds the lease | -
+command | Otto | scene | Position | holds the lease | accepted
+stream | Otto | scene | Position # | holds the lease | -
 command | Otto | scene | EndDrag | holds the lease | accepted
-command | Otto | page | SetJoint 1 0.1 | holds the lease | accepted
+command | Otto | page | Joint 1 0.1 | holds the lease | accepted
 refusal | Vera | page | Home | - | refused
 stop | Vera | page | pressed | anybody may stop the arm | accepted
 refusal | Vera | page | ClearStop | - | refused
@@ -183,9 +183,9 @@ lease | Ada | page | released | holds the lease | -
 lease | Wave | program | acquired Wave | the lease was free | -
 command | Wave | program | Hold | holds the lease | accepted
 program | Otto, Script | websocket | run Wave | - | -
-command | Wave | program | SpeedScale 1.0 | holds the lease | accepted
+command | Wave | program | Speed 1.0 | holds the lease | accepted
 command | Wave | program | Follow | holds the lease | accepted
-command | the server | server | SpeedScale 1.0 | protection by the server | accepted
+command | the server | server | Speed 1.0 | protection by the server | accepted
 lease | Wave | program | released | holds the lease | -
 program | Wave | program | done | - | -
 lease | Otto, Liner | TCP | acquired Otto, Liner | the lease was free | -
@@ -227,7 +227,7 @@ def test_every_action_is_recorded_once_and_in_order(
     session: tuple[Path, dict[str, str], str],
 ) -> None:
     found = [each for each in records(session[0]) if each["kind"] not in UNORDERED]
-    told = [re.sub(r"MoveTool \d+", "MoveTool #", line) for line in story(found)]
+    told = [re.sub(r"Position \d+", "Position #", line) for line in story(found)]
     assert told == STORY
 
 
@@ -245,7 +245,7 @@ def test_values_and_findings_are_recorded(session: tuple[Path, dict[str, str], s
     found = records(session[0])
     (stream,) = (each for each in found if each["kind"] == "stream")
     first, last = stream["what"]["first"], stream["what"]["last"]
-    assert last["position"][1] - first["position"][1] == pytest.approx(0.04)
+    assert last["p"][1] - first["p"][1] == pytest.approx(0.04)
     (follow,) = (each for each in found if each.get("what", {}).get("command") == "Follow")
     assert 0.1 < follow["what"]["plan"]["seconds"] < 5.0
     stops = [each for each in found if each.get("what", {}).get("reason") == "stopped"]

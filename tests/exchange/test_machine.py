@@ -112,7 +112,7 @@ def test_arm_with_a_skewed_axis_is_solved_numerically_for_a_reason(tmp_path: Pat
     found = find_robot(Settings(), path, None)
     assert found.robot.arm is not None
     assert f"The kinematics are numerical, because {reason}." in found.notes
-    found.session.check(cmd.SetPose(np.eye(4)))
+    found.session.check(cmd.Pose(np.eye(4)))
     # Without the extension of such arms only its joints are driven.
     joints = load(path)
     assert joints.arm is None

@@ -162,18 +162,18 @@ def test_tool_is_set_by_its_name(nodes: VrmlNodes, state: State, robot: Robot) -
     """A position alone keeps the target of the rotation, as the handle does."""
     place, offset = [0.3, 0.1, 0.25], robot.require_arm().T_base_shoulder[:3, 3]
     command = nodes.command(state, [setting(state.tool, "translation", place)])
-    assert isinstance(command, cmd.MoveTool)
+    assert isinstance(command, cmd.Position)
     # Commands are in {S}, in the shoulder.
-    np.testing.assert_allclose(command.position, place - offset, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(command.p, place - offset, rtol=0, atol=1e-15)
     turn = [0.0, 0.0, 1.0, 0.5]
     command = nodes.command(state, [setting(state.tool, "rotation", turn)])
-    assert isinstance(command, cmd.SetPose)
+    assert isinstance(command, cmd.Pose)
     now = robot.frames(robot.joint_values(state.q, state.gripper))[state.tool]
     np.testing.assert_allclose(command.T[:3, 3], now[:3, 3] - offset, rtol=0, atol=1e-15)
     np.testing.assert_allclose(command.T[:3, :3], so3.rotation_z(0.5), rtol=0, atol=1e-15)
     both = [setting(state.tool, "rotation", turn), setting(state.tool, "translation", place)]
     command = nodes.command(state, both)
-    assert isinstance(command, cmd.SetPose)
+    assert isinstance(command, cmd.Pose)
     np.testing.assert_allclose(command.T[:3, 3], place - offset, rtol=0, atol=1e-15)
     with pytest.raises(InputError, match="either joints or the tool"):
         nodes.command(state, [*both, setting("axis_2", "rotation", [0, 1, 0, -1.0])])
@@ -189,7 +189,7 @@ def test_setting_a_joint_is_a_motion_command(
         [setting(each, "rotation", rotation(each, angle)) for each, angle in wanted.items()],
     )
     assert isinstance(command, cmd.SetAxes)
-    assert dict(command.values) == {int(each[-1]) - 1: angle for each, angle in wanted.items()}
+    assert dict(command.values) == {int(each[-1]): angle for each, angle in wanted.items()}
     # The length of the axis does not matter.
     huge = [setting(n, "rotation", [1e200 * x for x in rotation(n, 0)[:3]] + [a])
             for n, a in wanted.items()]  # fmt: skip
@@ -216,14 +216,14 @@ def test_all_fields_of_a_message_are_one_command(nodes: VrmlNodes, state: State)
     )
     assert isinstance(command, cmd.Batch)
     turned, moved, spun, painted, gripped = command.commands
-    assert turned == cmd.SetAxes(((0, 0.1), (1, -1.0)))
+    assert turned == cmd.SetAxes(((1, 0.1), (2, -1.0)))
     assert isinstance(moved, cmd.MoveObject)
     assert moved.R is None
     assert isinstance(spun, cmd.MoveObject)
     assert spun.R is not None
     np.testing.assert_allclose(spun.R, so3.rotation_z(0.5), rtol=0, atol=1e-15)
     assert painted == cmd.SetAppearance("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.0))
-    assert gripped == cmd.SetGripper(0.3)
+    assert gripped == cmd.Gripper(0.3)
     shown = replace(
         state,
         appearance=state.appearance.having("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.0)),
@@ -329,7 +329,7 @@ def test_sliding_joint_has_a_translation_along_its_axis() -> None:
     np.testing.assert_allclose(get(nodes, state, "rail", "translation"), 0.2 * along, atol=1e-12)
     command = nodes.command(state, [setting("rail", "translation", (-0.1 * along).tolist())])
     assert isinstance(command, cmd.SetAxes)
-    np.testing.assert_allclose(command.values, ((0, -0.1),), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(command.values, ((1, -0.1),), rtol=0, atol=1e-15)
     with pytest.raises(InputError, match=r"rail slides along 0\.955336 0\.29552 0"):
         nodes.command(state, [setting("rail", "translation", [0.1, 0.1, 0.1])])
 

@@ -43,8 +43,8 @@ def test_every_query_is_answered(program: Client) -> None:
         requests.Heartbeat(n=3), requests.Gripper(angle=0.1), requests.Tool(name="flange"),
         requests.Tool(name="tcp"), requests.Joint(axis=5, value=0.1), requests.Pause(),
         requests.Resume(), requests.EndDrag(), requests.Hold(), requests.GoToZero(),
-        requests.Home(), requests.Jog(rates=(0.0, 0.0, 0.05, 0.0, 0.0)),
-        requests.Servo(q=READY.tolist()), requests.Fill(ml=150.0), requests.Query(at="loop"),
+        requests.Home(), requests.Jog(rates=np.array((0.0, 0.0, 0.05, 0.0, 0.0))),
+        requests.Servo(q=READY), requests.Fill(ml=150.0), requests.Query(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
         *(requests.SetPriority(priority=each) for each in reversed(FIVE_AXIS_PRIORITIES)),
     ]  # fmt: skip

@@ -19,7 +19,7 @@ SLOW_WATCH = 0.1
 
 def under_way(program: Client) -> None:
     program.ask(requests.Speed(value=0.2))
-    program.ask(requests.Joints(q=THERE.tolist()))
+    program.ask(requests.Joints(q=THERE))
     time.sleep(0.1)
 
 

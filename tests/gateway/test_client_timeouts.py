@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 
 import msgspec
+import numpy as np
 import pytest
 from websockets.asyncio.server import ServerConnection, serve
 
@@ -52,7 +53,7 @@ async def _states(client: AsyncClient) -> None:
 
 async def _send(client: AsyncClient) -> None:
     while True:
-        await client.send(requests.Servo(q=[0.1] * 1000))
+        await client.send(requests.Servo(q=np.full(1000, 0.1)))
 
 
 ACTS = {"ask": _ask, "states": _states, "send": _send}

@@ -75,7 +75,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
         Finding(Reason.STOPPED, 0.02, time=0.3),
     ]
     server = replace(SERVER, grounds=Grounds.SERVER)
-    causes = [(None, ""), (granted, "MoveTool"), (stopped, "Stop"), (server, "Stop")]
+    causes = [(None, ""), (granted, "Position"), (stopped, "Stop"), (server, "Stop")]
     entries = [
         LogEntry(table.t, finding, True, *cause)
         for finding, cause in zip(findings, causes, strict=True)
@@ -85,7 +85,7 @@ def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> 
         table.wait(TICK)
     lines = [serialize.log_line(line) for line in table.hub.event_log.lines]
     assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
-    assert [line.command for line in lines] == ["", "MoveTool", "Stop", "Stop"]
+    assert [line.command for line in lines] == ["", "Position", "Stop", "Stop"]
     assert [line.grounds for line in lines] == [
         None,
         "took the free lease",
@@ -106,7 +106,7 @@ def test_server_may_stop_hold_and_slow_but_not_move(table: Table) -> None:
     gate = table.hub.gate
     with pytest.raises(LeaseError, match="may not move"):
         gate.submit(cmd.Home(), SERVER)
-    gate.submit(cmd.SpeedScale(0.5), SERVER)
+    gate.submit(cmd.Speed(0.5), SERVER)
     gate.submit(cmd.Hold(), SERVER)
     assert (table.arm.fraction, table.arm.holds, table.hub.lease.holder) == (0.5, 1, None)
 
@@ -224,7 +224,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
     async def slide() -> None:
         hooked = Hooked(table, viser_server, driver)
         slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
-        listener(hooked.gestures)(slider, lambda: cmd.SetJoint(0, slider.value))
+        listener(hooked.gestures)(slider, lambda: cmd.Joint(1, slider.value))
         moved = internals.value_change(slider, 0.5)
         hooked.receive()
         table.stop("Vera")
@@ -237,7 +237,7 @@ def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
         assert correction.updates == {"value": 0.0}
         hooked.receive()
         await hooked.handle(moved)
-        assert table.arm.commands == [cmd.SetJoint(0, 0.5)]
+        assert table.arm.commands == [cmd.Joint(1, 0.5)]
         assert table.arm.actors[-1].name == driver.person.name
         assert table.arm.actors[-1].grounds is Grounds.LEASE
 
@@ -268,7 +268,7 @@ def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
         found: list[str] = handler.page_status(driver)["undo"]
         return found
 
-    table.hub.move(driver, cmd.SpeedScale(0.5))
+    table.hub.move(driver, cmd.Speed(0.5))
     assert undoable() == ["speed"]
     handler.handle(driver, requests.Undo())
     assert undoable() == []

@@ -60,7 +60,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
 
 def under_way(arm: Client) -> answers.State:
     """Start a motion to FAR; return the state once the arm moves."""
-    arm.ask(requests.Joints(q=FAR.tolist()))
+    arm.ask(requests.Joints(q=FAR))
     end = time.monotonic() + 20.0
     while (state := arm.query(answers.State)).q[0] < 0.2:
         assert state.stopped is None

@@ -113,7 +113,7 @@ class FakeArm:
             case cmd.Jog(rates=rates, frame=frame):
                 self.jogs.append((tuple(rates.tolist()), frame))
             case _:
-                if isinstance(command, cmd.SpeedScale):
+                if isinstance(command, cmd.Speed):
                     self.fraction = command.value
                 if actor.channel is not CommandChannel.SERVER:
                     self.commands.append(command)
@@ -202,7 +202,7 @@ def test_viewer_role_can_only_stop(table: Table) -> None:
         lambda: table.hub.move(
             watcher, cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)
         ),
-        lambda: table.hub.move(watcher, cmd.SpeedScale(1.0)),
+        lambda: table.hub.move(watcher, cmd.Speed(1.0)),
     ]
     for act in acts:
         with pytest.raises(LeaseError):

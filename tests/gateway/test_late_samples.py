@@ -184,7 +184,7 @@ def test_late_drag_is_shown_and_not_followed_and_its_end_counts(table: Table) ->
             if event.phase == "end":
                 hooked.gestures.submit(cmd.EndDrag(), actor)
             elif event.phase == "update":
-                hooked.gestures.submit(cmd.MoveTool(np.asarray(event.target.position)), actor)
+                hooked.gestures.submit(cmd.Position(np.asarray(event.target.position)), actor)
 
         async def say(message: Any, delay: float) -> list[str]:
             hooked.receive(delay)
@@ -199,8 +199,8 @@ def test_late_drag_is_shown_and_not_followed_and_its_end_counts(table: Table) ->
         # The start was refused, so nothing follows.
         assert await say(update, 0.0) == []
         await say(internals.drag(name, "start"), 0.1)
-        assert await say(update, 0.1) == ["MoveTool"]
-        assert await say(update, 2.0) == ["MoveTool"]
+        assert await say(update, 0.1) == ["Position"]
+        assert await say(update, 2.0) == ["Position"]
         assert len(hooked.refusals) == 2
         assert (await say(internals.drag(name, "end"), 2.0))[-1] == "EndDrag"
 

@@ -281,7 +281,7 @@ def test_lost_owner_ends_the_paused_program(late: LateServer) -> None:
     assert (progress.status, "sends no heartbeats" in progress.why) == ("stopped", True)
 
 
-JOG = cmd.SetJoints(np.zeros(5))
+JOG = cmd.Joints(np.zeros(5))
 
 
 @pytest.fixture

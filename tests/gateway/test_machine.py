@@ -14,6 +14,7 @@ import yourdfpy
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.client import Client, RefusedError
+from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Program
 from katana450.settings import Settings
@@ -86,10 +87,10 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     assert "carries a tool. Its joints are j1 (prismatic)" in description.joints_only
     state = program.query(answers.State)
     assert (state.tool, state.T, state.pitch, state.branch) == (None, None, None, None)
-    eye = ((1, 0, 0, 0.1), (0, 1, 0, 0), (0, 0, 1, 0.1), (0, 0, 0, 1))
     cartesian: list[requests.Request] = [
-        requests.Pose(T=eye), requests.Position(p=(0.1, 0, 0)), requests.Turn(pitch=0, roll=0),
-        requests.Jog(rates=(0.1, 0, 0, 0, 0)), requests.Branch(shoulder="front", elbow="up"),
+        requests.Pose(T=np.eye(4)), requests.Position(p=np.array((0.1, 0, 0))),
+        requests.Turn(pitch=0, roll=0), requests.Jog(rates=np.array((0.1, 0, 0, 0, 0))),
+        requests.Branch(shoulder="front", elbow="up"),
         requests.Gripper(angle=0.1), requests.Tool(name="tcp"), Program(text="steps: []"),
     ]  # fmt: skip
     for request in cartesian:
@@ -101,7 +102,7 @@ def test_arm_answer_gives_the_reason_for_joints_only(
     with pytest.raises(RefusedError, match=f"no axis {robot.joint_group.n + 1}: the robot has"):
         program.ask(requests.Joint(axis=robot.joint_group.n + 1, value=0.0))
     with pytest.raises(RefusedError, match="driven joints, but the command has 2"):
-        program.ask(requests.Joints(q=[0.0, 0.0]))
+        program.ask(requests.Joints(q=np.array([0.0, 0.0])))
     assert "Joints only." in described.notes[-1]
 
 
@@ -156,7 +157,7 @@ def place(
     size: Sequence[float] = (0.05, 0.05, 0.1),
 ) -> None:
     """Place a box on the table."""
-    T = ((1, 0, 0, at[0]), (0, 1, 0, at[1]), (0, 0, 1, -0.3), (0, 0, 0, 1))
+    T = se3.from_rotation_translation(np.eye(3), np.array((*at, -0.3)))
     client.ask(requests.Place(name=name, T=T, shape=requests.Shape.BOX, size=list(size)))
 
 

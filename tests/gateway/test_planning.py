@@ -279,12 +279,12 @@ def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
     program_runner.steer(owner, ProgramOrder.RUN)
     hub.move(owner, cmd.Pause())
     assert isinstance(table.arm.commands[-1], cmd.Pause)
-    hub.move(owner, cmd.SpeedScale(0.5))
+    hub.move(owner, cmd.Speed(0.5))
     assert table.arm.fraction == 0.5
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
-        hub.move(other, cmd.SpeedScale(1.0))
+        hub.move(other, cmd.Speed(1.0))
     assert (bar(table, owner)["orders"], bar(table, owner)["pace"]) == (["end"], "")
     assert bar(table, other)["orders"] == []
     assert bar(table, other)["pace"] == "Wave drives: ask for the arm."
@@ -301,7 +301,7 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, participant)
-    speeds = [each.value for each in table.arm.commands if isinstance(each, cmd.SpeedScale)]
+    speeds = [each.value for each in table.arm.commands if isinstance(each, cmd.Speed)]
     assert speeds == [1.0, 0.3]
     assert table.status == "done"
     assert table.arm.fraction == 0.3
@@ -320,9 +320,9 @@ def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: s
         table.stop("Anybody")
         table.wait(0.2, participant)
         # Nothing is selected before the stop is cleared.
-        assert [each for each in table.arm.commands if each == cmd.SetTool(before)] == []
+        assert [each for each in table.arm.commands if each == cmd.Tool(before)] == []
         table.hub.move(participant, cmd.ClearStop())
     table.wait(3.0, participant)
     assert table.status == ("done" if ends == "done" else "stopped")
-    chosen = [each.name for each in table.arm.commands if isinstance(each, cmd.SetTool)]
+    chosen = [each.name for each in table.arm.commands if isinstance(each, cmd.Tool)]
     assert chosen == ["flange", before]

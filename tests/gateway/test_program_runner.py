@@ -82,7 +82,7 @@ def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
     assert (holder.name, holder.role) == ("Wave", Role.OPERATOR)
     table.wait(1.0, participant)
     assert table.hub.lease.holder == holder
-    assert any(isinstance(command, cmd.SpeedScale) for command in table.arm.commands)
+    assert any(isinstance(command, cmd.Speed) for command in table.arm.commands)
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         table.touch(participant.person.key)
 

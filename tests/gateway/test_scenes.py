@@ -29,7 +29,6 @@ from katana450.extensions.importers.uploads import UPLOAD_BURST
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Matrix4
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.exchange.test_several_files import ARTICULATED, PARTS, written, zipped
@@ -129,7 +128,7 @@ def test_mesh_is_placed_fixed_to_the_hand_and_touched(
     assert at[2] == 0.0
     on_tool = np.eye(4)
     on_tool[:3, 3] = (-0.05, 0.0, 0.06)
-    arm.ask(requests.Attach(name="it", to=requests.Attachment.HAND, T=_rows(on_tool)))
+    arm.ask(requests.Attach(name="it", to=requests.Attachment.HAND, T=on_tool))
     until(lambda: objects(arm)["it"].fixed)
     mounted = robot.require_arm()
     T = mounted.T_base_shoulder @ forward(mounted.chain, np.array(arm.query(answers.State).q))
@@ -149,7 +148,7 @@ def test_mesh_is_placed_fixed_to_the_hand_and_touched(
         requests.Place(name="it", shape=form, mesh=uploaded.key, scale=900.0),
         requests.Place(name="cup", scale=2.0),
         requests.Attach(name="nobody", to=requests.Attachment.HAND),
-        requests.Attach(name="ring", to=requests.Attachment.TABLE, T=_rows(np.eye(4))),
+        requests.Attach(name="ring", to=requests.Attachment.TABLE, T=np.eye(4)),
         requests.Load(scene="0" * 32),
     ):
         with pytest.raises(RefusedError):
@@ -239,11 +238,6 @@ def test_invalid_scene_is_refused_before_the_server_starts(scene: Path) -> None:
     for option in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|unknown format"):
             load_initial_scene(robot.session, None, [option])
-
-
-def _rows(T: Any) -> Matrix4:
-    a, b, c, d = (tuple(row) for row in np.asarray(T).tolist())
-    return a, b, c, d
 
 
 def upload(local: VirtualServer, data: bytes, **query: str) -> tuple[int, dict[str, Any]]:

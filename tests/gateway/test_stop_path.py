@@ -128,7 +128,7 @@ def test_press_on_two_paths_counts_once_even_if_a_copy_is_late(
         program.clear_stop()
         # A late copy neither stops the arm again nor takes the motion away.
         program.ask(requests.Speed(value=1.0))
-        program.ask(requests.Joints(q=THERE.tolist()))
+        program.ask(requests.Joints(q=THERE))
         for url in copies:
             ask(f"{url}/api/v1/stop{query}", data=b"", X_Name="Vera")
         time.sleep(0.2)
@@ -208,7 +208,7 @@ def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
 def test_ended_stop_process_is_reported_and_restarted_while_the_arm_moves() -> None:
     with AppServer(APP) as server, connect(server.url, "Driver") as program:
         program.ask(requests.Speed(value=0.1))
-        program.ask(requests.Joints(q=THERE.tolist()))
+        program.ask(requests.Joints(q=THERE))
         killed = server.stop_process
         os.kill(killed, signal.SIGKILL)
         until(lambda: "is started again" in server.output)

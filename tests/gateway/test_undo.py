@@ -27,7 +27,7 @@ def names(program: Client) -> set[str]:
 def test_goals_are_undone_in_order(program: Client) -> None:
     start = program.go(requests.Home())
     program.nudge(1, 0.2)
-    program.go(requests.StepTool(by=(0.0, 0.0, 0.03, 0.0, 0.0)))
+    program.go(requests.StepTool(by=np.array((0.0, 0.0, 0.03, 0.0, 0.0))))
     after_nudge = undo(program)
     np.testing.assert_allclose(after_nudge.q[0], start.q[0] + 0.2, atol=1e-6)
     np.testing.assert_allclose(np.array(after_nudge.q)[1:], start.q[1:], atol=1e-6)
@@ -89,9 +89,9 @@ def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> N
     T[0, 3] += 0.02
     program.ask(requests.Place(name="basin", colour="#204060"))
     program.ask(requests.Place(name="basin", opacity=0.5, hidden=True))
-    program.ask(requests.Place(name="basin", T=T.tolist()))
+    program.ask(requests.Place(name="basin", T=T))
     # As at the end of a drag, which sends the last place again.
-    program.ask(requests.Place(name="basin", T=T.tolist()))
+    program.ask(requests.Place(name="basin", T=T))
     changed = basin()
     assert (changed.colour, changed.opacity, changed.hidden) == ("#204060", 0.5, True)
     np.testing.assert_allclose(changed.T, T, atol=1e-9)
@@ -141,7 +141,7 @@ def test_undo_does_not_leap_over_a_stream(program: Client) -> None:
     q = np.array(program.nudge(1, 0.1).q)
     for _ in range(20):
         q[0] += 0.005
-        program.send(requests.Servo(q=q.tolist()))
+        program.send(requests.Servo(q=q))
         time.sleep(0.02)
     time.sleep(1.0)
     streamed = state(program)

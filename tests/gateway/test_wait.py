@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, RefusedError
+from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
@@ -62,7 +63,7 @@ def wait_for(
 def wall(watcher: Client, place: tuple[float, float, float], size: list[float]) -> Iterator[None]:
     """Place a box in the base frame [m] inside the block."""
     x, y, z = place
-    T = ((1.0, 0.0, 0.0, x), (0.0, 1.0, 0.0, y), (0.0, 0.0, 1.0, z), (0.0, 0.0, 0.0, 1.0))
+    T = se3.from_rotation_translation(np.eye(3), np.array((x, y, z)))
     watcher.ask(requests.Place(name="wall", T=T, shape=requests.Shape.BOX, size=size))
     watcher.ask(requests.ReleaseLease())
     yield

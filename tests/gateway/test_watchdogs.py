@@ -100,7 +100,7 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
         clear_stop(arm)
         start = arm.query(answers.State).q[0]
         goal = NEAR if start > 0.0 else FAR
-        arm.ask(requests.Joints(q=goal.tolist()))
+        arm.ask(requests.Joints(q=goal))
         time.sleep(0.4)
         before = arm.query(answers.State)
         os.kill(victim, number)
@@ -120,7 +120,7 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
     assert abs(q[0] - before.q[0]) < 1.5
     with connect(server.url, "Driver") as arm:
         with pytest.raises(RefusedError, match="stop"):
-            arm.ask(requests.Joints(q=goal.tolist()))
+            arm.ask(requests.Joints(q=goal))
         clear_stop(arm)
         time.sleep(0.3)
         assert arm.query(answers.State).q == q
@@ -214,7 +214,7 @@ def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
     with AppServer(ATTENTIVE_APP) as server:
         others = [server.arm, server.front, server.stop_process]
         with suppress(KatanaError, OSError), connect(server.url, "Driver") as arm:
-            arm.ask(requests.Joints(q=FAR.tolist()))
+            arm.ask(requests.Joints(q=FAR))
             time.sleep(0.3)
             os.kill(server.pid, number)
             until(lambda: all(process_state(each) == "Z" for each in others), 10.0)

@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -105,7 +104,7 @@ class _Pipe:
 
     def deliver(self, command: cmd.Command, actor: Actor | None = None) -> int:
         if isinstance(command, cmd.Servo):
-            command = replace(command, t=self._clock.t)
+            command = command.timed(self._clock.t)
         ticket = self._mailbox.put(command, actor)
         # Also from threads that plan.
         self._loop.call_soon_threadsafe(self._woken.set)

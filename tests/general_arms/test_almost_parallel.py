@@ -57,7 +57,7 @@ def test_drags_move_the_tool(rough: Path) -> None:
         start = begun(session)
         way = rng.normal(size=3)
         target = pose(session, start)[:3, 3] + size * way / np.linalg.norm(way)
-        state = settled(session, start, [cmd.MoveTool(target)])
+        state = settled(session, start, [cmd.Position(target)])
         np.testing.assert_allclose(pose(session, state)[:3, 3], target, atol=1e-7)
 
 
@@ -95,6 +95,6 @@ def test_only_what_is_out_of_reach_is_called_so() -> None:
         ((0.0, -0.3, 0.3), "no joint moves the tool"),
         ((3.0, 0.0, 0.0), "reach no"),
     ):
-        state = settled(session, start, [cmd.MoveTool(T[:3, 3] + way)])
+        state = settled(session, start, [cmd.Position(T[:3, 3] + way)])
         assert ("out of reach" in sentence(state)) == (words == "reach no"), sentence(state)
         assert words in sentence(state)

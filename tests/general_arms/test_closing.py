@@ -38,7 +38,7 @@ from tests.general_arms.published_hands import (
 from tests.general_arms.test_grasping import item, planned
 
 TICK = 0.01
-CLOSED = cmd.SetGripper(-0.174533)
+CLOSED = cmd.Gripper(-0.174533)
 BOX = (25.0, 20.0, 50.0)
 """[mm] Size of the part between the jaws of an SO-101."""
 
@@ -209,9 +209,9 @@ def test_distance_is_that_of_the_named_part_of_the_palm(tmp_path: Path) -> None:
 def test_opened_jaw_leaves_the_part_standing(plan: Planned, before: State) -> None:
     held = run(plan.session, before, CLOSED)[-1]
     assert held.grip is not None
-    still = run(plan.session, held, cmd.SetGripper(held.grip + 0.01))[-1]
+    still = run(plan.session, held, cmd.Gripper(held.grip + 0.01))[-1]
     assert still.held is not None
-    free = run(plan.session, held, cmd.SetGripper(1.7))[-1]
+    free = run(plan.session, held, cmd.Gripper(1.7))[-1]
     assert free.held is None
     assert free.grip is None
     assert free.objects[0].T[2, 3] == 0.0
@@ -259,13 +259,13 @@ def test_hand_with_one_moving_link_holds_nothing(tmp_path: Path) -> None:
     assert hand is not None
     assert hand.sides == (("hook",),)
     start = session.begin(session.ready, 0.0, 0.0)
-    (*_, opened) = run(session, start, cmd.SetGripper(0.12))
+    (*_, opened) = run(session, start, cmd.Gripper(0.12))
     palm = hand.T_palm_tool @ se3.from_rotation_translation(np.eye(3), (0.09, 0.0, -0.025))
     T = session.environment.pose(
         SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), palm, fixed=True), opened.x_setpoint
     )
     part = SceneObject("part", Shape.BOX, (0.02, 0.02, 0.05), T, can_be_held=True)
-    (*_, closed) = run(session, replace(opened, objects=(part,)), cmd.SetGripper(0.05))
+    (*_, closed) = run(session, replace(opened, objects=(part,)), cmd.Gripper(0.05))
     assert closed.held is None
     assert closed.grip is None
     (contact,) = closed.findings

@@ -79,7 +79,7 @@ def test_drag_moves_the_tool_point_and_keeps_its_orientation(chain: Chain) -> No
     session = session_of(chain)
     start = begun(session)
     T = pose(session, start)
-    state = settled(session, start, [cmd.MoveTool(T[:3, 3] + SMALL)])
+    state = settled(session, start, [cmd.Position(T[:3, 3] + SMALL)])
     reached = pose(session, state)
     np.testing.assert_allclose(reached[:3, 3], T[:3, 3] + SMALL, atol=1e-7)
     assert so3.angle(reached[:3, :3], T[:3, :3]) < 1e-6
@@ -93,7 +93,7 @@ def test_four_axes_keep_the_pitch_in_a_drag(chain: Chain) -> None:
     start = begun(session)
     T = pose(session, start)
     aside = (se3.exp(0.7 * chain.S[:, 0]) @ T)[:3, 3]
-    state = settled(session, start, [cmd.MoveTool(aside)])
+    state = settled(session, start, [cmd.Position(aside)])
     np.testing.assert_allclose(pose(session, state)[:3, 3], aside, atol=1e-7)
     # The tool is in the plane that turns with axis 1, so all other joints stay.
     np.testing.assert_allclose(state.q[1:], start.q[1:], atol=1e-6)
@@ -105,7 +105,7 @@ def test_ring_turns_the_tool_about_its_point(chain: Chain) -> None:
     session = session_of(chain)
     start = begun(session)
     T = pose(session, start)
-    state = settled(session, start, [cmd.OrientTool(TURN @ T[:3, :3])])
+    state = settled(session, start, [cmd.Orient(TURN @ T[:3, :3])])
     reached = pose(session, state)
     np.testing.assert_allclose(reached[:3, 3], T[:3, 3], atol=1e-7)
     np.testing.assert_allclose(reached[:3, :3], TURN @ T[:3, :3], atol=1e-6)
@@ -116,7 +116,7 @@ def test_ring_pitches_four_axes() -> None:
     start = begun(session)
     T = pose(session, start)
     pitched = so3.exp(0.2 * OPENMANIPULATOR_X.S[:3, 3]) @ T[:3, :3]
-    state = settled(session, start, [cmd.OrientTool(pitched)])
+    state = settled(session, start, [cmd.Orient(pitched)])
     np.testing.assert_allclose(pose(session, state)[:3, :3], pitched, atol=1e-6)
     np.testing.assert_allclose(pose(session, state)[:3, 3], T[:3, 3], atol=1e-7)
 
@@ -128,7 +128,7 @@ def test_typed_pose_is_taken(chain: Chain) -> None:
     T = pose(session, start)
     T[:3, 3] += SMALL
     T[:3, :3] = TURN @ T[:3, :3]
-    state = settled(session, start, [cmd.SetPose(T)])
+    state = settled(session, start, [cmd.Pose(T)])
     np.testing.assert_allclose(pose(session, state), T, atol=1e-6)
     assert state.status is Status.OK
 
@@ -138,7 +138,7 @@ def test_pose_out_of_reach_has_its_reason_in_words(chain: Chain) -> None:
     session = session_of(chain)
     T = pose(session, begun(session))
     T[:3, 3] = 10.0 * T[:3, 3]
-    state = session.step(begun(session), [cmd.SetPose(T)], TICK)
+    state = session.step(begun(session), [cmd.Pose(T)], TICK)
     assert state.outcomes[0].verdict is Verdict.LIMITED
     assert state.findings[0].reason is Reason.OUT_OF_REACH
     assert "mm out of reach" in sentence(state)
@@ -200,9 +200,9 @@ def test_jog_of_four_axes_moves_the_point_exactly(chain: Chain) -> None:
     [
         (cmd.Jog(np.zeros(5)), "6 numbers"),
         (cmd.StepTool(np.zeros(5)), "6 numbers"),
-        (cmd.TurnTool(0.1, 0.2), "give this tool a pose or a rotation"),
+        (cmd.Turn(0.1, 0.2), "give this tool a pose or a rotation"),
         (cmd.SetPriority(Priority.PITCH), "'pose', 'position', 'orientation'"),
-        (cmd.TakeBranch("left-up"), "left-up-noflip, left-up-flip, left-down-noflip"),
+        (cmd.Branch(name="left-up"), "left-up-noflip, left-up-flip, left-down-noflip"),
     ],
 )
 def test_command_of_five_axes_is_refused_with_what_works(
@@ -216,10 +216,8 @@ def test_command_of_five_axes_is_refused_with_what_works(
 @pytest.mark.parametrize(
     "command",
     [
-        cmd.MoveTool(np.array([1e308, -1e308, 0.0])),
-        cmd.SetPose(se3.from_rotation_translation(np.eye(3), np.array([1e160, 0.0, 0.0]))),
-        cmd.StepTool(np.full(6, 1e200)),
-        cmd.Jog(np.full(6, -1e308)),
+        cmd.Position(np.array([1e308, -1e308, 0.0])),
+        cmd.Pose(se3.from_rotation_translation(np.eye(3), np.array([1e160, 0.0, 0.0]))),
     ],
     ids=lambda command: type(command).__name__,
 )
@@ -234,9 +232,9 @@ def test_number_whose_square_overflows_is_refused(command: cmd.Command) -> None:
     [
         (cmd.Jog(np.zeros(6)), "5 numbers: x, y, z, pitch and roll"),
         (cmd.StepTool(np.zeros(6)), "5 numbers"),
-        (cmd.OrientTool(np.eye(3)), "by a pitch and a roll"),
+        (cmd.Orient(np.eye(3)), "by a pitch and a roll"),
         (cmd.SetPriority(Priority.ORIENTATION), "'position and pitch'"),
-        (cmd.TakeBranch("left-up-noflip"), "front-up, front-down, back-up, back-down"),
+        (cmd.Branch(name="left-up-noflip"), "front-up, front-down, back-up, back-down"),
     ],
 )
 def test_command_of_six_axes_is_refused_by_five(
@@ -288,13 +286,13 @@ def test_priority_decides_what_is_kept_out_of_reach() -> None:
     session = session_of(UR5E)
     start = begun(session)
     T = pose(session, start)
-    far = cmd.MoveTool(2.0 * T[:3, 3])
+    far = cmd.Position(2.0 * T[:3, 3])
     lost = {}
     for priority in session.require_arm().kinematics.priorities:
         state = settled(session, start, [cmd.SetPriority(priority), far])
         reached = pose(session, state)
         lost[priority] = (
-            float(np.linalg.norm(reached[:3, 3] - far.position)),
+            float(np.linalg.norm(reached[:3, 3] - far.p)),
             so3.angle(reached[:3, :3], T[:3, :3]),
         )
     assert lost[Priority.ORIENTATION][1] < 1e-2
@@ -306,7 +304,7 @@ def test_position_only_leaves_the_orientation_free() -> None:
     session = session_of(UR5E)
     start = begun(session)
     target = pose(session, start)[:3, 3] + (0.1, 0.2, 0.05)
-    position_only: list[cmd.Command] = [cmd.SetPriority(Priority.POSITION), cmd.MoveTool(target)]
+    position_only: list[cmd.Command] = [cmd.SetPriority(Priority.POSITION), cmd.Position(target)]
     state = settled(session, start, position_only)
     np.testing.assert_allclose(pose(session, state)[:3, 3], target, atol=1e-6)
     assert state.status is Status.OK
@@ -319,7 +317,7 @@ def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
     start = session.begin(q, 0.0, 0.0)
     T = pose(session, start)
     turned = so3.exp(so3.log(np.eye(3)) + T[:3, :3] @ np.array([0.0, -1.2, 0.0])) @ T[:3, :3]
-    state = settled(session, start, [cmd.OrientTool(turned)])
+    state = settled(session, start, [cmd.Orient(turned)])
     assert state.branch == start.branch
     assert str(session.require_arm().kinematics.branch_of(state.goal)) == start.branch
 
@@ -327,13 +325,13 @@ def test_drag_beside_the_base_is_held_at_a_singularity_and_says_so() -> None:
 def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
     session, codec = session_of(UR5E), Codec()
     start = begun(session)
-    far = cmd.MoveTool(pose(session, start)[:3, 3] + (0.6, 0.3, 0.2))
+    far = cmd.Position(pose(session, start)[:3, 3] + (0.6, 0.3, 0.2))
     state = session.step(start, [far], TICK)
     text = json_text(codec.encoded(state))
     again = codec.decoded(State, json_form(text))
     assert json_text(codec.encoded(again)) == text
     following, repeated = (session.step(each, [], 2 * TICK) for each in (state, again))
     np.testing.assert_array_equal(following.goal, repeated.goal)
-    for command in (cmd.OrientTool(TURN), cmd.TakeBranch("left-up-noflip")):
+    for command in (cmd.Orient(TURN), cmd.Branch(name="left-up-noflip")):
         form = json_text(codec.encoded(command))
         assert type(codec.decoded(cmd.Command, json_form(form))) is type(command)

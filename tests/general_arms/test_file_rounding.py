@@ -118,7 +118,7 @@ def test_tool_of_such_an_arm_is_driven(tmp_path: Path, name: str) -> None:
     session = session_of(chain_in(tmp_path, ARMS[name]))
     state = begun(session)
     goal = pose(session, state)[:3, 3] + (0.02, 0.03, -0.04)
-    state = settled(session, state, [cmd.MoveTool(goal)])
+    state = settled(session, state, [cmd.Position(goal)])
     assert not state.findings
     np.testing.assert_allclose(pose(session, state)[:3, 3], goal, atol=1e-7)
 

@@ -58,10 +58,6 @@ def pose(arm: Client) -> FloatArray:
     return np.array(state(arm).T)
 
 
-def rows(T: FloatArray) -> Any:
-    return tuple(map(tuple, T.tolist()))
-
-
 def until(arm: Client, holds: Callable[[answers.State], bool]) -> answers.State:
     """Return the first state for which ``holds`` is true."""
     end = time.monotonic() + SECONDS
@@ -95,15 +91,15 @@ def test_tool_is_moved_turned_and_stepped_and_undone(tmp_path: Path) -> None:
     with served(tmp_path, ur5e()) as (arm, _):
         T = pose(arm)
         T[:3, 3] += (0.05, 0.05, -0.05)
-        arm.ask(requests.Position(p=tuple(T[:3, 3].tolist()), wait=30))
+        arm.ask(requests.Position(p=T[:3, 3], wait=30))
         np.testing.assert_allclose(pose(arm), T, atol=1e-6)
         T[:3, :3] = so3.exp([0.1, 0.2, -0.1]) @ T[:3, :3]
-        arm.ask(requests.Orient(R=rows(T[:3, :3]), wait=30))
+        arm.ask(requests.Orient(R=T[:3, :3], wait=30))
         np.testing.assert_allclose(pose(arm), T, atol=1e-6)
         T[:3, 3] += (0.0, -0.1, 0.05)
-        arm.ask(requests.Pose(T=rows(T), wait=30))
+        arm.ask(requests.Pose(T=T, wait=30))
         np.testing.assert_allclose(pose(arm), T, atol=1e-6)
-        arm.ask(requests.StepTool(by=(0.0, 0.03, 0.0, 0.0, 0.0, 0.1), wait=30))
+        arm.ask(requests.StepTool(by=np.array((0.0, 0.03, 0.0, 0.0, 0.0, 0.1)), wait=30))
         np.testing.assert_allclose(pose(arm)[:3, 3], T[:3, 3] + (0, 0.03, 0), atol=1e-6)
         np.testing.assert_allclose(pose(arm)[:3, :3], so3.rotation_z(0.1) @ T[:3, :3], atol=1e-6)
         arm.ask(requests.Undo(wait=30))
@@ -161,12 +157,12 @@ def test_drag_slider_jog_and_script_keep_clear_of_a_wall(chain: Chain, tmp_path:
     with served(tmp_path, chain_urdf("arm", chain)) as (arm, session):
         wall, side = wall_beside(session)
         size = list(wall.size)
-        arm.ask(requests.Place(name="wall", shape=requests.Shape.BOX, size=size, T=rows(wall.T)))
+        arm.ask(requests.Place(name="wall", shape=requests.Shape.BOX, size=size, T=wall.T))
         R_base = np.array(arm.query(answers.Arm).T_base_shoulder)[:3, :3]
         goal = pose(arm)[:3, 3] + R_base.T @ (0.0, 0.25 * side, 0.0)
         pan = state(arm).q[0] + 1.6 * side
         for request in (
-            requests.Position(p=tuple(goal.tolist()), wait=60),
+            requests.Position(p=goal, wait=60),
             requests.Joint(axis=1, value=pan, wait=60),
         ):
             arm.ask(requests.Home(wait=60))
@@ -178,7 +174,7 @@ def test_drag_slider_jog_and_script_keep_clear_of_a_wall(chain: Chain, tmp_path:
         arm.ask(requests.Home(wait=60))
         end = time.monotonic() + SECONDS
         while "wall are" not in state(arm).why and time.monotonic() < end:
-            arm.ask(requests.Jog(rates=(0.0, 0.08 * side, 0.0, 0.0, 0.0, 0.0)))
+            arm.ask(requests.Jog(rates=np.array((0.0, 0.08 * side, 0.0, 0.0, 0.0, 0.0))))
             time.sleep(0.05)
             assert gap(session, wall, state(arm).q) > STOP - 1e-6
         assert "wall are" in state(arm).why
@@ -210,7 +206,7 @@ def test_stop_keeps_a_box_in_the_hand_and_the_program_places_it(text: str, tmp_p
                 name="box",
                 shape=requests.Shape.BOX,
                 size=[0.04, 0.05, 0.06],
-                T=rows(T),
+                T=T,
                 can_be_held=True,
             )
         )

@@ -22,10 +22,10 @@ def ticks_of(name: str, seed: int) -> tuple[int, State, FloatArray, float]:
     chain = SEVEN[name]
     session, rng = session_of(chain), np.random.default_rng(seed)
     turned = chain.clamp(session.ready + 0.2 * rng.normal(size=7))
-    state = settled(session, begun(session), [cmd.SetJoints(turned)])
+    state = settled(session, begun(session), [cmd.Joints(turned)])
     T, by = pose(session, state), rng.normal(size=3)
     goal = T[:3, 3] + 0.1 * by / np.linalg.norm(by)
-    state, ticks = run(session, state, [cmd.MoveTool(goal)]), 1
+    state, ticks = run(session, state, [cmd.Position(goal)]), 1
     while state.since is not None:
         state, ticks = run(session, state), ticks + 1
         assert ticks < 1000

@@ -54,7 +54,7 @@ def test_commands_and_events_are_listed(path: Path, records: list[TickRecord]) -
     assert [each.t for each in recording.commands] == [t for t, _ in given]
     assert {each.giver for each in recording.commands} == {"Ada", "the server"}
     first = recording.commands[0].command
-    assert isinstance(first, cmd.MoveTool)
+    assert isinstance(first, cmd.Position)
     assert [each["number"] for each in recording.events] == [100]
 
 

@@ -32,7 +32,7 @@ class Workshop(NamedTuple):
     @property
     def filled(self) -> State:
         """Return the same state with 200 ml of water in the cup."""
-        return self.session.step(self.ready, [cmd.Fill(2e-4)], 0.01)
+        return self.session.step(self.ready, [cmd.Fill(200.0)], 0.01)
 
 
 @pytest.fixture(scope="session")

@@ -61,7 +61,7 @@ def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture
 
 
 def test_water_has_its_colour_in_pictures(workshop: Workshop) -> None:
-    state = workshop.session.step(workshop.ready, [cmd.Fill(2e-4)], 0.01)
+    state = workshop.session.step(workshop.ready, [cmd.Fill(200.0)], 0.01)
     (in_cup,) = workshop.stage.water(state)
     assert in_cup.item.shape.material.colour == pytest.approx(np.array(COLOUR) / 255.0)
 

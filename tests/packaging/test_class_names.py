@@ -19,7 +19,7 @@ CLASS = re.compile(r"^class ([A-Za-z]\w*)", re.MULTILINE)
 def role(node: ast.ClassDef) -> str:
     """Return whether the class is a command, a request or a program step; empty for others."""
     bases = {ast.unparse(each) for each in node.bases}
-    if bases & {"BaseCommand", "AxisCommand"}:
+    if bases & {"Command", "AxisCommand"}:
         return "command"
     if any(each.endswith("Request") for each in bases):
         return "request"
@@ -79,7 +79,7 @@ def test_duplicate_is_found_across_modules(tmp_path: Path) -> None:
 
 def test_command_request_and_step_share_a_name_once_each(tmp_path: Path) -> None:
     step = "class {}:\n    def read(self): ...\n    def build(self): ...\n"
-    one = "class A(BaseCommand): ...\nclass B(BaseCommand): ...\nclass C(BaseCommand): ...\n"
+    one = "class A(Command): ...\nclass B(Command): ...\nclass C(Command): ...\n"
     (tmp_path / "one.py").write_text(one)
     (tmp_path / "two.py").write_text(
         "class A(Request, frozen=True): ...\nclass B(AxisCommand): ...\nclass C: ...\n"

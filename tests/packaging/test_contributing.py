@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 
 import katana450
-from katana450.arm.control.traits import CommandTraits
+from katana450.arm.control.act import Traits
 from katana450.cli.core_commands import CORE_COMMANDS
 from katana450.extension import extensions
 
@@ -32,7 +32,7 @@ def test_files_that_the_recipes_name_exist() -> None:
 
 
 def test_every_trait_of_a_command_is_explained() -> None:
-    for field in dataclasses.fields(CommandTraits):
+    for field in dataclasses.fields(Traits):
         assert f"| `{field.name}" in TEXT, field.name
 
 
@@ -44,7 +44,7 @@ def test_lists_of_command_classes_are_those_that_the_recipe_names() -> None:
         for path in (PACKAGE / folder).rglob("*.py")
         if re.search(r"\(cmd\.\w+, cmd\.\w+", path.read_text(encoding="utf-8"))
     }
-    assert lists == {"session.py", "history.py"}
+    assert lists == {"history.py"}
     assert all(name in TEXT for name in lists)
 
 

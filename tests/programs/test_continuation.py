@@ -149,7 +149,7 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
     run, state = stopped_after(stage, program, 60)
     interruption = interruption_of(program, run, state)
     stood = state.setpoint
-    state = given(stage, state, cmd.SetJoints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
+    state = given(stage, state, cmd.Joints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
     rest = continued(interruption, stage.plan_context, state)
     added = rest.tasks[rest.first : rest.first + 2]
     assert [task.name for task in added] == ["move: speed", RETURN]
@@ -165,7 +165,7 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
 def test_tool_frame_of_the_run_is_selected_again(stage: Stage, program: Program) -> None:
     run, state = stopped_after(stage, program, 60)
     interruption = interruption_of(program, run, state)
-    state = given(stage, state, cmd.SetTool("flange"))
+    state = given(stage, state, cmd.Tool("flange"))
     states = played(stage, continued(interruption, stage.plan_context, state), state)
     assert (states[0].tool, states[-1].tool) == ("flange", "tcp")
 
@@ -179,7 +179,7 @@ def test_changed_surroundings_are_refused_by_name(
     T = np.eye(4)
     T[:3, 3] = (-0.3, 0.3, 0.0)
     commands: dict[str, cmd.Command] = {
-        "gripper": cmd.SetGripper(stage.plan_context.arm.gripper.upper),
+        "gripper": cmd.Gripper(stage.plan_context.arm.gripper.upper),
         "scene": cmd.PlaceObject(SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)),
     }
     state = given(stage, state, commands[changed])
@@ -238,7 +238,7 @@ def test_full_cup_returns_straight_or_not_at_all(stage: Stage, pour: Program) ->
         run, state = stage.tick(pour, run, state)
     run, state = stop(stage, pour, run, state)
     interruption = interruption_of(pour, run, state)
-    aside = given(stage, state, cmd.SetJoints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
+    aside = given(stage, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
     rest = continued(interruption, stage.plan_context, aside)
     assert any(task.name == RETURN for task in rest.tasks)
     T = np.eye(4)

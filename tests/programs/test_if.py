@@ -17,7 +17,6 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.server.step_list import current_step, page, steps_of
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.timeline import Timeline, moments
-from katana450.maths.water.units import ML
 from tests.programs.conftest import TICK, Stage
 
 HEAD = "frame: base\nsteps:\n"
@@ -53,7 +52,7 @@ def planned(stage: Stage, text: str, state: State) -> Program:
 
 def with_water(stage: Stage, ml: float) -> State:
     state = stage.begin()
-    state = stage.session.step(state, (cmd.Fill(ml * ML),), state.t + TICK)
+    state = stage.session.step(state, (cmd.Fill(ml),), state.t + TICK)
     return stage.session.observe(state, state.setpoint, state.gripper_setpoint)
 
 
@@ -162,7 +161,7 @@ def test_state_is_measured_when_the_step_is_reached(stage: Stage, empty: State) 
     while run.phase is Phase.RUNNING and state.t < 10.0:
         run, commands = runner.step(program, run, state, state.t)
         if empty.t + 0.2 < state.t < empty.t + 0.2 + 1.5 * TICK:
-            commands = (*commands, cmd.Fill(80.0 * ML))
+            commands = (*commands, cmd.Fill(80.0))
         state = stage.session.step(state, commands, state.t + TICK)
         state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
     assert run.phase is Phase.DONE

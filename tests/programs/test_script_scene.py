@@ -15,7 +15,7 @@ from katana450.extensions.programs.clocked_run import plan_script
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_scene import ScriptScene
 from katana450.extensions.programs.source import ScriptError
-from katana450.maths.water.units import MILLILITRE, ML
+from katana450.maths.water.units import MILLILITRE
 from katana450.resources import URDF_PATH
 from tests.programs.conftest import TICK, Stage
 
@@ -172,6 +172,6 @@ def test_water_of_a_script_without_water_is_none(stage: Stage) -> None:
     scene = scene_of(f"scene: [{CUP}]\n{STEPS}")
     state = scene.begin(stage.session)
     scene.check_present(stage.session, state)
-    state = stage.session.step(state, (cmd.Fill(30.0 * ML),), state.t + TICK)
+    state = stage.session.step(state, (cmd.Fill(30.0),), state.t + TICK)
     with pytest.raises(ScriptError, match=r"the cup has 30\.0 ml of water, not 0\.0 ml"):
         scene.check_present(stage.session, state)

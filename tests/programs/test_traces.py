@@ -66,7 +66,7 @@ def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedAr
     traces.follow(state)
     assert traced.points is last
     # Both stay until the arm is driven by hand.
-    state = session.step(state, [cmd.SetGripper(0.0)], state.t + 0.01)
+    state = session.step(state, [cmd.Gripper(0.0)], state.t + 0.01)
     traces.follow(state)
     assert [desired.visible, traced.visible] == [True, True]
     state = session.step(

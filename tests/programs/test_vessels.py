@@ -134,7 +134,7 @@ def glass(number: int) -> SceneObject:
 
 def test_vessels_come_and_go_with_their_water(stage: Stage) -> None:
     session, state = stage.session, stage.begin()
-    for command in (cmd.Fill(100 * ML), cmd.PlaceObject(glass(0)), cmd.PlaceObject(glass(1))):
+    for command in (cmd.Fill(100.0), cmd.PlaceObject(glass(0)), cmd.PlaceObject(glass(1))):
         state = session.step(state, [command], state.t + 0.01)
     assert state.poured is not None
     assert [each.name for each in state.poured.water.vessels] == ["cup", "glass 0", "glass 1"]

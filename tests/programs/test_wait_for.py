@@ -16,7 +16,6 @@ from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.extensions.programs.timeline import Timeline, moments
-from katana450.maths.water.units import ML
 from tests.programs.conftest import TICK, Stage
 
 HEAD = "frame: base\nsteps:\n"
@@ -68,7 +67,7 @@ def test_program_fails_at_its_line_after_the_timeout(stage: Stage) -> None:
 
 def test_conditions_are_measured(stage: Stage) -> None:
     state = stage.begin()
-    state = stage.session.step(state, (cmd.Fill(100.0 * ML),), state.t + TICK)
+    state = stage.session.step(state, (cmd.Fill(100.0),), state.t + TICK)
     state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
     axis_2 = float(np.degrees(state.q[1]))
     for condition, holds in (

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.arm_commands import ArmAct, OperateArm
 from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.commands.exchange_lines import ExchangeDecoder
@@ -24,7 +24,6 @@ from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTranspo
 from katana450.extensions.real_arm.link.tcp import TcpTransport
 from katana450.server.api import answers
 from katana450.server.api.arm_answers import MeasuredArm
-from katana450.server.api.motion_requests import OperateArm
 from tests.browser.server import APP, AppServer, free_port
 from tests.real_arm.emulated import ROOT, TIMEOUT, emulator
 

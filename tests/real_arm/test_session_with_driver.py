@@ -94,18 +94,18 @@ def test_person_connects_calibrates_moves_and_stops(operator: Operator) -> None:
     operator.perform(ArmAct.CALIBRATE, ArmMode.HOLDING)
     operator.clear_stop()
     # Slow enough that a machine that others keep busy sends the setpoints in time.
-    operator.give(cmd.SpeedScale(0.3))
+    operator.give(cmd.Speed(0.3))
     start = operator.state.q.copy()
     # The calibrated posture is at the ends of the axes.
     goal = start + np.array([0.3, 0.3, -0.3, 0.3, -0.3])
-    operator.give(cmd.SetJoints(goal))
-    operator.give(cmd.SetGripper(0.0))
+    operator.give(cmd.Joints(goal))
+    operator.give(cmd.Gripper(0.0))
     operator.until(lambda state: state.moving)
     there = operator.until(lambda state: not state.moving)
     assert there.stopped is None
     assert np.abs(there.q - goal).max() < 0.005
     assert abs(there.gripper) < 0.02
-    operator.give(cmd.SetJoints(start + 0.25 * (goal - start)))
+    operator.give(cmd.Joints(start + 0.25 * (goal - start)))
     operator.until(lambda state: state.moving and np.abs(state.q - goal).max() > 0.1)
     operator.give(cmd.Stop())
     stopped = operator.until(lambda state: state.stopped is not None and not state.moving)

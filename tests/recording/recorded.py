@@ -109,7 +109,7 @@ def random_commands(
                 yield cmd.Follow(plan_to(session.session.require_arm(), world, state, goal))
     elif kind < 0.6:
         at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.MoveTool(at)
+        yield cmd.Position(at)
         DRAGGED[id(rng)] = np.clip(
             at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
         )
@@ -124,18 +124,18 @@ def seldom_commands(rng: np.random.Generator, session: DescribedRobot) -> tuple[
     stone = Solid("stone", (0.03, 0.03, 0.03), corners)
     place = np.array((*rng.uniform((0.2, -0.3), (0.45, 0.3)), 0.0))
     kinds: tuple[tuple[cmd.Command, ...], ...] = (
-        (cmd.SetJoints(ready + 0.5 * rng.normal(size=5)),),
+        (cmd.Joints(ready + 0.5 * rng.normal(size=5)),),
         (cmd.Stop(pressed("Ada", ADA.key, f"press {rng.random()}", 1e9)),),
         (cmd.Jog(0.1 * rng.normal(size=5), JogFrame.TOOL),),
         (cmd.ReplaceScene(first.objects, 1e-4),),
         (cmd.MoveObject("cup", place),),
         (cmd.Servo(ready + 0.02 * rng.normal(size=5)),),
         (cmd.Attach("cup", Mount.HAND),),
-        (cmd.Attach("cup", Mount.WORLD), cmd.TurnTool(0.5, 0.3 * rng.normal())),
-        (cmd.SetGripper(abs(0.2 * rng.normal())), cmd.SpeedScale(0.5 + 0.5 * rng.random())),
+        (cmd.Attach("cup", Mount.WORLD), cmd.Turn(0.5, 0.3 * rng.normal())),
+        (cmd.Gripper(abs(0.2 * rng.normal())), cmd.Speed(0.5 + 0.5 * rng.random())),
         (cmd.Pause(), cmd.Resume()),
         (cmd.PlaceObject(SceneObject("stone", Shape.MESH, (), np.eye(4), solid=stone)),),
-        (cmd.EndDrag(), cmd.Batch((cmd.Home(), cmd.SetGripper(0.1)))),
+        (cmd.EndDrag(), cmd.Batch((cmd.Home(), cmd.Gripper(0.1)))),
     )
     return kinds[int(rng.integers(len(kinds)))]
 
@@ -183,7 +183,7 @@ def dragging(
     """Yield a drag in 60 % of all ticks, without a pause, as a restless hand sends it."""
     if rng.random() < 0.6:
         at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.MoveTool(at)
+        yield cmd.Position(at)
         DRAGGED[id(rng)] = np.clip(
             at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
         )
@@ -204,7 +204,7 @@ def swinging(
     if state.motion.at_rest:
         q = session.session.ready.copy()
         q[0] = 0.8 if state.q[0] <= 0.0 else -0.8
-        yield cmd.SetJoints(q)
+        yield cmd.Joints(q)
 
 
 def record(

@@ -57,7 +57,7 @@ def drag(ticks: int, at: Mapping[int, cmd.Command] | None = None, circles: float
         elif tick < ticks and state.stopped is None and not state.paused:
             angle = 2.0 * np.pi * circles * tick / ticks
             radius = 0.06 * tick / ticks
-            yield cmd.MoveTool(
+            yield cmd.Position(
                 np.array((0.3 + radius * np.cos(angle), radius * np.sin(angle), 0.05))
             )
         elif tick == ticks:

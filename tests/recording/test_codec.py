@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from hypothesis.stateful import run_state_machine_as_test
 from msgspec import Struct
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import classes_of
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
@@ -52,6 +53,7 @@ from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
 from katana450.maths.water.course import Course
 from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.control.test_session_machine import ArmRules, bounded
@@ -117,13 +119,13 @@ def test_every_command_survives_to_the_bit(
         follow,
         cmd.PlaceObject(mesh),
         cmd.ReplaceScene((mesh,), 1e-4),
-        cmd.Servo(np.zeros(5), -np.zeros(5), 0.1),
+        cmd.Servo(np.zeros(5), -np.zeros(5)).timed(0.1),
         cmd.Stop(cause, Finding(Reason.DRIVER_SILENT, 0.3, 2, ("a", "b"), math.inf), ("x",)),
-        cmd.Hold(Finding(Reason.WAITING)),
+        cmd.HoldFor(Finding(Reason.WAITING)),
         cmd.MoveObject("mesh", np.full(3, -0.0), np.eye(3).T),
         cmd.Batch((cmd.ReplaceScene((mesh,)), cmd.Follow(follow.plan, 0.01))),
     ]
-    assert {type(each) for each in given} == set(KINDS) == set(get_args(cmd.Command))
+    assert {type(each) for each in given} == set(KINDS) == set(classes_of(cmd.Command))
     for each in given:
         back = copied(cmd.Command, each)
         assert type(back) is type(each)
@@ -132,7 +134,7 @@ def test_every_command_survives_to_the_bit(
 
 def test_water_of_older_versions_is_read_and_other_liquids_are_refused(state: State) -> None:
     """They wrote the liquid in the cup, which counts in the digests of their states."""
-    fill = cmd.Fill(1e-4)
+    fill = cmd.Fill(100.0)
     form = Codec().encoded(fill)
     liquid = ["water", 998.2, 0.0010016, 0.07274, [74, 148, 192]]
     assert Codec().decoded(cmd.Command, {**form, "liquid": liquid}) == fill
@@ -236,9 +238,9 @@ def test_arrays_keep_shape_type_and_order_in_memory(array: np.ndarray[Any, Any])
 
 
 def test_whole_number_in_place_of_a_float_stays_one() -> None:
-    back = copied(cmd.Command, cmd.SetJoint(1, 2))
+    back = copied(cmd.Command, cmd.Joint(2, 2))
     assert type(back.value) is int
-    assert type(copied(cmd.Command, cmd.SetGripper(np.float64(0.1))).angle) is float
+    assert type(copied(cmd.Command, cmd.Gripper(np.float64(0.1))).angle) is float
 
 
 class RecordedRules(ArmRules):
@@ -347,7 +349,7 @@ def _examples(arm: ArmModel, follow: cmd.Follow) -> None:
     SESSIONS["session"] = session
     SESSIONS["commands"] = [*examples(session, state), follow]
     SESSIONS["follow"] = follow
-    SESSIONS["mode"] = session.step(state, [cmd.MoveTool(np.array((0.3, 0.1, 0.0)))], 0.01).mode
+    SESSIONS["mode"] = session.step(state, [cmd.Position(np.array((0.3, 0.1, 0.0)))], 0.01).mode
 
 
 @pytest.mark.parametrize(
@@ -355,20 +357,20 @@ def _examples(arm: ArmModel, follow: cmd.Follow) -> None:
     [
         (b"", "not JSON"),
         (b"[" * 100_000, "not JSON"),
-        (b'{"is": "SetJoint"}', "SetJoint lacks axis, value"),
+        (b'{"is": "joint"}', "Joint lacks axis, value"),
         (b'{"is": "os.system", "command": "true"}', "not one of"),
         (b'{"is": "State"}', "not one of"),
-        (b'{"is": "SetJoint", "axis": 0, "value": 1, "x": 1}', "has no field"),
-        (b'{"is": "SetJoint", "axis": 0.5, "value": 1}', "axis: 0.5 is not a whole number"),
-        (b'{"is": "SetJoint", "axis": 0, "value": "nan"}', "must be a finite number|nan"),
-        (b'{"is": "SetJoints", "q": [0, 1, [2]]}', "q: "),
-        (b'{"is": "SetJoints", "q": {"shape": [1e9], "type": "float64"}}', "is not an array"),
+        (b'{"is": "joint", "axis": 0, "value": 1, "x": 1}', "has no field"),
+        (b'{"is": "joint", "axis": 0.5, "value": 1}', "axis: 0.5 is not a whole number"),
+        (b'{"is": "joint", "axis": 1, "value": "nan"}', "must be a finite number|nan"),
+        (b'{"is": "joints", "q": [0, 1, [2]]}', "q: "),
+        (b'{"is": "joints", "q": {"shape": [1e9], "type": "float64"}}', "is not an array"),
         (
-            b'{"is":"SetJoints","q":{"shape":[9999999999],"type":"float64","steps":[0],"data":[1]}}',
+            b'{"is":"joints","q":{"shape":[9999999999],"type":"float64","steps":[0],"data":[1]}}',
             "does not have",
         ),
-        (b'{"is": "Follow", "plan": "0123", "tau": 0}', "plan: the Plan with the key '0123' is"),
-        (b'{"is": "Batch", "commands": [{"is": "Go"}, {"is": "Home", "a": 1}]}', r"commands\[1\]"),
+        (b'{"is": "follow", "plan": "0123", "tau": 0}', "plan: the Plan with the key '0123' is"),
+        (b'{"is": "batch", "commands": [{"is": "go"}, {"is": "home", "a": 1}]}', r"commands\[1\]"),
     ],
 )
 def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None:
@@ -376,8 +378,64 @@ def test_error_names_the_place_and_the_fault(text: bytes, expected: str) -> None
         Codec().decoded(cmd.Command, json_form(text))
 
 
+CAUSE = Finding(Reason.WAITING)
+CAUSE_FORM = {"reason": "WAITING", "amount": 0.0, "axis": None, "parts": None, "time": 0.0}
+SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
+
+
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [
+        ({"is": "SetJoint", "axis": 0, "value": 0.5}, cmd.Joint(1, 0.5)),
+        ({"is": "Nudge", "axis": 4, "by": 0.5}, cmd.Nudge(5, 0.5)),
+        ({"is": "SetAxes", "values": [[0, 0.5], [2, 1.5]]}, cmd.SetAxes(((1, 0.5), (3, 1.5)))),
+        ({"is": "MoveTool", "position": [0.1, 0.2, 0.3]}, cmd.Position(np.array((0.1, 0.2, 0.3)))),
+        ({"is": "TakeBranch", "branch": "left-up"}, cmd.Branch(name="left-up")),
+        (
+            {"is": "TakeBranch", "branch": {"shoulder": "back", "elbow": "up"}},
+            cmd.Branch("back", "up"),
+        ),
+        ({"is": "SpeedScale", "value": 0.5}, cmd.Speed(0.5)),
+        ({"is": "Fill", "volume": ML * 100.0}, cmd.Fill(100.0)),
+        ({"is": "Hold", "finding": None}, cmd.Hold()),
+        ({"is": "Pause", "finding": CAUSE_FORM}, cmd.PauseFor(CAUSE)),
+        ({**SAMPLE, "t": None}, cmd.Servo(np.array((0.1, 0.2)))),
+        ({**SAMPLE, "t": 0.3}, cmd.Servo(np.array((0.1, 0.2))).timed(0.3)),
+        (
+            {"is": "Batch", "commands": [{"is": "SetTool", "name": "tcp"}, {"is": "Home"}]},
+            cmd.Batch((cmd.Tool("tcp"), cmd.Home())),
+        ),
+    ],
+    ids=lambda value: value["is"] if isinstance(value, dict) else "",
+)
+def test_commands_of_older_versions_are_read(form: dict[str, Any], expected: cmd.Command) -> None:
+    command = Codec().decoded(cmd.Command, form)
+    assert text_of(command) == text_of(expected)
+
+
+@given(st.floats(0.0, 300.0))
+def test_volume_of_an_older_version_stays_the_same_to_the_bit(ml: float) -> None:
+    volume = ML * ml
+    assert Codec().decoded(cmd.Command, {"is": "Fill", "volume": volume}).volume == volume
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        {"is": "SetJoint", "axis": "0", "value": 0.5},
+        {"is": "SetAxes", "values": [["0", 0.5], 3]},
+        {"is": "TakeBranch", "branch": {"shoulder": "left"}},
+        {"is": "Fill", "volume": "1"},
+        {"is": "Hold", "finding": 3},
+    ],
+)
+def test_wrong_command_of_an_older_version_is_refused(form: dict[str, Any]) -> None:
+    with pytest.raises(FormError):
+        Codec().decoded(cmd.Command, form)
+
+
 def test_deep_batches_are_refused() -> None:
-    text = b'{"is":"Batch","commands":[' * 400 + b"]}" * 400
+    text = b'{"is": "batch","commands":[' * 400 + b"]}" * 400
     with pytest.raises(FormError, match="too often"):
         Codec().decoded(cmd.Command, json_form(text))
 

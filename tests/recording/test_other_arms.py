@@ -68,7 +68,7 @@ def path(urdf: Path, described: DescribedRobot) -> Path:
         for tick in range(260):
             clock.t += PERIOD
             if tick in at:
-                mailbox.put(cmd.MoveTool(at[tick]), ADA)
+                mailbox.put(cmd.Position(at[tick]), ADA)
             loop.tick()
         writer.close()
     return recorded
@@ -176,7 +176,7 @@ def test_server_records_it_and_runs_it_again(
         with connect(server.url, "Ada") as client:
             client.ask(requests.Home(wait=30))
             T = np.array(client.query(answers.State).T)
-            target = tuple((T[:3, 3] + (0.0, 0.05, -0.05)).tolist())
+            target = T[:3, 3] + (0.0, 0.05, -0.05)
             client.ask(requests.Position(p=target, wait=30))
             end = client.query(answers.State).q
 

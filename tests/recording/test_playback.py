@@ -19,7 +19,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from benchmarks.scrub import write_run
-from katana450.arm.control.commands import ClearStop, Command, Follow, SetJoints, Stop
+from katana450.arm.control.commands import ClearStop, Command, Follow, Joints, Stop
 from katana450.arm.control.lease import Role
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.scene_objects import SceneObject, Shape
@@ -193,7 +193,7 @@ class StopAndPlan:
     ) -> Iterator[Command]:
         self._tick += 1
         if self._tick == 5:
-            yield SetJoints(session.session.ready + 0.1)
+            yield Joints(session.session.ready + 0.1)
         elif self._tick == 30:
             yield Stop(pressed("Ada", ADA.key, "press", 1e9))
         elif self._tick > 150 and state.stopped is not None:

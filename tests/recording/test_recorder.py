@@ -98,7 +98,7 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
         waited_for(lambda: list(folder.glob("*")), "the first file")
         # After the delay of its start, and then a second for the disk.
         waited_for(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0, "motion")
-        waited_for(lambda: _keeps(folder, kept, "Stop"), "the stop in the recording")
+        waited_for(lambda: _keeps(folder, kept, "stop"), "the stop in the recording")
         address, cookie = f"{server.url}/api/v1/recording", enter(server.url)
         for query, status in (("?last=0", 400), ("?last=x", 400), ("", 200)):
             answer = ask(address + query, Cookie=cookie)
@@ -115,7 +115,7 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
     # It begins with the first motion, although the process started later.
     assert recording.t[-1] - recording.t[0] > 1.0
     names = [type(each.command).__name__ for each in recording.commands]
-    assert names.count("SetJoints") == len(POSTURES)
+    assert names.count("Joints") == len(POSTURES)
     assert "Stop" in names
     assert path.stat().st_mode & 0o077 == 0
     capsys.readouterr()

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import katana450
@@ -56,7 +57,7 @@ def swinging(server: AppServer) -> Iterator[None]:
         with connect(server.url, "Ada") as arm:
             for number in range(10_000):
                 with suppress(RefusedError):
-                    arm.ask(requests.Joints(q=list(POSTURES[number % 2])))
+                    arm.ask(requests.Joints(q=np.array(POSTURES[number % 2])))
                 if ended.wait(0.6):
                     break
 

@@ -47,7 +47,7 @@ TOLERANCE = 1.5e-4
 @pytest.fixture(scope="module")
 def dragged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A drag of 2.5 s, and a motion to the ready posture after a rest."""
-    at: dict[int, cmd.Command] = {380: cmd.SetJoints(described().session.ready)}
+    at: dict[int, cmd.Command] = {380: cmd.Joints(described().session.ready)}
     return record_session(tmp_path_factory.mktemp("again") / "drag.mcap", 600, drag(250, at))
 
 
@@ -82,9 +82,9 @@ def test_straight_motion_takes_its_recorded_time(
 
     def commands(tick: int, _: State) -> Iterator[cmd.Command]:
         if tick == 5:
-            yield cmd.SpeedScale(speed)
+            yield cmd.Speed(speed)
         elif tick == 10:
-            yield cmd.SetJoints(goal)
+            yield cmd.Joints(goal)
 
     path = record_session(tmp_path / "straight.mcap", 600, commands)
     part, text = read(path)
@@ -138,7 +138,7 @@ def test_pause_or_stop_in_the_middle_is_left_out(
     end: cmd.Command = cmd.Resume()
     if disturbance == "stop":
         begin, end = cmd.Stop(pressed("Ada", "key", "press", 1e9)), cmd.ClearStop()
-    at = {120: begin, 420: end, 430: cmd.MoveTool(np.array((0.33, 0.05, 0.08)))}
+    at = {120: begin, 420: end, 430: cmd.Position(np.array((0.33, 0.05, 0.08)))}
     path = record_session(tmp_path / "disturbed.mcap", 700, drag(120, at))
     part, text = read(path)
     assert part.waited > 1.5

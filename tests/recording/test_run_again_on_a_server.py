@@ -48,7 +48,7 @@ def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Pat
     path = tmp_path_factory.mktemp("kept") / "drag.mcap"
     with katana450.connect(server.url, "Ada") as client:
         for target in TARGETS:
-            client.go(requests.Position(p=target))
+            client.go(requests.Position(p=np.array(target)))
         end = client.query(answers.State).q
 
         def kept() -> bool:
@@ -163,7 +163,7 @@ def test_present_obstacle_is_refused(
         client.ask(
             requests.Place(
                 name="stone",
-                T=place.tolist(),  # type: ignore[arg-type]
+                T=place,
                 shape=Shape.BOX,
                 size=[0.06, 0.06, 0.06],
             )

@@ -92,7 +92,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     at: dict[int, cmd.Command] = {
         90: cmd.Stop(pressed("Ada", "key", "press", 1e9)),
         250: cmd.ClearStop(),
-        260: cmd.MoveTool(np.array((0.33, 0.05, 0.08))),
+        260: cmd.Position(np.array((0.33, 0.05, 0.08))),
     }
     path = tmp_path_factory.mktemp("score") / "stopped.mcap"
     return record_session(path, 420, drag(90, at))
@@ -167,7 +167,7 @@ def test_rest_before_the_first_motion_does_not_count(stopped: Path) -> None:
 @pytest.mark.long
 def test_contacts_are_counted(tmp_path: Path) -> None:
     """The arm waits before the table, below the shoulder by 274.5 mm."""
-    at: dict[int, cmd.Command] = {1: cmd.MoveTool(np.array((0.3, 0.0, -0.4)))}
+    at: dict[int, cmd.Command] = {1: cmd.Position(np.array((0.3, 0.0, -0.4)))}
     found = score(record_session(tmp_path / "table.mcap", 300, drag(0, at)))
     assert found.values["contacts"] == 1.0
     assert 0.0 < (found.values["nearest_clearance_mm"] or 0.0) < 8.0

@@ -57,7 +57,7 @@ def records(path: Path) -> list[TickRecord]:
 
 def test_random_session_is_identical_to_the_bit(path: Path, records: list[TickRecord]) -> None:
     kinds = Counter(type(each.command).__name__ for r in records for each in r.submissions)
-    assert kinds["MoveTool"] > 40
+    assert kinds["Position"] > 40
     assert {"Stop", "ClearStop", "Follow", "ReplaceScene", "Batch"} <= set(kinds), kinds
     assert any(each.failed for each in records)
     assert sum(each.state.following is not None for each in records) > 40
@@ -131,13 +131,13 @@ def test_changed_command_is_found_at_its_tick(tmp_path: Path) -> None:
 
     def commands(*_: object) -> Iterator[cmd.Command]:
         if len(records) == 50:
-            yield cmd.SetJoints(goal)
+            yield cmd.Joints(goal)
         elif len(records) < 50:
             # An arm at rest makes no records.
-            yield cmd.SpeedScale(1.0)
+            yield cmd.Speed(1.0)
 
     run(120, 1, records.append, commands)
-    changed = cmd.SetJoints(goal + np.array((0.0, 0.0, 1e-3, 0.0, 0.0)))
+    changed = cmd.Joints(goal + np.array((0.0, 0.0, 1e-3, 0.0, 0.0)))
     records[50] = records[50]._replace(submissions=[Submission(changed, None)])
     with RecordingFile.open(write(tmp_path / "changed.mcap", records)) as file:
         result = verify_recording(file, described().session)
@@ -164,7 +164,7 @@ def test_lost_ticks_are_a_gap_and_not_a_difference(
 
 def test_value_without_a_form_is_a_gap(records: list[TickRecord], tmp_path: Path) -> None:
     part = list(records[:60])
-    odd = cmd.SetTool("\ud800")
+    odd = cmd.Tool("\ud800")
     part[30] = part[30]._replace(submissions=[Submission(odd, None)])
     with RecordingFile.open(write(tmp_path / "odd.mcap", part)) as file:
         result = verify_recording(file, described().session)
@@ -182,7 +182,7 @@ def test_loop_on_the_clock_of_the_machine_is_identical(tmp_path: Path) -> None:
     loop.record = records.put
     loop.start()
     for goal in (0.2, -0.2, 0.0):
-        mailbox.put(cmd.SetJoints(found.session.ready + goal), ADA)
+        mailbox.put(cmd.Joints(found.session.ready + goal), ADA)
         time.sleep(0.15)
     loop.stop()
     taken = [records.get() for _ in range(records.qsize())]
@@ -202,7 +202,7 @@ def test_mechanism_without_an_arm_is_recorded(
     path, records = tmp_path / "gantry.mcap", []
     state = found.session.begin(found.session.ready, 0.0, 10.0)
     for number in range(60):
-        given = [cmd.SetJoint(0, 0.2)] if number == 5 else []
+        given = [cmd.Joint(1, 0.2)] if number == 5 else []
         before, t = state, 10.0 + 0.01 * (number + 1)
         state = stepped(found.session, before, list(given), t, lambda q, g, *_: DriverAnswer(q, g))
         inputs = [Submission(each, ADA) for each in given]

@@ -37,9 +37,9 @@ def test_arm_without_its_meshes_stops_before_the_table_and_says_what_is_estimate
     )
     assert set(robot.cautions) <= set(notes)
     for elbow in (0.0, 1.0):
-        state = settled(session, begun(session), [cmd.SetJoint(1, -np.pi / 2.0)])
-        state = settled(session, state, [cmd.SetJoint(2, elbow)])
-        state = settled(session, state, [cmd.SetJoint(1, 0.7)])
+        state = settled(session, begun(session), [cmd.Joint(2, -np.pi / 2.0)])
+        state = settled(session, state, [cmd.Joint(3, elbow)])
+        state = settled(session, state, [cmd.Joint(2, 0.7)])
         frames = robot.frames(robot.joint_values(state.q, 0.0))
         lowest = min(frames[name][2, 3] for name in ("forearm", "wrist_1", "wrist_2", "wrist_3"))
         assert state.q[1] < 0.69

@@ -128,11 +128,11 @@ def test_dragging_keeps_the_coordinates_that_are_not_dragged(other: MountedArm) 
     start = forward(chain, state.goal)[:3, 3]
     pitch, roll = pitch_and_roll(chain, state.goal)
     moved = start + np.array([0.01, 0.03, 0.02])
-    state = session.step(state, [cmd.MoveTool(moved)], 0.01)
+    state = session.step(state, [cmd.Position(moved)], 0.01)
     assert state.findings == ()
     np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
     assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch, roll), abs=1e-12)
-    state = session.step(state, [cmd.TurnTool(pitch + 0.1, roll + 0.4)], 0.02)
+    state = session.step(state, [cmd.Turn(pitch + 0.1, roll + 0.4)], 0.02)
     np.testing.assert_allclose(forward(chain, state.goal)[:3, 3], moved, atol=1e-12)
     assert pitch_and_roll(chain, state.goal) == pytest.approx((pitch + 0.1, roll + 0.4), abs=1e-12)
     # A positive pitch points the roll axis down.

@@ -80,7 +80,7 @@ def test_a_session_drives_sliding_fingers_and_names_their_limit(tmp_path: Path) 
     arm = load(written(tmp_path, "px150", PX150)).require_arm()
     session = Session(arm, arm.ready(Settings().ready))
     state = session.begin(session.ready, arm.gripper.clamp(0.0), 0.0)
-    state = session.step(state, [cmd.SetGripper(0.05)], 0.01)
+    state = session.step(state, [cmd.Gripper(0.05)], 0.01)
     assert [(f.reason, f.amount) for f in state.findings] == [(Reason.GRIPPER_SLIDE_LIMIT, 0.037)]
     for tick in range(2, 20):
         state = session.step(state, [], 0.01 * tick)

@@ -116,10 +116,10 @@ def test_they_hold_and_release_an_object(
     scene_object = SceneObject("block", Shape.BOX, (0.02, width, 0.02), T, can_be_held=True)
     session = Session(arm, ready, world, hand=hand_of(robot, world), objects=(scene_object,))
     state = session.begin(ready, arm.gripper.upper, 0.0)
-    state = run(session, state, cmd.SetGripper(arm.gripper.lower))
+    state = run(session, state, cmd.Gripper(arm.gripper.lower))
     (held,) = state.objects
     assert held.held
     inside = 0.5 * (width + THICK)
     assert state.gripper_setpoint == pytest.approx(inside, abs=1e-3)
-    left = run(session, state, cmd.SetGripper(state.gripper_setpoint + 2e-3))
+    left = run(session, state, cmd.Gripper(state.gripper_setpoint + 2e-3))
     assert not left.objects[0].held

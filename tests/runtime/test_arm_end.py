@@ -123,10 +123,10 @@ def test_arm_that_has_just_ended_is_not_young(ends: Ends) -> None:
     assert theirs.poll()
     assert front.age > 0.01
     # Its command is not sent, and will be reported as dropped.
-    front.deliver(cmd.SetJoint(0, 1.0))
+    front.deliver(cmd.Joint(1, 1.0))
     assert len(front._unsent) == 1
     with pytest.raises(InputError, match="only STOP"):
-        front.deliver(cmd.SetJoint(0, 1.0))
+        front.deliver(cmd.Joint(1, 1.0))
     arm_end.close()
 
 
@@ -139,12 +139,12 @@ def test_arm_that_moves_at_once_was_at_rest(ends: Ends, monkeypatch: pytest.Monk
         until(lambda: front.state_publisher.snapshot.state.moving)
 
     monkeypatch.setattr(front, "_flush", slow)
-    front.deliver(cmd.SetJoint(0, 1.0))
+    front.deliver(cmd.Joint(1, 1.0))
     assert told
 
 
 def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
-    tickets = [ends.front.deliver(cmd.SetJoint(axis, 0.1)) for axis in (0, 4, 0)]
+    tickets = [ends.front.deliver(cmd.Joint(axis + 1, 0.1)) for axis in (0, 4, 0)]
     assert tickets == [1, 2, 3]
     assert ends.front.last_ticket == 3
     until(lambda: ends.front.state_publisher.snapshot.ticket == 3)
@@ -166,7 +166,7 @@ def wait_with_heartbeats(ends: Ends, true: Callable[[], bool]) -> None:
 
 def test_unsupported_command_is_refused_before_the_pipe(ends: Ends) -> None:
     with pytest.raises(InputError, match="no axis 9"):
-        ends.front.deliver(cmd.SetJoint(8, 0.1))
+        ends.front.deliver(cmd.Joint(9, 0.1))
     assert ends.front.last_ticket == 0
 
 
@@ -177,9 +177,9 @@ def test_ticket_of_a_dropped_command_still_advances(ends: Ends) -> None:
 
 
 def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
-    ends.front.deliver(cmd.SetJoint(0, 99.0))
+    ends.front.deliver(cmd.Joint(1, 99.0))
     until(lambda: bool(ends.front.state_publisher.event_log))
-    ends.front.deliver(cmd.SetJoint(0, 0.0))
+    ends.front.deliver(cmd.Joint(1, 0.0))
     until(
         lambda: (
             len(ends.front.state_publisher.event_log)
@@ -201,7 +201,7 @@ def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
 def test_silent_front_end_stops_a_moving_arm(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
     assert ends.loop.state_publisher.snapshot.state.stopped is None
-    ends.front.deliver(cmd.SetJoint(0, 2.0))
+    ends.front.deliver(cmd.Joint(1, 2.0))
     began = time.monotonic()
     until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
     assert SILENCE < time.monotonic() - began < 2 * SILENCE
@@ -215,17 +215,17 @@ def test_silent_front_end_pauses_a_simulated_arm(
     ends = Ends(arm, session, SilenceProfile.SIMULATION)
     front, publisher = ends.front, ends.loop.state_publisher
     assert front.profile is SilenceProfile.SIMULATION
-    front.deliver(cmd.SetJoint(0, 2.0))
+    front.deliver(cmd.Joint(1, 2.0))
     until(lambda: publisher.snapshot.state.waits)
     until(lambda: front.state_publisher.snapshot.state.waits)
     until(lambda: not publisher.snapshot.state.moving)
     assert publisher.snapshot.state.stopped is None
     # The next command moves the arm.
-    front.deliver(cmd.SetJoint(0, 1.0))
+    front.deliver(cmd.Joint(1, 1.0))
     wait_with_heartbeats(ends, lambda: publisher.snapshot.state.q[0] == 1.0)
     assert not publisher.snapshot.state.waits
     # Longer silence latches the stop.
-    front.deliver(cmd.SetJoint(0, -2.0))
+    front.deliver(cmd.Joint(1, -2.0))
     until(lambda: publisher.snapshot.state.stopped is not None)
     assert Reason.SERVER_SILENT in {each.reason for each in publisher.snapshot.state.findings}
     ends.arm_end.close()
@@ -235,11 +235,11 @@ def test_silent_front_end_pauses_a_simulated_arm(
 def test_command_older_than_a_pause_is_refused(arm: ArmModel, session: Session) -> None:
     ends = Ends(arm, session, SilenceProfile.SIMULATION)
     front, publisher = ends.front, ends.loop.state_publisher
-    front.deliver(cmd.SetJoint(0, 2.0))
+    front.deliver(cmd.Joint(1, 2.0))
     wait_with_heartbeats(ends, lambda: publisher.snapshot.state.moving)
     ends.loop.brake(Finding(Reason.LOOP_LATE, 0.3), 0.3)
     # The front end does not know of the pause yet.
-    ends.theirs.send(CommandMessage(99, cmd.SetJoint(0, 2.0), None, ends.loop.paused_at - 0.01))
+    ends.theirs.send(CommandMessage(99, cmd.Joint(1, 2.0), None, ends.loop.paused_at - 0.01))
     wait_with_heartbeats(ends, lambda: publisher.snapshot.state.waits)
     wait_with_heartbeats(ends, lambda: not publisher.snapshot.state.moving)
     assert publisher.snapshot.state.waits
@@ -249,7 +249,7 @@ def test_command_older_than_a_pause_is_refused(arm: ArmModel, session: Session) 
 
 
 def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends) -> None:
-    ends.front.deliver(cmd.SetJoint(0, 2.0))
+    ends.front.deliver(cmd.Joint(1, 2.0))
     wait_with_heartbeats(ends, lambda: ends.front.state_publisher.snapshot.state.moving)
     with socket.socket(fileno=os.dup(ends.theirs.fileno())) as line:
         line.shutdown(socket.SHUT_RDWR)
@@ -274,10 +274,10 @@ def test_actor_crosses_the_pipe_into_the_event_log(ends: Ends) -> None:
     actor = Actor(
         Person("a key", "Anna", Role.OPERATOR), CommandChannel.WEBSOCKET, None, Grounds.LEASE
     )
-    ends.front.deliver(cmd.SetJoint(0, 99.0), actor)
+    ends.front.deliver(cmd.Joint(1, 99.0), actor)
     until(lambda: bool(ends.front.state_publisher.event_log))
     (entry,) = ends.front.state_publisher.event_log
-    assert (entry.actor, entry.command) == (actor, "SetJoint")
+    assert (entry.actor, entry.command) == (actor, "Joint")
     # A stop by the arm's own process has no actor.
     ends.mailbox.put(cmd.Stop())
     until(lambda: ends.front.state_publisher.event_log[-1].finding.reason is Reason.STOPPED)
@@ -293,19 +293,19 @@ def test_actor_crosses_the_pipe_into_the_event_log(ends: Ends) -> None:
 def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:
     front, wait = ends.front, 5.0
     outcomes = front.state_publisher.outcomes
-    fine, far = front.deliver(cmd.SetJoint(0, 0.1)), front.deliver(cmd.SetJoint(1, 99.0))
+    fine, far = front.deliver(cmd.Joint(1, 0.1)), front.deliver(cmd.Joint(2, 99.0))
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
     limited = outcomes.of(far).result(wait)
     assert limited.verdict is Verdict.LIMITED
     assert [found.axis for found in limited.findings] == [1]
     # The front end has not seen this stop yet, as when the arm's end lost contact.
     ends.mailbox.put(cmd.Stop())
-    late = outcomes.of(front.deliver(cmd.SetJoint(0, 0.2))).result(wait)
+    late = outcomes.of(front.deliver(cmd.Joint(1, 0.2))).result(wait)
     assert late.verdict is Verdict.REFUSED
     assert "clear the stop first" in late.why
     # The outcome of this ticket is recorded before the test reads it.
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
-    both = front.deliver(cmd.Batch((cmd.SetJoint(0, 0.2), cmd.SpeedScale(0.5))))
+    both = front.deliver(cmd.Batch((cmd.Joint(1, 0.2), cmd.Speed(0.5))))
     assert outcomes.of(both).result(wait).verdict is Verdict.LIMITED
     early = outcomes.of(front.deliver(cmd.ClearStop())).result(wait)
     assert early.verdict is Verdict.REFUSED
@@ -321,7 +321,7 @@ def test_numbers_of_displaced_outcomes_are_dropped(
     ends.loop.stop()
     count = MAX_KEPT_OUTCOMES + 5
     # Each command replaces the one before, so that one tick reports all outcomes.
-    tickets = [ends.front.deliver(cmd.SetJoint(0, 1e-4 * k)) for k in range(count)]
+    tickets = [ends.front.deliver(cmd.Joint(1, 1e-4 * k)) for k in range(count)]
 
     def all_arrived() -> bool:
         # A heartbeat first sends the commands that found the pipe full.
@@ -364,7 +364,7 @@ def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: 
     arm_end.start()
     front = FrontEnd(theirs, session.check, reconnect)
     front.start()
-    front.deliver(cmd.SetJoint(0, 2.0))
+    front.deliver(cmd.Joint(1, 2.0))
     until(lambda: front.state_publisher.snapshot.ticket == 1)
     # The end of the process closes its end of the pipe.
     with socket.socket(fileno=os.dup(ours.fileno())) as line:
@@ -372,7 +372,7 @@ def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: 
     until(lambda: bool(numbers))
     assert front.age > 0.0
     with pytest.raises(InputError, match="only STOP"):
-        front.deliver(cmd.SetJoint(0, 1.0))
+        front.deliver(cmd.Joint(1, 1.0))
     stop = front.deliver(cmd.Stop())
     until(lambda: numbers[-1] == stop)
     ours, theirs = multiprocessing.Pipe()
@@ -383,7 +383,7 @@ def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: 
     # No command to the process that ended has reached the new one.
     assert new.mailbox.last_ticket == 0
     assert front.last_ticket == stop
-    ticket = front.deliver(cmd.SetJoint(0, 0.1))
+    ticket = front.deliver(cmd.Joint(1, 0.1))
     until(lambda: front.state_publisher.snapshot.ticket == ticket)
     # Another front end replaces this one.
     later.close()
@@ -442,7 +442,7 @@ def test_error_in_a_thread_of_the_arm_closes_the_pipe(
 
     setattr(again.arm_ends[0], name, fail)
     again.front.start()
-    again.front.deliver(cmd.SetJoint(0, 1.0))
+    again.front.deliver(cmd.Joint(1, 1.0))
     # No command can come any more, so the arm stops.
     until(lambda: again.front.state_publisher.snapshot.state.stopped is not None)
     again.works_by_a_second_pipe()
@@ -474,7 +474,7 @@ def test_arm_ends_stopped_and_at_rest_although_a_command_has_just_arrived(
     arm.attach(ours, Greeting(FRONT))
     front = FrontEnd(theirs, session.check)
     front.start()
-    front.deliver(cmd.SetJoint(0, 2.0))
+    front.deliver(cmd.Joint(1, 2.0))
     arm.stop()
     state = arm.state_publisher.snapshot.state
     assert (state.stopped is not None, state.moving, arm.running) == (True, False, False)

@@ -66,7 +66,7 @@ def parts(arm: ArmModel, session: Session) -> LoopParts:
 
 
 def test_command_moves_the_arm_to_its_goal(arm: ArmModel, parts: LoopParts) -> None:
-    ticket = parts.mailbox.put(cmd.SetJoint(0, 0.5))
+    ticket = parts.mailbox.put(cmd.Joint(1, 0.5))
     parts.tick()
     assert parts.loop.state_publisher.snapshot.ticket == ticket
     jerk = float(arm.limits.jerk[0])
@@ -88,7 +88,7 @@ def test_arm_at_rest_publishes_nothing(parts: LoopParts) -> None:
 def test_first_step_after_rest_is_one_period_long(arm: ArmModel, parts: LoopParts) -> None:
     parts.tick(500)
     before = parts.loop.state_publisher.snapshot.state.q
-    parts.mailbox.put(cmd.SetJoint(0, 2.0))
+    parts.mailbox.put(cmd.Joint(1, 2.0))
     parts.tick()
     step = np.abs(parts.loop.state_publisher.snapshot.state.q - before)
     assert step.max() == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)
@@ -128,7 +128,7 @@ def test_failing_driver_makes_the_arm_hold_and_report_it(
     clock, mailbox = SteppedClock(), Mailbox(session.check)
     driver = BrokenDriver(arm, session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, clock, RATE)
-    mailbox.put(cmd.SetJoint(0, 2.0))
+    mailbox.put(cmd.Joint(1, 2.0))
     for _ in range(5):
         clock.t += 0.01
         loop.tick()
@@ -168,7 +168,7 @@ def test_stop_in_a_failed_tick_is_executed_in_the_next(arm: ArmModel, session: S
     driver.broken = False
     # A copy of the press by another path is no second stop.
     mailbox.put(press)
-    mailbox.put(cmd.SetJoint(0, 2.0))
+    mailbox.put(cmd.Joint(1, 2.0))
     for _ in range(20):
         clock.t += 0.01
         loop.tick()
@@ -297,7 +297,7 @@ def test_arm_at_rest_ticks_seldom_and_moves_at_once(arm: ArmModel, session: Sess
         states.append(loop.state_publisher.snapshot.state)
         if clock.left == 6:
             given.append(clock.t)
-            mailbox.put(cmd.SetJoint(0, 0.4))
+            mailbox.put(cmd.Joint(1, 0.4))
 
     clock.press, clock.end = give, loop._stopping.set
     begun = clock.t
@@ -318,7 +318,7 @@ def test_loop_runs_and_stops_on_the_machine_clock(arm: ArmModel, session: Sessio
     loop = ControlLoop(session, driver, mailbox, MonotonicClock(), RATE)
     loop.start()
     started = time.perf_counter()
-    mailbox.put(cmd.SetJoint(0, 0.4))
+    mailbox.put(cmd.Joint(1, 0.4))
     snapshot = loop.state_publisher.snapshot
     while snapshot.state.q[0] != 0.4:
         assert time.perf_counter() - started < 10.0

@@ -23,7 +23,7 @@ def mailbox(session: Session) -> Mailbox:
 
 
 def test_commands_leave_once_and_in_order(mailbox: Mailbox) -> None:
-    sent: list[cmd.Command] = [cmd.Home(), cmd.SetJoint(0, 1.0), cmd.Hold()]
+    sent: list[cmd.Command] = [cmd.Home(), cmd.Joint(1, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
     submissions = [Submission(each, None) for each in sent]
@@ -33,23 +33,23 @@ def test_commands_leave_once_and_in_order(mailbox: Mailbox) -> None:
 
 def test_last_of_a_stream_is_kept_and_every_ticket_counts(mailbox: Mailbox) -> None:
     for i in range(50):
-        mailbox.put(cmd.MoveTool(np.array([0.3, 0.0, 0.001 * i])))
+        mailbox.put(cmd.Position(np.array([0.3, 0.0, 0.001 * i])))
     drained = mailbox.drain()
     assert drained.last == 50 == mailbox.last_ticket
     assert drained.tickets == [list(range(1, 51))]
     (last,) = drained.commands
-    assert isinstance(last, cmd.MoveTool)
-    assert last.position[2] == 0.049
+    assert isinstance(last, cmd.Position)
+    assert last.p[2] == 0.049
 
 
 def test_sliders_of_two_axes_do_not_replace_each_other(mailbox: Mailbox) -> None:
-    for command in (cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.0), cmd.SetJoint(1, -1.1)):
+    for command in (cmd.Joint(1, 1.0), cmd.Joint(2, -1.0), cmd.Joint(2, -1.1)):
         mailbox.put(command)
-    assert mailbox.drain().commands == [cmd.SetJoint(0, 1.0), cmd.SetJoint(1, -1.1)]
+    assert mailbox.drain().commands == [cmd.Joint(1, 1.0), cmd.Joint(2, -1.1)]
 
 
 def test_stop_reports_the_dropped_tickets(mailbox: Mailbox) -> None:
-    for command in (cmd.Home(), cmd.SetJoint(0, 0.1), cmd.SetJoint(0, 0.2), cmd.Stop()):
+    for command in (cmd.Home(), cmd.Joint(1, 0.1), cmd.Joint(1, 0.2), cmd.Stop()):
         mailbox.put(command)
     mailbox.put(cmd.Home())
     assert mailbox.drain() == Drained(
@@ -119,7 +119,7 @@ def test_flood_is_refused_and_waiting_commands_are_kept(mailbox: Mailbox) -> Non
 def test_full_mailbox_refuses_no_pause_by_the_server(mailbox: Mailbox) -> None:
     for _ in range(CAPACITY):
         mailbox.put(cmd.Home())
-    pause = cmd.Hold(finding=Finding(Reason.LOOP_LATE, 0.3))
+    pause = cmd.HoldFor(Finding(Reason.LOOP_LATE, 0.3))
     assert mailbox.put(pause) == CAPACITY + 1
     with pytest.raises(InputError, match="slower"):
         mailbox.put(cmd.Hold())
@@ -128,7 +128,7 @@ def test_full_mailbox_refuses_no_pause_by_the_server(mailbox: Mailbox) -> None:
 
 def test_unsupported_command_is_refused_by_the_session(mailbox: Mailbox) -> None:
     with pytest.raises(InputError, match="no axis 9"):
-        mailbox.put(cmd.SetJoint(8, 0.0))
+        mailbox.put(cmd.Joint(9, 0.0))
     assert mailbox.drain() == Drained([], [], [], 0)
 
 

@@ -44,9 +44,7 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
     here = state.branch
     assert isinstance(here, Branch)
-    worker.deliver(
-        cmd.TakeBranch(Branch(here.shoulder, "down" if here.elbow == "up" else "up")), None
-    )
+    worker.deliver(cmd.Branch(here.shoulder, "down" if here.elbow == "up" else "up"), None)
     end = time.monotonic() + 30.0
     while any(each.name == "planning" for each in threading.enumerate()):
         assert time.monotonic() < end
@@ -84,7 +82,7 @@ def test_path_that_is_found_after_a_stop_is_not_followed(
     state = session.begin(np.array([0.3, -0.9, 0.4, -0.6, -0.2]), 0.0, 0.0)
     sink = Sink()
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
-    worker.deliver(cmd.TakeBranch(Branch("front", "down")), None)
+    worker.deliver(cmd.Branch("front", "down"), None)
     assert found.wait(30.0)
     worker.deliver(cmd.Stop(), None)
     (thread,) = (each for each in threading.enumerate() if each.name == "planning")
@@ -95,7 +93,7 @@ def test_path_that_is_found_after_a_stop_is_not_followed(
 
 PERSON = Actor(Person("1", "Ada", Role.OPERATOR), CommandChannel.PAGE)
 PROTECTION = replace(SERVER, grounds=Grounds.SERVER)
-PAUSE = cmd.Hold(finding=Finding(Reason.PAUSED))
+PAUSE = cmd.HoldFor(Finding(Reason.PAUSED))
 
 
 @pytest.mark.parametrize(
@@ -105,7 +103,7 @@ PAUSE = cmd.Hold(finding=Finding(Reason.PAUSED))
         (PAUSE, PROTECTION, 1),
         (cmd.Hold(), PERSON, 1),
         (cmd.Home(), PERSON, 1),
-        (cmd.SpeedScale(0.5), PERSON, 0),
+        (cmd.Speed(0.5), PERSON, 0),
     ],
     ids=["driver left", "pause by the server", "hold", "motion", "speed"],
 )

@@ -46,7 +46,7 @@ def model(session: Session) -> TouchModel:
 def around(session: Session, arm: MountedArm) -> State:
     """The state with open fingers around the cup, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
-    commands: tuple[Any, ...] = (cmd.SetGripper(OPEN), cmd.SetTool("grasp"))
+    commands: tuple[Any, ...] = (cmd.Gripper(OPEN), cmd.Tool("grasp"))
     state = run(session, state, *commands)
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back)
@@ -59,4 +59,4 @@ def around(session: Session, arm: MountedArm) -> State:
 @pytest.fixture(scope="session")
 def holding(session: Session, around: State) -> State:
     """The state after the fingers were closed with all their force."""
-    return run(session, around, cmd.SetGripper(-0.44))
+    return run(session, around, cmd.Gripper(-0.44))

@@ -32,7 +32,7 @@ def gripped_with(session: Session, model: TouchModel, holding: State, force: flo
     """Return the state after a command that presses with ``force`` [N]."""
     assert holding.grip is not None
     wanted = holding.grip - model.squeeze_for(holding, force)
-    return run(session, holding, cmd.SetGripper(wanted))
+    return run(session, holding, cmd.Gripper(wanted))
 
 
 def test_pads_lie_on_the_inner_surface_of_the_fingers(session: Session, model: TouchModel) -> None:
@@ -63,11 +63,11 @@ def test_other_fingers_have_no_pads() -> None:
 def test_wish_beyond_the_stop_is_kept_as_squeeze(session: Session, holding: State) -> None:
     assert holding.grip is not None
     assert holding.squeeze == holding.grip + 0.44
-    softer = run(session, holding, cmd.SetGripper(holding.grip - 0.01))
+    softer = run(session, holding, cmd.Gripper(holding.grip - 0.01))
     assert softer.squeeze == pytest.approx(0.01)
     assert softer.gripper_goal == softer.gripper_setpoint == holding.grip
     assert softer.findings == ()
-    beyond = run(session, holding, cmd.SetGripper(-1.0))
+    beyond = run(session, holding, cmd.Gripper(-1.0))
     assert beyond.squeeze == holding.squeeze
     assert [each.reason for each in beyond.findings] == [Reason.GRIPPER_LIMIT]
 
@@ -80,7 +80,7 @@ def test_stop_and_restart_keep_the_squeeze_and_opening_clears_it(
     assert stopped.squeeze == holding.squeeze
     begun = session.begin(holding.q, holding.gripper, 0.0)
     assert restarted(begun, holding).squeeze == holding.squeeze
-    opened = run(session, holding, cmd.SetGripper(OPEN))
+    opened = run(session, holding, cmd.Gripper(OPEN))
     assert opened.squeeze == 0.0
     assert opened.grip is None
 
@@ -131,7 +131,7 @@ def test_impossible_forces_are_refused(session: Session, model: TouchModel, hold
     with pytest.raises(InputError, match="at most 10 N, not 11 N"):
         model.squeeze_for(holding, 11.0)
     with pytest.raises(InputError, match="hold nothing"):
-        model.squeeze_for(run(session, holding, cmd.SetGripper(OPEN)), 1.0)
+        model.squeeze_for(run(session, holding, cmd.Gripper(OPEN)), 1.0)
 
 
 def slides(state: State) -> bool:
@@ -194,7 +194,7 @@ def test_firm_grip_ends_a_slide(
     needed = mass(cup, holding, {"cup": 0.0614}) * GRAVITY / (2.0 * FRICTION)
     after = lifted(session, arm, gripped_with(session, model, holding, 0.8 * needed), 0.04)
     assert slides(after)
-    held = run(session, after, cmd.SetGripper(-0.44))
+    held = run(session, after, cmd.Gripper(-0.44))
     assert not slides(held)
     still = session.step(held, (), held.t + 0.01)
     assert still.held is held.held
@@ -222,7 +222,7 @@ def test_cup_slides_out_of_the_fingers_and_falls(
     assert sentence(state).startswith("Cup slipped out of the fingers under a load of 0.6 N")
     (stands,) = (each for each in state.objects if each.name == "cup")
     assert stands.T[2, 3] == 0.0
-    opened = run(session, state, cmd.SetGripper(OPEN))
+    opened = run(session, state, cmd.Gripper(OPEN))
     assert opened.findings == ()
 
 
@@ -234,7 +234,7 @@ def test_acceleration_makes_a_held_cup_slide_until_it_ends(
     up = lifted(session, arm, gripped_with(session, model, holding, 0.65 * weight), 0.06)
     assert up.held is not None
     assert not slides(up)
-    loads, state = [], session.step(up, [cmd.SetJoint(3, up.q[3] + 0.5)], up.t + 0.01)
+    loads, state = [], session.step(up, [cmd.Joint(4, up.q[3] + 0.5)], up.t + 0.01)
     while state.moving:
         loads += [each.amount for each in state.findings if each.reason is Reason.SLIDING]
         state = session.step(state, (), state.t + 0.01)
@@ -250,7 +250,7 @@ def test_mass_follows_from_the_cup_with_its_water_or_from_the_volume(
     session: Session, holding: State
 ) -> None:
     (cup,) = (each for each in holding.objects if each.name == "cup")
-    filled = run(session, holding, cmd.Fill(100e-6))
+    filled = run(session, holding, cmd.Fill(100.0))
     assert mass(cup, filled, {"cup": 0.06}) == pytest.approx(0.06 + 0.09982, rel=1e-6)
     box = SceneObject("box", Shape.BOX, (0.1, 0.1, 0.1), np.eye(4))
     assert mass(box, filled, {"cup": 0.06}) == pytest.approx(1e-3 * DENSITY)

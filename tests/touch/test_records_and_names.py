@@ -39,16 +39,16 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
     def commands(tick: int, state: State) -> Iterator[cmd.Command]:
         seen.append(state)
         if tick == 0:
-            yield cmd.SetGripper(OPEN)
+            yield cmd.Gripper(OPEN)
         elif tick == 60:
             yield cmd.PlaceObject(ROD)
-            yield cmd.SetGripper(-0.44)
+            yield cmd.Gripper(-0.44)
         elif tick == 160:
             assert state.grip is not None
             # Too little for the weight of the rod.
-            yield cmd.SetGripper(state.grip - 0.004)
+            yield cmd.Gripper(state.grip - 0.004)
         elif tick == 170:
-            yield cmd.SetJoint(1, state.q[1] - 0.1)
+            yield cmd.Joint(2, state.q[1] - 0.1)
 
     path = record_session(tmp_path / "slip.mcap", 320, commands)
     assert len({state.squeeze for state in seen}) == 3

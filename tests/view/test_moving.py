@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.branch_options import BranchOption
-from katana450.arm.control.commands import Command, SetJoints
+from katana450.arm.control.commands import Command, Joints
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
@@ -49,7 +49,7 @@ def test_branches_are_computed_once_a_second_while_the_arm_moves(
 
     rest = session.begin(session.ready, 0.0, 0.0)
     branches = BranchList(server, robot, find, listen, rest)
-    state = session.step(rest, [SetJoints(session.ready + 0.3)], 0.01)
+    state = session.step(rest, [Joints(session.ready + 0.3)], 0.01)
     times = np.arange(0.0, 3.0 * INTERVAL, 0.1)
     for t in times:
         state = replace(state, t=t)

@@ -166,7 +166,7 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
         0.74,
     ]
     assert not shown
-    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), put[-1].scene_object))  # type: ignore[union-attr]
+    nodes.follow(seen(session.begin(session.ready, 0.0, 0.0), put[-1].scene_object))  # type: ignore[attr-defined]
     drag("end", 1.5)
     assert len(put) == 2
     assert "nothing carries it there" in shown[0]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands import Command, SetJoint, Stop
+from katana450.arm.control.commands import Command, Joint, Stop
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
@@ -26,7 +26,7 @@ def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatAr
     state = session.begin(LEVEL, 0.0, 0.0)
     poses = []
     for k in range(300):
-        commands: list[Command] = [SetJoint(0, math.radians(50.0))] if k == 0 else []
+        commands: list[Command] = [Joint(1, math.radians(50.0))] if k == 0 else []
         if k == round(stop_after / DT):
             commands = [Stop()]
         state = session.step(state, commands, k * DT)

@@ -9,7 +9,7 @@ import time
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 from urllib.parse import quote
 
 import msgspec
@@ -19,11 +19,13 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from katana450.arm.control.act import Id
+from katana450.arm.control.checked import encoded_field
 from katana450.client.episodes import EpisodeClient
 from katana450.client.files import STOP_TIMEOUT, LostError, RefusedError, Site
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import ROOT, Id
+from katana450.server.api.fields import ROOT
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 
 SOCKET = f"{ROOT}/socket"
@@ -103,11 +105,13 @@ class AsyncClient:
         """
         if self._lost is not None:
             raise LostError(self._lost)
-        if request.id is None or request.traits.stream:
+        if request.id is None or request.traits.at_once:
             request = msgspec.structs.replace(request, made=time.monotonic())
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT):
-                await self._socket.send(msgspec.json.encode(request, enc_hook=_plain).decode())
+                await self._socket.send(
+                    msgspec.json.encode(request, enc_hook=encoded_field).decode()
+                )
         except ConnectionClosed as error:
             raise LostError(f"The server has closed the connection: {error}.") from error
         except TimeoutError as error:
@@ -272,7 +276,7 @@ class AsyncClient:
         if isinstance(done, answers.Done):
             ticket = done.ticket
             # A resumed program ends by itself, which also changes the driver.
-            revocations = None if request.traits.for_program else done.revocations
+            revocations = None if request.traits.pacing else done.revocations
         async with asyncio.timeout(seconds):
             async for state in self.states():
                 if state.stopped is not None:
@@ -285,7 +289,7 @@ class AsyncClient:
 
     async def joints(self, q: npt.ArrayLike) -> answers.State:
         """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
-        return await self.go(requests.Joints(q=np.asarray(q, dtype=float).tolist()))
+        return await self.go(requests.Joints(q=np.asarray(q, dtype=float)))
 
     async def nudge(self, axis: int, by: float) -> answers.State:
         """Turn the joint ``axis``, counted from 1, by the angle ``by`` [rad]; see ``go``.
@@ -403,13 +407,6 @@ async def close_quietly(socket: ClientConnection) -> None:
 def is_over(program: answers.Progress) -> bool:
     """Return whether ``program`` has ended, or is not going to run."""
     return program.status in END_STATUSES or program.why.startswith(NOT_RUN)
-
-
-def _plain(value: Any) -> Any:
-    """Return a number or an array of numpy as JSON values."""
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f"A value of type {type(value).__name__} cannot be sent: {value!r}")
 
 
 @asynccontextmanager

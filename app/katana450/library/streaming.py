@@ -18,9 +18,9 @@ def stream(samples: Trajectory, client: Client) -> State:
     at once.
     """
     revocations = client.query(State).revocations
-    client.go(requests.Joints(q=samples.q[0].tolist(), revocations=revocations))
+    client.go(requests.Joints(q=samples.q[0], revocations=revocations))
     started = time.monotonic()
     for t, q, qd in zip(samples.t.tolist(), samples.q, samples.qd, strict=True):
         time.sleep(max(started + t - time.monotonic(), 0.0))
-        client.ask(requests.Servo(q=q.tolist(), qd=qd.tolist(), revocations=revocations))
-    return client.go(requests.Joints(q=samples.q[-1].tolist(), revocations=revocations))
+        client.ask(requests.Servo(q=q, qd=qd, revocations=revocations))
+    return client.go(requests.Joints(q=samples.q[-1], revocations=revocations))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from katana450.arm.control.traits import BaseCommand, CommandTraits
+from katana450.arm.control.act import Command, Request, Traits
 from katana450.errors import InputError
 
 
@@ -41,16 +40,20 @@ HAZARDS = {
 }
 
 
-@dataclass(frozen=True)
-class OperateArm(BaseCommand):
-    """Perform an act at a real arm. It is stopped before and after.
+class OperateArm(Command, Request, frozen=True):
+    """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
+
+    The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
 
     Attributes:
-        act: the act.
-        confirmed: whether a person has confirmed its hazard. Raises InputError without.
+        act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
+            motors hold the arm, which was calibrated before; release: motors off, the arm falls;
+            unblock: hold again after a collision or an error.
+        confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
+            refused with the text of the hazard.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
 
     act: ArmAct
     confirmed: bool = False

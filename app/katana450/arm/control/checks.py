@@ -27,9 +27,8 @@ TURNS = {
 """Refusals of a command that turns the tool of other arms."""
 
 FARTHEST_TARGET = 1e6
-"""[m, m/s, rad, rad/s] Maximum size of a number in a target, a step or a jog of the tool. A larger
-one is a mistake, and its square can overflow in a search.
-"""
+"""[m] Maximum size of a coordinate in a target of the tool. A larger one is a mistake, and its
+square can overflow in a search."""
 
 NO_HAND = "Nothing can be fixed to a hand: there is no arm, or no collision checking."
 
@@ -46,7 +45,7 @@ def check_joints(joints: JointSet, environment: Environment, command: cmd.Comman
             command.targets(np.zeros(joints.n))
         case cmd.Servo(gripper=float()):
             raise InputError("This robot has no gripper. Leave `gripper` out.")
-        case cmd.SetJoints(q=q) | cmd.Servo(q=q):
+        case cmd.Joints(q=q) | cmd.Servo(q=q):
             joints.check(q)
         case _:
             _check_objects(None, environment, command)
@@ -63,9 +62,9 @@ def check(
         case cmd.Batch(commands=commands):
             for each in commands:
                 check(arm, pouring, environment, each)
-        case cmd.SetJoints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
+        case cmd.Joints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
             raise InputError(f"This arm has {n} joints, but the command has {q.size}.")
-        case cmd.SetTool(name=name):
+        case cmd.Tool(name=name):
             arm.chain_to(name)
         case cmd.Follow(plan=plan) | cmd.OfferDetour(plan=plan):
             chains = [segment.path.chain for segment in plan.segments]
@@ -79,23 +78,22 @@ def check(
 def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
     kinematics = arm.kinematics
     match command:
-        case cmd.MoveTool(position=position):
+        case cmd.Position(p=position):
             _check_size("The position", position)
-        case cmd.SetPose(T=T):
+        case cmd.Pose(T=T):
             _check_size("The position of the pose", T[:3, 3])
         case cmd.Jog(rates=numbers) | cmd.StepTool(by=numbers):
-            _check_size("The jog or step", numbers)
             if numbers.size != kinematics.freedoms:
                 raise InputError(f"{NUMBERS[kinematics.freedoms]} The command has {numbers.size}.")
-        case cmd.TurnTool() | cmd.OrientTool() if not isinstance(command, kinematics.turn):
+        case cmd.Turn() | cmd.Orient() if not isinstance(command, kinematics.turn):
             raise InputError(TURNS[kinematics.freedoms])
         case cmd.SetPriority(priority=priority) if priority not in kinematics.priorities:
             known = ", ".join(repr(each.value) for each in kinematics.priorities)
             raise InputError(
                 f"This arm has no priority {priority.value!r}; its priorities are {known}."
             )
-        case cmd.TakeBranch(branch=branch):
-            branch_named(arm, str(branch))
+        case cmd.Branch(full_name=name):
+            branch_named(arm, name)
 
 
 def _check_size(what: str, numbers: FloatArray) -> None:

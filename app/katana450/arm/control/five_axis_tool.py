@@ -11,7 +11,7 @@ import numpy as np
 from katana450.arm.control import findings
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
-from katana450.arm.control.tool_commands import StepTool, TurnCommand, TurnTool
+from katana450.arm.control.tool_commands import StepTool, Turn, TurnCommand
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics import projection, tracker, velocity
 from katana450.maths.kinematics.arm import arm_of
@@ -39,7 +39,7 @@ class FiveAxisTool(FiveAxisKinematics):
         each: (name, PRIORITY_HINTS[each]) for each, name in PRIORITIES.items()
     }
     freedoms: ClassVar[int] = 5
-    turn: ClassVar[type[TurnCommand]] = TurnTool
+    turn: ClassVar[type[TurnCommand]] = Turn
     task: ClassVar[None] = None
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
@@ -52,7 +52,7 @@ class FiveAxisTool(FiveAxisKinematics):
 
     def turned(self, _state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
         """Return ``target`` with the pitch and roll of ``command``."""
-        turn = cast(TurnTool, command)
+        turn = cast(Turn, command)
         return ToolTarget(target.position, turn.pitch, turn.roll)
 
     def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import JOG_TIME, ClearStop, Command, Servo
+from katana450.arm.control.commands import JOG_TIME, ClearStop, Command, Servo, TimedServo
 from katana450.arm.control.following import Following
 from katana450.arm.control.modes import (
     IDLE,
@@ -116,7 +116,7 @@ def with_stream_sample(
     state: the state before. aimed: ``state`` with the sample as its goal. acceleration: (n,) the
     maximum of each joint.
     """
-    t = state.t if command.t is None else command.t
+    t = command.t if isinstance(command, TimedServo) else state.t
     if state.servo is None:
         return with_mode(aimed, Servoing(Stream.begin(t, aimed.goal, command.qd)))
     stream = state.servo.followed_by(t, aimed.goal, command.qd, acceleration)
@@ -140,13 +140,14 @@ def with_time(command: Command, t: float) -> Command:
     A sample of a stream without a valid time of its own gets the time of the tick. So does the end
     of a stop, which is refused too early.
     """
-    if isinstance(command, ClearStop):
-        return replace(command, t=t)
-    if not isinstance(command, Servo) or (
-        command.t is not None and 0.0 <= t - command.t < MAX_SAMPLE_AGE
-    ):
-        return command
-    return replace(command, t=t)
+    match command:
+        case ClearStop(known=known):
+            return ClearStop(known, t)
+        case TimedServo(t=sampled) if 0.0 <= t - sampled < MAX_SAMPLE_AGE:
+            return command
+        case Servo():
+            return command.timed(t)
+    return command
 
 
 def follow_plan(arm: ArmModel, state: State, plan: Plan, tau: float) -> State:

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 import numpy as np
+from msgspec import Meta
+from msgspec.structs import force_setattr
 
+from katana450.arm.control.act import Command, Name, Request, Traits
 from katana450.arm.control.appearance import AS_MADE, MAX_NAME_LENGTH, AppearanceTrait
-from katana450.arm.control.checked import check_finite, vector
+from katana450.arm.control.checked import Transform, check_finite, vector
 from katana450.arm.control.scene_objects import MAX_COORDINATE, MAX_OBJECTS, Attachment, SceneObject
-from katana450.arm.control.traits import BaseCommand, CommandTraits
 from katana450.errors import InputError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.water.units import ML
 
-SCENE_TRAITS = CommandTraits(while_stopped=True, supersedes=False, passive=True, joints_only=True)
+SCENE_TRAITS = Traits(
+    while_stopped=True, supersedes=False, passive=True, joints_only=True, extension=True
+)
 """Traits of the commands about objects, water and appearance."""
 
+MOVING_TRAITS = replace(SCENE_TRAITS, gesture=True)
+"""Traits of those that move an object as a hand does."""
 
-@dataclass(frozen=True)
-class PlaceObject(BaseCommand):
+
+class PlaceObject(Command, frozen=True):
     """Put an object at its pose, in place of the one of its name; a held object stays."""
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    traits: ClassVar[Traits] = MOVING_TRAITS
 
     scene_object: SceneObject
 
@@ -34,29 +41,39 @@ class PlaceObject(BaseCommand):
             )
 
 
-@dataclass(frozen=True)
-class Fill(BaseCommand):
-    """Fill the cup with ``volume`` [m^3], and remove all other water."""
+class Fill(Command, Request, frozen=True):
+    """Fill the cup with water, and remove all water elsewhere.
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    Attributes:
+        ml: Volume in the cup [ml].
+    """
 
-    volume: float
+    traits: ClassVar[Traits] = SCENE_TRAITS
+
+    ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
     def __post_init__(self) -> None:
-        check_finite("The volume", self.volume)
+        check_finite("The volume", self.ml)
+
+    @property
+    def volume(self) -> float:
+        """Volume in the cup [m^3]."""
+        return ML * self.ml
 
 
-@dataclass(frozen=True)
-class Remove(BaseCommand):
-    """Remove the object of that name; a held object stays."""
+class Remove(Command, Request, frozen=True):
+    """Remove an object; a held object stays.
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    Attributes:
+        name: Name of the object.
+    """
 
-    name: str
+    traits: ClassVar[Traits] = SCENE_TRAITS
+
+    name: Name
 
 
-@dataclass(frozen=True, eq=False)
-class MoveObject(BaseCommand):
+class MoveObject(Command, frozen=True, eq=False):
     """Move or turn the object of that name; a held object stays.
 
     Attributes:
@@ -65,7 +82,7 @@ class MoveObject(BaseCommand):
         R: (3, 3) rotation of its frame in the base frame; None to keep its rotation.
     """
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    traits: ClassVar[Traits] = MOVING_TRAITS
 
     name: str
     position: FloatArray | None = None
@@ -76,20 +93,19 @@ class MoveObject(BaseCommand):
             position = vector(f"The position of {self.name!r}", self.position, 3)
             if np.abs(position).max() > MAX_COORDINATE:
                 raise InputError(f"{self.name!r} would be more than {MAX_COORDINATE:g} m away.")
-            object.__setattr__(self, "position", position)
+            force_setattr(self, "position", position)
         if self.R is not None:
             R = so3.validated(self.R, f"The rotation of {self.name!r}")
-            object.__setattr__(self, "R", frozen(R))
+            force_setattr(self, "R", frozen(R))
 
 
-@dataclass(frozen=True)
-class SetAppearance(BaseCommand):
+class SetAppearance(Command, frozen=True):
     """Change one trait of the appearance of the link or object ``name``.
 
     See ``LinkAppearance.having``.
     """
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    traits: ClassVar[Traits] = replace(SCENE_TRAITS, keeps_detour=True)
 
     name: str
     trait: AppearanceTrait
@@ -103,22 +119,29 @@ class SetAppearance(BaseCommand):
         AS_MADE.having(self.trait, self.value)
 
 
-@dataclass(frozen=True)
-class Attach(BaseCommand):
-    """Fix the object of that name to the hand, or to the world again; a held object stays."""
+class Attach(Command, Request, frozen=True, eq=False):
+    """Fix an object to the hand, for example a camera or a tool, or release it to the world.
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    Attributes:
+        name: Name of the object.
+        to: Body to which the object is fixed. With `"table"` it is put down upright on the table
+            below.
+        T: (4, 4) Pose on the hand, in the frame of the arm's default tool. Without it the object
+            stays where it is.
+    """
 
-    name: str
+    traits: ClassVar[Traits] = MOVING_TRAITS
+
+    name: Name
     to: Attachment
+    T: Transform | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.to, Attachment):
             raise InputError(f"`to` must be one of {list(Attachment)}, not {self.to!r}.")
 
 
-@dataclass(frozen=True, eq=False)
-class ReplaceScene(BaseCommand):
+class ReplaceScene(Command, frozen=True, eq=False):
     """Replace all objects and the water in one step; a held object stays, and keeps its name.
 
     Attributes:
@@ -126,7 +149,7 @@ class ReplaceScene(BaseCommand):
         volume: volume in the cup [m^3]; None for no water anywhere.
     """
 
-    traits: ClassVar[CommandTraits] = SCENE_TRAITS
+    traits: ClassVar[Traits] = SCENE_TRAITS
 
     objects: tuple[SceneObject, ...]
     volume: float | None = None

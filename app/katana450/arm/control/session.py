@@ -13,7 +13,12 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control import tool_targets
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.branch_options import BranchOption, branch_options, current_target
+from katana450.arm.control.branch_options import (
+    BranchOption,
+    branch_named,
+    branch_options,
+    current_target,
+)
 from katana450.arm.control.checks import check, check_joints
 from katana450.arm.control.findings import of_joints
 from katana450.arm.control.goals import (
@@ -62,9 +67,6 @@ TOOL_SPEED = 0.5
 
 MAX_STEP_TIME = 0.05
 """[s] Maximum time that one tick moves the arm by. It prevents a leap after a stalled machine."""
-
-KEEP_DETOUR = (cmd.EndDrag, cmd.SpeedScale, cmd.SetAppearance)
-"""Commands that leave a detour on offer; all others change what its plan depends on."""
 
 NO_BRANCH = BRANCHES[0]
 """The branch in the state of a robot that has none; nothing reads it."""
@@ -133,7 +135,7 @@ class Session:
         self._travel = travel
         # Cache for the objects of the newest state.
         self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
-        self.check(cmd.SetJoints(ready))
+        self.check(cmd.Joints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
             raise InputError("The ready posture lies outside the joint limits.")
@@ -257,7 +259,7 @@ class Session:
 
     def _accepted(self, state: State, command: cmd.Command) -> State:
         """Return ``state`` after a command that leaves the mode as it is."""
-        if not isinstance(command, KEEP_DETOUR):
+        if not command.traits.keeps_detour:
             state = with_detour(state, None)
         match command:
             case cmd.Pause(finding=cause):
@@ -266,9 +268,9 @@ class Session:
                 return resumed(state)
             case cmd.OperateArm():
                 return state
-            case cmd.SpeedScale(value=value):
+            case cmd.Speed(value=value):
                 return replace(state, speed=value)
-            case cmd.SetTool(name=name):
+            case cmd.Tool(name=name):
                 return replace(self._aim(replace(state, tool=name), state.goal), mode=state.mode)
             case cmd.SetPriority(priority=priority):
                 return replace(state, priority=priority)
@@ -276,7 +278,7 @@ class Session:
                 return end_drag(state)
             case cmd.OfferDetour(plan=plan):
                 return with_detour(state, plan)
-            case cmd.SetGripper(angle=angle):
+            case cmd.Gripper(angle=angle):
                 return self._grip(without_cause(state), angle)
         return with_scene_change(self.environment, self.pouring, state, command)
 
@@ -313,7 +315,7 @@ class Session:
                 return replace(held, findings=(*why, *held.findings))
             case cmd.AxisCommand():
                 return self._aim(state, command.targets(state.goal))
-            case cmd.SetJoints(q=q):
+            case cmd.Joints(q=q):
                 return self._aim(state, q)
             case cmd.Servo(q=q, gripper=fingers):
                 aimed = self._aim(state, q)
@@ -335,18 +337,18 @@ class Session:
     def _to_tool_target(self, arm: ArmModel, state: State, command: cmd.Command) -> State:
         """Return ``state`` in the mode that a command about the tool begins."""
         match command:
-            case cmd.MoveTool(position=position):
+            case cmd.Position(p=position):
                 target = current_target(arm, state).moved(position)
                 return tool_targets.dragged(arm, state, target)
-            case cmd.TurnTool() | cmd.OrientTool():
+            case cmd.Turn() | cmd.Orient():
                 return tool_targets.turned(arm, state, command)
             case cmd.StepTool():
                 return tool_targets.stepped(arm, state, command)
-            case cmd.SetPose(T=T):
+            case cmd.Pose(target=T):
                 return tool_targets.with_pose_target(arm, state, PoseTarget(T))
-            case cmd.TakeBranch(branch=branch):
-                return tool_targets.with_branch(arm, state, branch)
-            case cmd.SetTool(name=name):
+            case cmd.Branch(full_name=name):
+                return tool_targets.with_branch(arm, state, branch_named(arm, name))
+            case cmd.Tool(name=name):
                 # The goal stays, and the target becomes the goal.
                 return self._aim(replace(state, tool=name), state.goal)
             case cmd.Go():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from katana450.arm.control.commands import Hold, Pause, Stop
+from katana450.arm.control.commands import HoldFor, PauseFor, Stop
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.state import Finding
 from katana450.arm.control.stop_cause import StopCause
@@ -28,11 +28,11 @@ class SilenceProfile(Enum):
 
     def braking(
         self, cause: Finding, silence: float, *, resumes: bool = False
-    ) -> Stop | Hold | Pause:
+    ) -> Stop | HoldFor | PauseFor:
         """Return the command for a moving arm after ``silence`` [s], for the reason ``cause``.
 
         resumes: whether a program drives that may resume by itself.
         """
         if self is SilenceProfile.REAL_ARM or silence >= PAUSE_TIMEOUT:
             return Stop(StopCause(f"{finding_text(cause)}."), cause)
-        return Pause(cause) if resumes else Hold(finding=cause)
+        return PauseFor(cause) if resumes else HoldFor(cause)

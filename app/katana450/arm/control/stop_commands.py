@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar
 
+from katana450.arm.control.act import Command, Traits
 from katana450.arm.control.state import Finding
 from katana450.arm.control.stop_cause import WATCHDOG, StopCause
-from katana450.arm.control.traits import BaseCommand, CommandTraits
 
 
-@dataclass(frozen=True)
-class Stop(BaseCommand):
+class Stop(Command, frozen=True):
     """Come to rest as fast as the arm can, and accept no motion until ClearStop.
 
     ``finding``: the cause that is shown, where the server stops the arm by itself.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits(
+    traits: ClassVar[Traits] = Traits(
         while_stopped=True, protective=True, joints_only=True, safety=True
     )
 
@@ -33,8 +31,7 @@ class Stop(BaseCommand):
         return tuple(filter(None, (self.cause.press, *self.others)))
 
 
-@dataclass(frozen=True)
-class ClearStop(BaseCommand):
+class ClearStop(Command, frozen=True):
     """Accept motion again after a stop; nothing moves. See ``stopping`` for its refusal.
 
     Attributes:
@@ -42,7 +39,7 @@ class ClearStop(BaseCommand):
         t: time of the tick [s], which the session sets.
     """
 
-    traits: ClassVar[CommandTraits] = CommandTraits(while_stopped=True, joints_only=True)
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
 
     known: float = math.inf
     t: float = 0.0

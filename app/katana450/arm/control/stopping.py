@@ -72,4 +72,4 @@ def joined(first: Stop, second: Stop) -> Stop:
     if not second.cause.press:
         # A stop without a name always counts, so the two together do too.
         cause, others = replace(cause, press=""), (cause.press, *others)
-    return replace(first, cause=cause, others=others[-REPORTED_PRESSES:])
+    return Stop(cause, first.finding, others[-REPORTED_PRESSES:])

@@ -49,17 +49,17 @@ def _row(begins: type[Mode] | None, *effects: Effect) -> Row:
     return Row(begins, dict(zip(MODES, effects, strict=True)))
 
 
-TABLE: Mapping[type[cmd.BaseCommand], Row] = {
+TABLE: Mapping[type[cmd.Command], Row] = {
     # begins                         Idle Pos. Trac Jog. Serv Foll
     cmd.AxisCommand: _row(Positioning,  S,   S,   S,   S,   S,   S),
-    cmd.SetJoints: _row(Positioning,    S,   S,   S,   S,   S,   S),
+    cmd.Joints: _row(Positioning,    S,   S,   S,   S,   S,   S),
     cmd.Home: _row(Positioning,         S,   S,   S,   S,   S,   S),
     cmd.GoToZero: _row(Positioning,     S,   S,   S,   S,   S,   S),
-    cmd.SetPose: _row(Positioning,      S,   S,   S,   S,   S,   S),
-    cmd.TakeBranch: _row(Positioning,   S,   S,   S,   S,   S,   S),
-    cmd.MoveTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
-    cmd.TurnTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
-    cmd.OrientTool: _row(Tracking,      S,   S,   C,   S,   S,   S),
+    cmd.Pose: _row(Positioning,      S,   S,   S,   S,   S,   S),
+    cmd.Branch: _row(Positioning,   S,   S,   S,   S,   S,   S),
+    cmd.Position: _row(Tracking,        S,   S,   C,   S,   S,   S),
+    cmd.Turn: _row(Tracking,        S,   S,   C,   S,   S,   S),
+    cmd.Orient: _row(Tracking,      S,   S,   C,   S,   S,   S),
     cmd.StepTool: _row(Tracking,        S,   S,   C,   S,   S,   S),
     cmd.EndDrag: _row(Positioning,      A,   S,   C,   R,   R,   R),
     cmd.Jog: _row(Jogging,              S,   S,   S,   C,   S,   S),
@@ -73,13 +73,13 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
     # A jog ends along its twist, as without renewal.
     cmd.Hold: _row(Idle,                S,   S,   S,   C,   S,   S),
     # A target refers to the earlier tool frame, so it ends; the goal stays.
-    cmd.SetTool: _row(Positioning,      A,   S,   S,   S,   S,   A),
+    cmd.Tool: _row(Positioning,      A,   S,   S,   S,   S,   A),
     # A tool target is projected again.
     cmd.SetPriority: _row(None,          A,   C,   C,   A,   A,   A),
     cmd.Pause: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.Resume: _row(None,              A,   A,   A,   A,   A,   A),
-    cmd.SpeedScale: _row(None,          A,   A,   A,   A,   A,   A),
-    cmd.SetGripper: _row(None,          A,   A,   A,   A,   A,   A),
+    cmd.Speed: _row(None,          A,   A,   A,   A,   A,   A),
+    cmd.Gripper: _row(None,          A,   A,   A,   A,   A,   A),
     cmd.PlaceObject: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.MoveObject: _row(None,               A,   A,   A,   A,   A,   A),
     cmd.Attach: _row(None,              A,   A,   A,   A,   A,   A),
@@ -94,7 +94,7 @@ TABLE: Mapping[type[cmd.BaseCommand], Row] = {
 }  # fmt: skip
 
 
-def row_of(kind: type[cmd.BaseCommand]) -> Row:
+def row_of(kind: type[cmd.Command]) -> Row:
     """Return the row of a class of commands: its own, or that of its nearest base."""
     return next(TABLE[each] for each in kind.__mro__ if each in TABLE)
 

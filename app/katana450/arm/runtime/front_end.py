@@ -109,7 +109,7 @@ class FrontEnd:
         age = self.age
         if isinstance(command, cmd.Servo):
             # An early stamp keeps delays in this process from looking like motion.
-            command = replace(command, t=MonotonicClock().now())
+            command = command.timed(MonotonicClock().now())
         with self._sending:
             if isinstance(command, cmd.Stop):
                 # Unsent commands are dropped; an earlier stop is fulfilled together with this one.

@@ -151,7 +151,7 @@ class ControlLoop:
             if isinstance(command, Stop):
                 # Without a name it counts again, although the mailbox knows its presses.
                 cause = replace(command.cause, press="")
-                self._mailbox.put(replace(command, cause=cause, others=command.presses), actor)
+                self._mailbox.put(Stop(cause, command.finding, command.presses), actor)
 
     def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:
         """Return the new entries of the event log, attributed to the newest command."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, Hold, Pause, Stop
+from katana450.arm.control.commands import Command, HoldFor, PauseFor, Stop
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
@@ -141,4 +141,4 @@ class Mailbox:
 
 
 def _pauses(command: Command) -> bool:
-    return isinstance(command, Hold | Pause) and command.finding is not None
+    return isinstance(command, HoldFor | PauseFor)

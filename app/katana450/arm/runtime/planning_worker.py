@@ -11,6 +11,7 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, Grounds
+from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
@@ -72,7 +73,7 @@ class PlanningWorker:
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
         if any(each.supersedes for each in traits) and not left:
             self.redirected()
-        if isinstance(command, cmd.TakeBranch):
+        if isinstance(command, cmd.Branch):
             self._plan(command, actor)
             return self.last_ticket
         return self._arm.deliver(command, actor)
@@ -84,7 +85,7 @@ class PlanningWorker:
                 self._work.set()
                 self._work = None
 
-    def _plan(self, command: cmd.TakeBranch, actor: Actor | None) -> None:
+    def _plan(self, command: cmd.Branch, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
@@ -92,14 +93,12 @@ class PlanningWorker:
             target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
-    def _find(
-        self, command: cmd.TakeBranch, actor: Actor | None, cancelled: threading.Event
-    ) -> None:
+    def _find(self, command: cmd.Branch, actor: Actor | None, cancelled: threading.Event) -> None:
         waited = self._state_publisher.snapshot.state.waits
         try:
             state = self._at_rest(actor, cancelled)
             arm = self._session.require_arm()
-            goal = with_branch(arm, state, command.branch).goal
+            goal = with_branch(arm, state, branch_named(arm, command.full_name)).goal
             # At a stretched elbow two branches are one posture, but for rounding.
             if (np.abs(goal - state.setpoint) > START_TOLERANCE).any():
                 plan = plan_to(arm, self._session.world_at(state), state, goal)

@@ -8,8 +8,9 @@ from typing import Any, Union, get_args
 
 import msgspec
 
+from katana450.arm.control.act import Request
+from katana450.arm.control.checked import field_schema
 from katana450.server.api import answers
-from katana450.server.api.fields import Request
 
 TITLE = "katana450"
 
@@ -55,7 +56,9 @@ def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str,
     of the server.
     """
     shapes: list[Any] = [Union[asked], answers.AnyAnswer]  # noqa: UP007
-    (request, answer), components = msgspec.json.schema_components(shapes, ref_template=REFERENCE)
+    (request, answer), components = msgspec.json.schema_components(
+        shapes, schema_hook=field_schema, ref_template=REFERENCE
+    )
     components = {name: _portable(schema) for name, schema in components.items()}
     messages = {each.__name__: each for each in (*asked, *kinds(answers.AnyAnswer))}
     for name, schema in components.items():

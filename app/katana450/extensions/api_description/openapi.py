@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 
+from katana450.arm.control.act import Request
 from katana450.extensions.api_description.messages import (
     ABOUT,
     LICENSE,
@@ -15,7 +16,7 @@ from katana450.extensions.api_description.messages import (
     summary,
 )
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Request
+from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT
 
 READABLE = {
     "state": answers.State,

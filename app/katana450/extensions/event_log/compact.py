@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from typing import Any
@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.traits import BaseCommand
+from katana450.arm.control.act import Act, Command, content_names
 from katana450.maths.planning.plan import Plan
 
 MAX_TEXT = 200
@@ -33,17 +33,14 @@ def text(value: object) -> str:
     return found if len(found) <= MAX_TEXT else f"{found[:MAX_TEXT]}... ({len(found)} characters)"
 
 
-def compact_command(command: BaseCommand) -> dict[str, Any]:
+def compact_command(command: Command) -> dict[str, Any]:
     """Return the name of ``command`` and its values."""
     if isinstance(command, cmd.Batch):
         parts = [compact_command(part) for part in command.parts[:MAX_ITEMS]]
         return {"command": "Batch", "count": len(command.parts), "parts": parts}
     content = {"command": type(command).__name__, **_fields(command, 0)}
-    # People and the API count axes from 1.
-    if "axis" in content:
-        content["axis"] += 1
     if isinstance(command, cmd.SetAxes):
-        content["values"] = {str(axis + 1): _number(value) for axis, value in command.values}
+        content["values"] = {str(axis): _number(value) for axis, value in command.values}
     return content
 
 
@@ -82,8 +79,11 @@ def compact(value: Any, depth: int = 0) -> Any:
 
 def _fields(value: Any, depth: int) -> dict[str, Any]:
     """Return the fields of ``value`` that are set and no secrets."""
-    if isinstance(value, msgspec.Struct):
-        names = [name for name in value.__struct_fields__ if name != "id"]
+    names: Sequence[str]
+    if isinstance(value, Act):
+        names = content_names(type(value))
+    elif isinstance(value, msgspec.Struct):
+        names = value.__struct_fields__
     elif is_dataclass(value):
         names = [field.name for field in fields(value) if field.repr]
     else:

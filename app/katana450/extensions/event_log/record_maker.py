@@ -13,12 +13,12 @@ from typing import Any
 import msgspec
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import Command
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.state import Outcome, Verdict
-from katana450.arm.control.traits import BaseCommand
 from katana450.extensions.event_log.compact import compact, compact_command, compact_request, text
 from katana450.extensions.event_log.record_limits import RecordLimits
 from katana450.extensions.event_log.records import Record, utc
@@ -101,7 +101,7 @@ class RecordMaker:
 
     def _take(self, note: Note) -> None:
         match note.what:
-            case BaseCommand() if note.kind == "command":
+            case Command() if note.kind == "command":
                 self._command(note, note.what)
             case Outcome():
                 self._outcome(note.ticket, note.what, note.t)
@@ -115,7 +115,7 @@ class RecordMaker:
                 self._stopped |= note.kind == "stop"
                 self._add(note, _content(note.what))
 
-    def _command(self, note: Note, command: BaseCommand) -> None:
+    def _command(self, note: Note, command: Command) -> None:
         key = _stream_key(note, command)
         if key is None:
             self._end_all()
@@ -248,7 +248,7 @@ class RecordMaker:
             self._made.append(record)
 
 
-def _stream_key(note: Note, command: BaseCommand) -> StreamKey | None:
+def _stream_key(note: Note, command: Command) -> StreamKey | None:
     """Return what the commands of one stream have in common; None for a single command.
 
     A slider or a held key sends such commands many times a second.
@@ -267,7 +267,7 @@ def _stream_key(note: Note, command: BaseCommand) -> StreamKey | None:
 
 def _content(what: Any) -> Any:
     match what:
-        case BaseCommand():
+        case Command():
             return compact_command(what)
         case msgspec.Struct():
             return compact_request(what)

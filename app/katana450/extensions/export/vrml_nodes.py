@@ -190,7 +190,7 @@ class VrmlNodes(Nodes):
         T[:3, 3] = T[:3, 3] if orders.position is None else orders.position
         T[:3, :3] = T[:3, :3] if orders.R is None else orders.R
         T = se3.inverse(self._robot.require_arm().T_base_shoulder) @ T
-        return (cmd.MoveTool(T[:3, 3]) if orders.R is None else cmd.SetPose(T),)
+        return (cmd.Position(T[:3, 3]) if orders.R is None else cmd.Pose(T),)
 
     def _pose(self, state: State, link: str) -> FloatArray:
         """Return the pose (4, 4) of a link in the root's frame [m]."""
@@ -254,9 +254,9 @@ class VrmlNodes(Nodes):
             given = _given(name, value)
             amount = _along(name, axis, given) if joint.slides else _about(name, axis, given)
             if name in self._axes:
-                orders.axes[self._axes[name]] = amount
+                orders.axes[self._axes[name] + 1] = amount
             else:
-                orders.others.append(cmd.SetGripper(amount))
+                orders.others.append(cmd.Gripper(amount))
 
         why = ""
         if joint.leader != name:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
-from katana450.arm.control.tool_commands import OrientTool, StepTool, TurnCommand
+from katana450.arm.control.tool_commands import Orient, StepTool, TurnCommand
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.choice import kinematics_of
@@ -73,7 +73,7 @@ class DrivenTool:
     chain: Chain
 
     freedoms: ClassVar[int] = 6
-    turn: ClassVar[type[TurnCommand]] = OrientTool
+    turn: ClassVar[type[TurnCommand]] = Orient
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = SIX_PRIORITIES
 
     @cached_property
@@ -120,7 +120,7 @@ class DrivenTool:
 
     def turned(self, state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
         """Return ``target`` with the rotation of ``command``."""
-        assert isinstance(command, OrientTool)
+        assert isinstance(command, Orient)
         return ToolPose(target.position, frozen(self._pan(state.goal).T @ command.R))
 
     def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:

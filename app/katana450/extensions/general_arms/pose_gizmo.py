@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import viser
 
-from katana450.arm.control.commands import OrientTool
+from katana450.arm.control.commands import Orient
 from katana450.arm.control.state import State
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -74,7 +74,7 @@ class PoseGizmo(Gizmo):
             del self._held["turn"]
         wxyz = np.asarray(event.target.wxyz, dtype=float)
         R = self._arm.T_base_shoulder[:3, :3].T @ so3.from_quaternion(wxyz) @ self._R_ring_tool
-        self._submit(event, actor, OrientTool(R), tuple(wxyz.tolist()))
+        self._submit(event, actor, Orient(R), tuple(wxyz.tolist()))
 
 
 def gizmo_for(freedoms: int) -> type[Gizmo] | None:

@@ -109,7 +109,7 @@ class MachinePanel:
         )
         slider.precision = 2
         unit = 1e-3 if slides else math.radians(1.0)
-        listen(slider, lambda: cmd.SetJoint(axis, unit * slider.value))
+        listen(slider, lambda: cmd.Joint(axis + 1, unit * slider.value))
         return slider
 
 

@@ -170,7 +170,7 @@ class LeaderRun:
             case ReleaseControl():
                 await self._release()
             case Sample(q=q, qd=qd, revocations=revocations, first=first):
-                sample = requests.Servo(q=q.tolist(), qd=qd.tolist(), revocations=revocations)
+                sample = requests.Servo(q=q, qd=qd, revocations=revocations)
                 await (self._ask(sample) if first else self._client.send(sample))
             case FingerTarget(angle=angle, revocations=revocations):
                 await self._client.send(requests.Gripper(angle=angle, revocations=revocations))

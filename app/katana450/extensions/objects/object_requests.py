@@ -15,7 +15,6 @@ from katana450.errors import InputError
 from katana450.extensions.free_place import free_place
 from katana450.extensions.objects.scenes import scenes_of
 from katana450.maths.geometry import se3
-from katana450.maths.water.units import ML
 from katana450.server.api import requests
 from katana450.server.service.participants import Participant
 from katana450.server.service.request_handler import RequestHandler
@@ -40,11 +39,11 @@ class ObjectRequests(RequestHandler):
                 return self._attached(request)
             case requests.Load(scene=key):
                 return scenes_of(self.hub).load_command(key, self.hub.present())
-            case requests.Fill(ml=ml):
-                return cmd.Fill(ML * ml)
+            case requests.Fill():
+                return request
             case requests.Remove(name=name):
                 self._known(name)
-                return cmd.Remove(name)
+                return request
         raise AssertionError(request)
 
     def _object(self, request: requests.Place) -> SceneObject:
@@ -128,7 +127,7 @@ class ObjectRequests(RequestHandler):
         hand = arm.environment.hand
         if request.T is None or hand is None:
             check_mounted(arm.environment, arm.state.objects, scene_object, to, arm.state.x)
-            return cmd.Attach(request.name, to)
+            return request
         if to is not Attachment.HAND:
             raise InputError("`T` is a pose on the hand. Use `place` for a pose elsewhere.")
         T = hand.T_palm_tool @ se3.validated(request.T)

@@ -13,6 +13,7 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan
+from katana450.maths.water.units import ML
 
 ACTION_TIMEOUT = 10.0
 """[s] Timeout of a finger motion, and of an arm that is blocked."""
@@ -86,7 +87,7 @@ class MoveFingers:
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that sets the finger angle."""
-        return (cmd.SetGripper(self.angle),)
+        return (cmd.Gripper(self.angle),)
 
     def done(self, state: State, waited: float) -> bool:
         """Return whether the fingers are at their goal.
@@ -119,7 +120,7 @@ class FillCup:
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that fills the cup."""
-        return (cmd.Fill(self.volume),)
+        return (cmd.Fill(self.volume / ML),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return True. Raises InputError if there is no cup."""
@@ -178,7 +179,7 @@ class UseTool:
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the command that selects the tool frame."""
-        return (cmd.SetTool(self.name),)
+        return (cmd.Tool(self.name),)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return whether the tool frame is selected."""
@@ -197,7 +198,7 @@ class SetSpeed:
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:
         """Return the command that sets the speed, at least MIN_SPEED."""
-        return (cmd.SpeedScale(self.scale(speed)),)
+        return (cmd.Speed(self.scale(speed)),)
 
     def scale(self, speed: float) -> float:
         """Return the fraction of full speed for a program with the fraction ``speed``."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from katana450.arm.control.commands import SetGripper
+from katana450.arm.control.commands import Gripper
 from katana450.arm.control.messages import part
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
@@ -18,7 +18,7 @@ def with_fingers(builder: PlanBuilder, position: float) -> State:
     They may end before it on an object that they close on. Raises InputError if something else
     stops them.
     """
-    state = builder.after(SetGripper(position), round(ACTION_TIMEOUT / TICK))
+    state = builder.after(Gripper(position), round(ACTION_TIMEOUT / TICK))
     if state.gripper_setpoint == state.gripper_goal:
         return state
     unit, scale = finger_unit(builder)

@@ -60,7 +60,7 @@ class CloseUntil(MoveFingers):
         """
         if state.held is None or state.grip is None:
             return ()
-        return (cmd.SetGripper(_angle_for(self.force, self.model, state, self.gripper)),)
+        return (cmd.Gripper(_angle_for(self.force, self.model, state, self.gripper)),)
 
 
 def _angle_for(force: float, model: TouchModel, state: State, gripper: GripperModel) -> float:

@@ -128,7 +128,7 @@ class Nudge:
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the motion. Raises InputError if the angle is outside the limits."""
-        q = cmd.Nudge(self.axis, self.by).targets(builder.q)
+        q = cmd.Nudge(self.axis + 1, self.by).targets(builder.q)
         builder.move_to(builder.joints_at(StepTarget(joints=q)), "nudge")
 
 

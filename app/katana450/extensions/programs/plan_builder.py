@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import Command, SetJoints
+from katana450.arm.control.commands import Command, Joints
 from katana450.arm.control.modes import IDLE
 from katana450.arm.control.plans import path_to, plan_along
 from katana450.arm.control.scene_objects import SceneObject, named
@@ -367,7 +367,7 @@ class PlanBuilder:
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
-            self.plan_context.session.check(SetJoints(place.joints))
+            self.plan_context.session.check(Joints(place.joints))
             q = self.plan_context.arm.chain.check_q(place.joints)
             _check_range(self.chain, q)
             return q

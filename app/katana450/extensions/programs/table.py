@@ -46,7 +46,7 @@ class Fill:
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the filling. Raises InputError if the cup is absent or too small."""
-        command = cmd.Fill(self.volume)
+        command = cmd.Fill(self.volume / ML)
         builder.plan_context.session.check(command)
         filled = FillCup(self.volume)
         builder.note("fill", filled, builder.after(command, ticks=1))

@@ -14,13 +14,14 @@ import typing
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from functools import cache
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple, Union
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control import modes
+from katana450.arm.control.act import ENVELOPE, Act, classes_of, tag_of
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import Command
 from katana450.arm.control.solid import Solid
@@ -33,7 +34,7 @@ from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
-from katana450.extensions.recording.former_forms import FORMER, upgraded
+from katana450.extensions.recording.former_forms import FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (
     MAX_INT,
     MAX_ITEMS,
@@ -56,8 +57,9 @@ MEMBERS: Final[Mapping[Any, Any]] = {
     PoseCurve: TurnedCurve | PoseTurn | PoseLines,
     Callable: Linear | Swing,
     DragTarget: ToolTarget | ToolPose,
+    Command: Union[classes_of(Command)],  # noqa: UP007
 }
-"""The types that a field may hold whose type is a protocol, by that type."""
+"""The types that a field may hold whose type is a base or a protocol, by that type."""
 
 SHARED: Final[tuple[type, ...]] = (Plan, Solid)
 """Large values that are written once and then named by a key."""
@@ -66,7 +68,7 @@ SINGLE: Final[Mapping[type, Any]] = {modes.Idle: modes.IDLE}
 """Types with one value, which other code compares by identity."""
 
 TAG = "is"
-"""Name of the item with the name of the class; no field of a class can have it."""
+"""Name of the item with the name of the class, that of the API for a command; no field has it."""
 
 ORDER = "order"
 """Name of the item of a plan with the number of each segment in the list of different segments."""
@@ -133,7 +135,7 @@ class Codec:
         return self._record(record, value)
 
     def _record(self, record: _Record, value: Any) -> dict[str, Any]:
-        form: dict[str, Any] = {TAG: record.kind.__name__} if record.tagged else {}
+        form: dict[str, Any] = {TAG: record.name} if record.tagged else {}
         order = None
         if record.kind is Plan:
             # A segment that is followed several times is written once. The session remembers by
@@ -266,7 +268,7 @@ def _union(parts: Iterable[Any]) -> Form:
     optional = types.NoneType in kinds
     forms = [form_of(kind) for kind in kinds if kind is not types.NoneType]
     records = {
-        form.record.kind.__name__: form.record
+        form.record.name: form.record
         for form in forms
         if form.record is not None and form.json == (dict,)
     }
@@ -276,11 +278,13 @@ def _union(parts: Iterable[Any]) -> Form:
     if len(records) > 1:
         for record in records.values():
             record.tagged = True
+    commands = any(issubclass(record.kind, Act) for record in records.values())
 
     def decode(form: Any, shared: SharedValues) -> Any:
         if form is None and optional:
             return None
         if len(records) > 1 and isinstance(form, dict):
+            form = command_form(form) if commands else form
             name = form.get(TAG)
             # Before a field had several types, its objects had no tag.
             fit = [record for record in records.values() if record.has_form_of(form)]
@@ -303,10 +307,11 @@ class _Record:
 
     def __init__(self, kind: type) -> None:
         self.kind = kind
+        self.name = tag_of(kind.__name__) if issubclass(kind, Act) else kind.__name__
         self.tagged = False
         """Whether its objects name the class, because some field can have several classes."""
         fields: Any = (
-            msgspec.structs.fields(kind)
+            [field for field in msgspec.structs.fields(kind) if field.name not in ENVELOPE]
             if issubclass(kind, msgspec.Struct)
             else [field for field in dataclasses.fields(kind) if field.init]  # type: ignore[arg-type]
         )

@@ -1,15 +1,19 @@
 """Forms of older versions, which recorded only the cup, with a liquid of several.
 
-Their files are read, and the digests of their states are still made, so that they verify.
+They named commands by the classes of their time, which counted axes from 0. Their files are read,
+and the digests of their states are still made, so that they verify.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
+from katana450.arm.control.act import tag_of
 from katana450.arm.control.pouring import CUP, MotionWithWater
 from katana450.extensions.recording.forms import FormError, shown
+from katana450.maths.water.units import ML
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
 """Fields that are not written any more, each with the only form that is read."""
@@ -19,6 +23,58 @@ OF_CUP = ("volume", "T", "slosh", "film", "wetted")
 
 WRITTEN = ("cup", "T_base_cup", "slosh", "film", "wetted")
 OF_MOTION = ("course", "middle", "velocity")
+
+
+COMMANDS: Mapping[str, str] = {
+    **{"SetJoint": "joint", "SetJoints": "joints", "MoveTool": "position", "SetPose": "pose"},
+    **{"TurnTool": "turn", "OrientTool": "orient", "SetGripper": "gripper", "SetTool": "tool"},
+    **{"SpeedScale": "speed", "TakeBranch": "branch"},
+}
+"""Present names of the commands whose former class had another name."""
+
+
+def command_form(form: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return ``form`` of a command as it is written now."""
+    former = form.get("is")
+    if not isinstance(former, str) or not former[:1].isupper():
+        return form
+    now = dict(form) | {"is": COMMANDS.get(former, tag_of(former))}
+    match former, now:
+        case "SetJoint" | "Nudge", {"axis": int(axis)}:
+            now["axis"] = axis + 1
+        case "SetAxes", {"values": list(values)}:
+            now["values"] = [
+                [row[0] + 1, *row[1:]] if _is_axis_value(row) else row for row in values
+            ]
+        case "MoveTool", {"position": _}:
+            now["p"] = now.pop("position")
+        case "TakeBranch", {"branch": dict()}:
+            now |= now.pop("branch")
+        case "TakeBranch", {"branch": _}:
+            now["name"] = now.pop("branch")
+        case "Fill", {"volume": int(volume) | float(volume)}:
+            now["ml"] = _millilitres(volume)
+            del now["volume"]
+        case "Servo", {"t": t}:
+            now |= {"is": "servo"} if t is None else {"is": "timed_servo"}
+            if t is None:
+                del now["t"]
+        case "Hold" | "Pause", {"finding": finding}:
+            now["is"] += "" if finding is None else "_for"
+            if finding is None:
+                del now["finding"]
+    return now
+
+
+def _is_axis_value(row: Any) -> bool:
+    return isinstance(row, list) and bool(row) and isinstance(row[0], int)
+
+
+def _millilitres(volume: float) -> float:
+    """Return the number of millilitres of which ``volume`` [m^3] was made, exact to the bit."""
+    ml = volume / ML
+    near = (round(ml, 9), ml, math.nextafter(ml, 0.0), math.nextafter(ml, math.inf))
+    return next((number for number in near if ML * number == volume), ml)
 
 
 def upgraded(kind: type, form: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -52,7 +52,7 @@ class Pseudonyms:
     def _command(self, command: Command) -> Command:
         match command:
             case Stop(cause=cause) if cause.key:
-                return replace(command, cause=self._cause(cause))
+                return Stop(self._cause(cause), command.finding, command.others)
             case Batch(commands=commands):
                 return Batch(tuple(map(self._command, commands)))
         return command

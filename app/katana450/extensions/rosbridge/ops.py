@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeVar, get_args
 import msgspec
 from msgspec import Meta
 
+from katana450.arm.control.act import Traits, tag_of
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.names import (
     CANCEL,
@@ -18,7 +19,6 @@ from katana450.extensions.rosbridge.names import (
     STOP_SERVICE,
     resolved,
 )
-from katana450.server.api.fields import COMMAND, RequestTraits, tag_of
 
 MAX_OP_BYTES = 327_680
 """Maximum size of an operation [bytes]: a long trajectory with rates and accelerations."""
@@ -35,7 +35,7 @@ Type = Annotated[str, Meta(max_length=200)]
 
 T = TypeVar("T", bound=msgspec.Struct)
 
-FREE, STOP = RequestTraits(free=True), RequestTraits(free=True, safety=True)
+FREE, STOP = Traits(free=True), Traits(free=True, safety=True)
 
 NOTHING = msgspec.Raw(b"{}")
 
@@ -50,9 +50,9 @@ class Op(msgspec.Struct, frozen=True, kw_only=True, tag_field="op", tag=tag_of):
     id: OpId = None
 
     @property
-    def traits(self) -> RequestTraits:
+    def traits(self) -> Traits:
         """The traits of the operation: ``safety`` for the rate limit, ``free`` for the budget."""
-        return COMMAND
+        return Traits()
 
 
 class Advertise(Op, frozen=True, kw_only=True):
@@ -102,11 +102,11 @@ class CallService(Op, frozen=True, kw_only=True):
     args: msgspec.Raw = NOTHING
 
     @property
-    def traits(self) -> RequestTraits:
+    def traits(self) -> Traits:
         """The traits of the service: what ends a motion or a stop costs nothing."""
         if (name := resolved(self.service)) == STOP_SERVICE:
             return STOP
-        return FREE if name in (HOLD_SERVICE, CLEAR_SERVICE) or name.endswith(CANCEL) else COMMAND
+        return FREE if name in (HOLD_SERVICE, CLEAR_SERVICE) or name.endswith(CANCEL) else Traits()
 
 
 class SendActionGoal(Op, frozen=True, kw_only=True):
@@ -124,7 +124,7 @@ class CancelActionGoal(Op, frozen=True, kw_only=True):
     action: Name
 
     @property
-    def traits(self) -> RequestTraits:
+    def traits(self) -> Traits:
         """The traits: a cancel costs nothing."""
         return FREE
 

@@ -13,10 +13,10 @@ from enum import Enum
 
 import numpy as np
 
+from katana450.arm.control.tool_commands import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.messages import GivenHeader, JointJog, Twist, Vector3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.api.fields import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
 
 COMMAND_TIMEOUT = 0.1
 """[s] Time for which a command is valid, as ``incoming_command_timeout`` of MoveIt Servo."""

@@ -58,7 +58,7 @@ class ServoStream:
             return
         self._begin(ServoMotion.TOOL)
         self._rates = rates
-        self._send(requests.Jog(rates=tuple(rates.tolist()), revocations=self._revocations))
+        self._send(requests.Jog(rates=rates, revocations=self._revocations))
 
     def joints(self, rates: FloatArray) -> None:
         """Move the joints at ``rates`` (n,) [rad/s]. Raises KatanaError if refused."""
@@ -103,9 +103,7 @@ class ServoStream:
         q = self._q + self._rates * (t - self._t)
         # The lead stays bounded if the arm is slower or cannot continue.
         self._q, self._t = np.clip(q, state.setpoint - lead, state.setpoint + lead), t
-        request = requests.Servo(
-            q=self._q.tolist(), qd=self._rates.tolist(), revocations=self._revocations
-        )
+        request = requests.Servo(q=self._q, qd=self._rates, revocations=self._revocations)
         self._send(request)
 
     def _send(self, request: requests.Request) -> None:
@@ -122,7 +120,7 @@ class ServoStream:
         self._motion = ServoMotion.NOTHING
         if motion is ServoMotion.TOOL:
             # Keeps the tool on its line; a hold brakes each joint by itself.
-            rest = (0.0,) * len(self._rates)
-            self._ask(requests.Jog(rates=rest, revocations=self._revocations))
+            rest = requests.Jog(np.zeros(len(self._rates)), revocations=self._revocations)
+            self._ask(rest)
         else:
             self._ask(requests.Hold(revocations=self._revocations))

@@ -20,30 +20,6 @@ MAX_CHANGES = 20
 SAME_GESTURE = 1.0
 """[s] Maximum pause between two commands of one drag, or of one jog."""
 
-GOALS: dict[type[cmd.BaseCommand], str] = {
-    cmd.MoveTool: "drag",
-    cmd.TurnTool: "drag",
-    cmd.OrientTool: "drag",
-    cmd.EndDrag: "drag",
-    cmd.SetPose: "pose",
-    cmd.SetJoint: "joint",
-    cmd.SetAxes: "joints",
-    cmd.SetJoints: "joints",
-    cmd.StepTool: "step",
-    cmd.Jog: "jog",
-    cmd.TakeBranch: "branch",
-    cmd.Go: "detour",
-    cmd.Home: "home",
-    cmd.GoToZero: "zero",
-}
-"""The commands that change the goal of the arm, in words. Other motions of single axes do too."""
-
-GESTURES = (
-    *(cmd.EndDrag, cmd.SetAxes, cmd.Jog, cmd.SetTool, cmd.SetPriority, cmd.SpeedScale),
-    *(cmd.PlaceObject, cmd.MoveObject, cmd.Attach),
-)
-"""Commands that continue the same change, if they follow soon, as the samples of a stream do."""
-
 OBJECTS = (cmd.PlaceObject, cmd.MoveObject, cmd.Attach, cmd.Remove)
 
 
@@ -109,7 +85,7 @@ class UndoHistory:
         self._undone = ()
         change = Change(*found, actor, self._clock())
         last = self._changes[-1] if self._changes else None
-        one_gesture = command.traits.stream or isinstance(command, GESTURES)
+        one_gesture = command.traits.stream or command.traits.gesture
         # A state without the last command does not show what this one changes.
         if last is not None and change.continues(last) and (one_gesture or not caught_up):
             self._changes = (*self._changes[:-1], replace(last, at=change.at))
@@ -152,7 +128,7 @@ class UndoHistory:
         if now is not None and now.held:
             raise InputError(f"{now.name!r} is held: open the gripper first.")
         holds = any(each.held for each in state.objects)
-        if isinstance(command, cmd.SetGripper) and holds and state.moving:
+        if isinstance(command, cmd.Gripper) and holds and state.moving:
             raise InputError("The hand holds an object and the arm moves: wait until it rests.")
         if isinstance(command, cmd.PlaceObject) and now is not None:
             before = command.scene_object
@@ -204,16 +180,15 @@ class UndoHistory:
 
 def _inverse(state: State, command: cmd.Command) -> tuple[str, cmd.Command] | None:
     """Return the name of the change by ``command``, and its inverse; None for no such change."""
-    if type(command) in GOALS or isinstance(command, cmd.AxisCommand):
-        what = GOALS.get(type(command), type(command).__name__.lower())
-        return f"arm ({what})", cmd.SetJoints(state.goal)
+    if command.traits.goal:
+        return f"arm ({command.traits.goal})", cmd.Joints(state.goal)
     match command:
-        case cmd.SetGripper():
-            return "gripper", cmd.SetGripper(state.gripper_goal)
-        case cmd.SpeedScale():
-            return "speed", cmd.SpeedScale(state.speed)
-        case cmd.SetTool() if state.tool:
-            return "tool", cmd.SetTool(state.tool)
+        case cmd.Gripper():
+            return "gripper", cmd.Gripper(state.gripper_goal)
+        case cmd.Speed():
+            return "speed", cmd.Speed(state.speed)
+        case cmd.Tool() if state.tool:
+            return "tool", cmd.Tool(state.tool)
         case cmd.SetPriority():
             return "priority", cmd.SetPriority(state.priority)
     name = _object_of(command) if isinstance(command, OBJECTS) else None

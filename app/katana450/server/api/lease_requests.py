@@ -6,19 +6,20 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import LEASE, Request, RequestTraits
+from katana450.arm.control.act import Request, Traits
+from katana450.server.api.fields import LEASE
 
 
 class Acquire(Request, frozen=True):
     """Acquire the lease if it is free. A command does this by itself while the lease is free."""
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
 
 class Take(Request, frozen=True):
     """Take the lease from its holder. For admins only."""
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
 
 class Ask(Request, frozen=True):
@@ -27,19 +28,19 @@ class Ask(Request, frozen=True):
     While a program holds the lease, the owner of the program is asked.
     """
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
 
 class Withdraw(Request, frozen=True):
     """Withdraw your own request for the lease."""
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
 
 class ReleaseLease(Request, frozen=True):
     """Release the lease, so that others can acquire it."""
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
 
 class Give(Request, frozen=True, kw_only=True):
@@ -51,7 +52,7 @@ class Give(Request, frozen=True, kw_only=True):
         to: Number of the page or program.
     """
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
     to: int
 
@@ -65,7 +66,7 @@ class Decline(Request, frozen=True, kw_only=True):
         to: Number of the page or program.
     """
 
-    traits: ClassVar[RequestTraits] = LEASE
+    traits: ClassVar[Traits] = LEASE
 
     to: int
 
@@ -77,6 +78,6 @@ class Rename(Request, frozen=True, kw_only=True):
         name: Name, of at most 24 characters. That of an access link cannot be changed.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits()
+    traits: ClassVar[Traits] = Traits()
 
     name: Annotated[str, Meta(max_length=200)]

@@ -6,7 +6,8 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import ADMIN, Request, RequestTraits
+from katana450.arm.control.act import Request, Traits
+from katana450.server.api.fields import ADMIN
 
 MAX_TIME_OUT = 86_400.0
 """Maximum time [s] for which an admin keeps somebody out without revoking the link."""
@@ -15,7 +16,7 @@ MAX_TIME_OUT = 86_400.0
 class ListPeople(Request, frozen=True):
     """List everybody who is connected or kept out. For admins only."""
 
-    traits: ClassVar[RequestTraits] = RequestTraits(admin=True, answered=True)
+    traits: ClassVar[Traits] = Traits(admin=True, answered=True, extension=True)
 
 
 class Kick(Request, frozen=True, kw_only=True):
@@ -31,7 +32,7 @@ class Kick(Request, frozen=True, kw_only=True):
             ``katana450 access revoke`` alone.
     """
 
-    traits: ClassVar[RequestTraits] = ADMIN
+    traits: ClassVar[Traits] = ADMIN
 
     person: int
     seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0

@@ -7,13 +7,8 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import (
-    COMMAND,
-    MAX_REQUEST_BYTES,
-    MotionRequest,
-    Request,
-    RequestTraits,
-)
+from katana450.arm.control.act import MotionRequest, Request, Traits
+from katana450.server.api.fields import MAX_REQUEST_BYTES
 
 SLOWEST_SPEED = 0.01
 """Minimum fraction of its own speed at which a program can run."""
@@ -48,7 +43,7 @@ class Program(Request, frozen=True, kw_only=True):
     is refused unless that is the present one.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits(extension=True)
 
     text: Annotated[str, Meta(max_length=MAX_REQUEST_BYTES)]
     more: bool = False
@@ -74,7 +69,7 @@ class Steer(MotionRequest, frozen=True, kw_only=True):
     if the gripper or the scene has changed.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits(extension=True)
 
     order: ProgramOrder
     unattended: bool = False
@@ -87,7 +82,7 @@ class Breakpoints(Request, frozen=True, kw_only=True):
     They last for all runs of scripts of this name, until another participant sends a script.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits(extension=True)
 
     steps: Annotated[tuple[Annotated[int, Meta(ge=1)], ...], Meta(max_length=MAX_BREAKPOINTS)]
 

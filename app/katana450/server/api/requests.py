@@ -2,144 +2,35 @@
 
 ``do`` names the request. A request with an ``id`` is answered; without one only a refusal is
 sent. Lengths are in m, angles in rad, times in s. A pose is that of the tool, in the paper's frame
-{S} at the shoulder or in the base frame on the table.
+{S} at the shoulder or in the base frame on the table. The requests that are commands of the arm are
+their classes in ``arm.control``.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, Union
 
 import msgspec
 from msgspec import Meta
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import Attachment, Shape
+from katana450.arm.control.act import *
+from katana450.arm.control.act import Id, MotionRequest, Request, Traits, tag_of
+from katana450.arm.control.arm_commands import *
+from katana450.arm.control.checked import decoded_field
+from katana450.arm.control.joint_commands import *
+from katana450.arm.control.motion_commands import *
+from katana450.arm.control.object_commands import *
+from katana450.arm.control.scene_objects import Attachment as Attachment
+from katana450.arm.control.scene_objects import Shape as Shape
+from katana450.arm.control.tool_commands import *
 from katana450.errors import InputError
-from katana450.maths.kinematics.priority import Priority
-from katana450.server.api.fields import (
-    COMMAND,
-    MAX_JOINTS,
-    MAX_REQUEST_BYTES,
-    MAX_SPEED,
-    MAX_STATES_PER_SECOND,
-    MIN_SPEED,
-    ROOT,
-    VERSION,
-    Frame,
-    Id,
-    MotionRequest,
-    Name,
-    Request,
-    RequestTraits,
-    tag_of,
-)
-from katana450.server.api.lease_requests import (
-    Acquire,
-    Ask,
-    Decline,
-    Give,
-    ReleaseLease,
-    Rename,
-    Take,
-    Withdraw,
-)
-from katana450.server.api.motion_requests import (
-    Branch,
-    EndDrag,
-    Go,
-    GoToZero,
-    Gripper,
-    Hold,
-    Home,
-    Jog,
-    Joint,
-    Joints,
-    OperateArm,
-    Orient,
-    Pose,
-    Position,
-    Redo,
-    Servo,
-    StepTool,
-    Turn,
-    Undo,
-)
-from katana450.server.api.people_requests import Kick, ListPeople
-from katana450.server.api.scene_requests import (
-    Attach,
-    FieldName,
-    FieldSetting,
-    Fill,
-    Get,
-    Load,
-    Place,
-    Remove,
-    Set,
-)
-from katana450.server.api.stop_requests import Hello, Stop
-
-__all__ = [
-    "MAX_REQUEST_BYTES",
-    "VERSION",
-    "Acquire",
-    "AnyRequest",
-    "Ask",
-    "Attach",
-    "Attachment",
-    "Branch",
-    "ClearStop",
-    "Decline",
-    "EndDrag",
-    "FieldName",
-    "FieldSetting",
-    "Fill",
-    "Frame",
-    "Get",
-    "Give",
-    "Go",
-    "GoToZero",
-    "Gripper",
-    "Heartbeat",
-    "Hello",
-    "Hold",
-    "Home",
-    "Jog",
-    "Joint",
-    "Joints",
-    "Kick",
-    "ListPeople",
-    "Load",
-    "MotionRequest",
-    "Nudge",
-    "OperateArm",
-    "Orient",
-    "Pause",
-    "Place",
-    "Pose",
-    "Position",
-    "Query",
-    "Redo",
-    "ReleaseLease",
-    "Remove",
-    "Rename",
-    "Request",
-    "RequestDecoder",
-    "Resume",
-    "Servo",
-    "Set",
-    "SetPriority",
-    "Shape",
-    "Speed",
-    "StepTool",
-    "Stop",
-    "Take",
-    "Tool",
-    "Turn",
-    "Undo",
-    "Watch",
-    "Withdraw",
-    "id_of",
-]
+from katana450.server.api.fields import *
+from katana450.server.api.fields import MAX_REQUEST_BYTES, MAX_STATES_PER_SECOND, ROOT
+from katana450.server.api.lease_requests import *
+from katana450.server.api.people_requests import *
+from katana450.server.api.scene_requests import *
+from katana450.server.api.scene_requests import FieldName
+from katana450.server.api.stop_requests import *
 
 
 class Heartbeat(Request, frozen=True, kw_only=True):
@@ -151,105 +42,25 @@ class Heartbeat(Request, frozen=True, kw_only=True):
         n: Number that the answer repeats, for measuring the round trip.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True, answered=True)
+    traits: ClassVar[Traits] = Traits(free=True, answered=True)
 
     n: int = 0
 
 
-class ClearStop(Request, frozen=True):
-    """Clear a stop: the arm accepts motion again. Nothing moves, and old targets are dropped."""
+class Undo(MotionRequest, frozen=True):
+    """Undo the last change of a goal, an object or a setting by this client.
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True)
-
-    def command(self) -> cmd.Command:
-        return cmd.ClearStop()
-
-
-class Speed(Request, frozen=True, kw_only=True):
-    """Set the maximum speed.
-
-    Attributes:
-        value: Fraction of full speed.
+    To undo a goal, the arm moves back to the earlier one. Refused while the arm is stopped, and
+    without a change since the last stop or change of driver.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
-
-    value: Annotated[float, Meta(ge=MIN_SPEED, le=MAX_SPEED)]
-
-    def command(self) -> cmd.Command:
-        return cmd.SpeedScale(self.value)
+    traits: ClassVar[Traits] = Traits(extension=True)
 
 
-class Tool(Request, frozen=True, kw_only=True):
-    """Choose the tool frame to which targets and read-outs refer. Nothing moves.
+class Redo(MotionRequest, frozen=True):
+    """Repeat the change by this client that was undone last, if no other change followed."""
 
-    Attributes:
-        name: Name of the tool frame; the answer ``arm`` lists them.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    name: Name
-
-    def command(self) -> cmd.Command:
-        return cmd.SetTool(self.name)
-
-
-class SetPriority(Request, frozen=True, kw_only=True):
-    """Choose which part of a target is kept when the arm cannot satisfy all of it.
-
-    Attributes:
-        priority: The part that is kept first.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    priority: Priority
-
-    def command(self) -> cmd.Command:
-        return cmd.SetPriority(self.priority)
-
-
-class Nudge(MotionRequest, frozen=True, kw_only=True):
-    """Move one joint by a relative angle, counted from its goal.
-
-    The new goal is limited to the range of the joint.
-
-    Attributes:
-        axis: Number of the joint, counted from 1.
-        by: Change of the goal [rad]; [m] for a joint that slides.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    axis: Annotated[int, Meta(ge=1, le=MAX_JOINTS)]
-    by: float
-
-    def command(self) -> cmd.Command:
-        return cmd.Nudge(self.axis - 1, self.by)
-
-
-class Pause(Request, frozen=True):
-    """Come to rest on the path and keep the target.
-
-    The requests ``pause``, ``resume`` and ``speed`` also act on a running program. Only its owner
-    may send them then: the page or API program that started it. A program that is being planned
-    starts paused.
-    """
-
-    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
-
-    def command(self) -> cmd.Command:
-        return cmd.Pause()
-
-
-class Resume(MotionRequest, frozen=True):
-    """Resume the motion after a pause."""
-
-    traits: ClassVar[RequestTraits] = RequestTraits(for_program=True)
-
-    def command(self) -> cmd.Command:
-        return cmd.Resume()
+    traits: ClassVar[Traits] = Traits(extension=True)
 
 
 class Watch(Request, frozen=True, kw_only=True):
@@ -262,7 +73,7 @@ class Watch(Request, frozen=True, kw_only=True):
         fields: Fields of the VRML world whose values each state includes.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(question=True)
+    traits: ClassVar[Traits] = Traits(question=True)
 
     hz: Annotated[float, Meta(ge=0.0, le=MAX_STATES_PER_SECOND)]
     fields: tuple[FieldName, ...] = ()
@@ -277,55 +88,22 @@ class Query(Request, frozen=True, kw_only=True):
             world, or the poses of the links.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
+    traits: ClassVar[Traits] = Traits(question=True, answered=True)
 
     at: Literal["state", "arm", "event_log", "branches", "loop", "objects", "world", "links"] = (
         "state"
     )
 
 
-AnyRequest = (
-    Hello
-    | Heartbeat
-    | Stop
-    | ClearStop
-    | Acquire
-    | Take
-    | Ask
-    | Withdraw
-    | ReleaseLease
-    | Give
-    | Decline
-    | Jog
-    | StepTool
-    | Speed
-    | Joint
-    | Joints
-    | Nudge
-    | Servo
-    | Pose
-    | Position
-    | Turn
-    | Orient
-    | Gripper
-    | Tool
-    | SetPriority
-    | Branch
-    | EndDrag
-    | Go
-    | Home
-    | GoToZero
-    | Hold
-    | OperateArm
-    | Pause
-    | Resume
-    | Set
-    | Get
-    | Watch
-    | Query
-    | Rename
+EVERY: tuple[type[Request], ...] = tuple(
+    kind
+    for kind in globals().values()
+    if isinstance(kind, type) and issubclass(kind, Request) and "traits" in vars(kind)
 )
-"""The requests that every server answers. Extensions answer more."""
+"""The classes of all requests of this module."""
+
+CORE = tuple(kind for kind in EVERY if not kind.traits.extension)
+"""The classes of the requests that every server answers. Extensions answer more."""
 
 
 class _Named(msgspec.Struct):
@@ -340,10 +118,12 @@ class RequestDecoder:
     """Decoder of the requests that a server answers, of the classes ``kinds``."""
 
     def __init__(self, added: tuple[type[Request], ...] = ()) -> None:
-        """Accept the requests of AnyRequest, and those of the classes ``added`` by extensions."""
-        kinds: Any = Union[(AnyRequest, *added)]
-        self.kinds: tuple[type[Request], ...] = get_args(kinds)
-        self._decoder: msgspec.json.Decoder[Request] = msgspec.json.Decoder(kinds)
+        """Accept the requests of CORE, and those of the classes ``added`` by extensions."""
+        self.kinds: tuple[type[Request], ...] = (*CORE, *added)
+        kinds: Any = Union[self.kinds]  # noqa: UP007
+        self._decoder: msgspec.json.Decoder[Request] = msgspec.json.Decoder(
+            kinds, dec_hook=decoded_field
+        )
         self._known = {tag_of(kind.__name__) for kind in self.kinds}
 
     def decoded(self, text: str | bytes) -> Request:
@@ -353,6 +133,8 @@ class RequestDecoder:
         try:
             return self._decoder.decode(text)
         except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            if isinstance(error.__cause__, InputError):
+                raise error.__cause__ from None
             name = _named(text).do
             if isinstance(name, str) and name not in self._known:
                 raise InputError(

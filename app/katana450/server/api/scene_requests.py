@@ -7,22 +7,14 @@ from typing import Annotated, ClassVar
 import msgspec
 from msgspec import Meta
 
-from katana450.arm.control.scene_objects import Attachment, Shape
-from katana450.server.api.fields import (
-    COMMAND,
-    FieldValue,
-    Frame,
-    Key,
-    Matrix4,
-    MotionRequest,
-    Name,
-    NodeName,
-    Request,
-    RequestTraits,
-)
+from katana450.arm.control.act import MotionRequest, Name, Request, Traits
+from katana450.arm.control.checked import Transform
+from katana450.arm.control.scene_objects import Shape
+from katana450.arm.control.tool_commands import Frame
+from katana450.server.api.fields import FieldValue, Key, NodeName
 
 
-class Place(Request, frozen=True, kw_only=True):
+class Place(Request, frozen=True, kw_only=True, eq=False):
     """Create an object, or change one. Fields that are not given keep their values.
 
     Attributes:
@@ -46,10 +38,10 @@ class Place(Request, frozen=True, kw_only=True):
         hidden: Whether the object is not drawn. It is checked for contacts nevertheless.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits(extension=True)
 
     name: Name
-    T: Matrix4 | None = None
+    T: Transform | None = None
     near: tuple[float, float] | None = None
     frame: Frame = Frame.BASE
     shape: Shape | None = None
@@ -62,24 +54,6 @@ class Place(Request, frozen=True, kw_only=True):
     hidden: bool | None = None
 
 
-class Attach(Request, frozen=True, kw_only=True):
-    """Fix an object to the hand, for example a camera or a tool, or release it to the world.
-
-    Attributes:
-        name: Name of the object.
-        to: Body to which the object is fixed. With `"table"` it is put down upright on the table
-            below.
-        T: (4, 4) Pose on the hand, in the frame of the arm's default tool. Without it the object
-            stays where it is.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    name: Name
-    to: Attachment
-    T: Matrix4 | None = None
-
-
 class Load(Request, frozen=True, kw_only=True):
     """Replace all objects and the water by those of an uploaded scene. The arm does not move.
 
@@ -87,33 +61,9 @@ class Load(Request, frozen=True, kw_only=True):
         scene: Key of the scene, from the answer to its upload.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits(extension=True)
 
     scene: Key
-
-
-class Remove(Request, frozen=True, kw_only=True):
-    """Remove an object.
-
-    Attributes:
-        name: Name of the object.
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    name: Name
-
-
-class Fill(Request, frozen=True, kw_only=True):
-    """Fill the cup with water, and remove all water elsewhere.
-
-    Attributes:
-        ml: Volume in the cup [ml].
-    """
-
-    traits: ClassVar[RequestTraits] = COMMAND
-
-    ml: Annotated[float, Meta(ge=0.0, le=1000.0)]
 
 
 class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -154,7 +104,7 @@ class Set(MotionRequest, frozen=True, kw_only=True):
         more: Further fields to set at the same time.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits()
 
     node: NodeName
     field: NodeName
@@ -171,7 +121,7 @@ class Get(Request, frozen=True, kw_only=True):
         more: Further fields to read at the same time.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(question=True, answered=True)
+    traits: ClassVar[Traits] = Traits(question=True, answered=True)
 
     node: NodeName
     field: NodeName

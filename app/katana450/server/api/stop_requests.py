@@ -1,4 +1,8 @@
-"""The two requests that the process of STOP reads; this module loads fast."""
+"""Requests about a stop, and the first on a connection. This module loads fast.
+
+The process of STOP reads two of them. The gate makes the commands ``Stop`` and ``ClearStop`` of
+these requests, with the cause and the time that it knows.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,8 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.server.api.fields import COMMAND, Name, Press, Request, RequestTraits
+from katana450.arm.control.act import Name, Request, Traits
+from katana450.server.api.fields import Press
 
 
 class Hello(Request, frozen=True, kw_only=True):
@@ -17,7 +22,7 @@ class Hello(Request, frozen=True, kw_only=True):
         token: Token of an access link, where the server requires one.
     """
 
-    traits: ClassVar[RequestTraits] = COMMAND
+    traits: ClassVar[Traits] = Traits()
 
     name: Name
     token: Annotated[str, Meta(max_length=400)] = ""
@@ -32,6 +37,12 @@ class Stop(Request, frozen=True, kw_only=True):
             between.
     """
 
-    traits: ClassVar[RequestTraits] = RequestTraits(free=True, safety=True)
+    traits: ClassVar[Traits] = Traits(free=True, safety=True)
 
     press: Press = None
+
+
+class ClearStop(Request, frozen=True):
+    """Clear a stop: the arm accepts motion again. Nothing moves, and old targets are dropped."""
+
+    traits: ClassVar[Traits] = Traits(free=True)

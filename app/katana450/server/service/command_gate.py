@@ -231,7 +231,7 @@ class CommandGate:
             self._waits = True
             self.settle()
             with suppress(InputError):
-                arm.deliver(cmd.Hold(finding=cause), replace(SERVER, grounds=Grounds.SERVER))
+                arm.deliver(cmd.HoldFor(cause), replace(SERVER, grounds=Grounds.SERVER))
 
     def settle(self) -> None:
         """Void every gesture, and refuse motion for SETTLE_TIME.

@@ -10,12 +10,11 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.branch_options import branch_named
+from katana450.arm.control.act import Request
 from katana450.arm.control.lease import Role
 from katana450.arm.control.state import Verdict
 from katana450.errors import InputError, KatanaError, LeaseError
-from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests
 from katana450.server.service import serialize
 from katana450.server.service.arm_handle import ArmHandle
@@ -49,7 +48,7 @@ class Dispatcher:
         self._hub = hub
 
     def handle(
-        self, participant: Participant, request: requests.Request, budget: Budget
+        self, participant: Participant, request: Request, budget: Budget
     ) -> answers.Answer | PendingAnswer:
         """Execute ``request`` and return its answer. Counts as a heartbeat of ``participant``.
 
@@ -84,7 +83,7 @@ class Dispatcher:
             return PendingAnswer(self._hub, participant, answer, wait, fingers=fingers)
         return answer
 
-    def _execute(self, participant: Participant, request: requests.Request) -> answers.Answer:
+    def _execute(self, participant: Participant, request: Request) -> answers.Answer:
         hub = self._hub
         still = request.traits.free or request.traits.question
         limit = math.inf if still else hub.gate.sample_delay
@@ -115,12 +114,12 @@ class Dispatcher:
         revocations = hub.gate.revocations
         ticket = hub.move(participant, command, seen=request.revocations, delay=delay)
         # A stream does not wait for its answers. A command that is planned first has no ticket yet.
-        at_once = request.traits.stream or command.traits.planned or not ticket
+        at_once = request.traits.at_once or command.traits.planned or not ticket
         done = _done(ticket, ACCEPTED if at_once else None, _misfit(request))
         return msgspec.structs.replace(done, revocations=revocations)
 
     def _handled(
-        self, participant: Participant, request: requests.Request
+        self, participant: Participant, request: Request
     ) -> answers.Answer | cmd.Command | None:
         """Return what the handler of ``request`` does; None for a request of the core."""
         for handler in self._hub.handlers:
@@ -131,7 +130,7 @@ class Dispatcher:
                 return handler.handle(participant, request)
         return None
 
-    def _change_lease(self, participant: Participant, request: requests.Request) -> None:
+    def _change_lease(self, participant: Participant, request: Request) -> None:
         """Execute a request about the lease."""
         hub = self._hub
         match request:
@@ -152,30 +151,20 @@ class Dispatcher:
             case requests.Rename(name=name):
                 hub.rename(participant, name)
 
-    def _command(self, request: requests.Request) -> cmd.Command | None:
+    def _command(self, request: Request) -> cmd.Command | None:
         """Return the command of ``request``; None for a request about the lease."""
         match request:
-            case requests.Pose(T=T, frame=frame):
-                return cmd.SetPose(self._in_shoulder(frame) @ se3.validated(T))
-            case requests.Position(p=p, frame=frame):
-                return cmd.MoveTool((self._in_shoulder(frame) @ np.array([*p, 1.0]))[:3])
-            case requests.Orient(R=R, frame=frame):
-                rotation = so3.validated(np.array(R))
-                return cmd.OrientTool(self._in_shoulder(frame)[:3, :3] @ rotation)
-            case requests.Branch(name=name, shoulder=shoulder, elbow=elbow):
-                name = name or f"{shoulder}-{elbow}"
-                return cmd.TakeBranch(branch_named(self._hub.present().arm, name))
+            case requests.Position() | requests.Pose() | requests.Orient():
+                at_base = request.frame is requests.Frame.BASE
+                T = self._hub.present().arm.T_base_shoulder if at_base else np.eye(4)
+                return request.in_shoulder(T)
             case requests.Set(node=node, field=field, value=value, more=more):
                 arm = self._hub.present()
                 first = requests.FieldSetting(node=node, field=field, value=value)
                 return arm.nodes.command(arm.state, (first, *more))
-        return request.command()
-
-    def _in_shoulder(self, frame: requests.Frame) -> FloatArray:
-        """Return the transform (4, 4) from ``frame`` to {S}."""
-        if frame is requests.Frame.SHOULDER:
-            return np.eye(4)
-        return se3.inverse(self._hub.present().arm.T_base_shoulder)
+            case requests.ClearStop():
+                return cmd.ClearStop()
+        return request if isinstance(request, cmd.Command) else None
 
     def query(self, at: str) -> answers.Answer:
         """Return the answer to a ``query`` of ``at``. Raises LeaseError while there is no arm."""
@@ -210,8 +199,8 @@ def _done(ticket: int | None, outcome: str | None, misfit: float | None = None) 
     return answers.Done(ticket=ticket or None, outcome=outcome, rotation_misfit=misfit)
 
 
-def _misfit(request: requests.Request) -> float | None:
+def _misfit(request: Request) -> float | None:
     """Return ``so3.misfit`` of the pose in ``request``; None without a pose."""
-    if isinstance(request, requests.Pose | requests.Place | requests.Attach) and request.T:
-        return so3.misfit(np.array(request.T)[:3, :3])
+    if isinstance(request, requests.Pose | requests.Place | requests.Attach):
+        return None if request.T is None else so3.misfit(request.T[:3, :3])
     return None

@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from katana450.arm.control.act import Command
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.lease import Lease, Person, Role
-from katana450.arm.control.traits import BaseCommand
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.errors import KatanaError
 
@@ -85,7 +85,7 @@ class Recorder:
         else:
             self.lost += 1
 
-    def command(self, command: BaseCommand, actor: Actor, ticket: int) -> None:
+    def command(self, command: Command, actor: Actor, ticket: int) -> None:
         """Note an accepted command."""
         self.note("command", actor, command, outcome=ACCEPTED, ticket=ticket)
 

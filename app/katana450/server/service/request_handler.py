@@ -6,8 +6,8 @@ from argparse import Namespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import Request
 from katana450.server.api import answers
-from katana450.server.api.fields import Request
 
 if TYPE_CHECKING:
     from katana450.server.service.hub import Hub

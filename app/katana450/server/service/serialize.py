@@ -8,6 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from katana450.arm.control import state as control
+from katana450.arm.control.act import tag_of
 from katana450.arm.control.arm_report import ArmReport
 from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.grip import touching
@@ -27,7 +28,6 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
-from katana450.server.api.fields import tag_of
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.derived import once
 from katana450.server.service.event_log import UNITS, LogLine

@@ -13,8 +13,8 @@ from html import escape
 
 import viser
 
-from katana450.arm.control.branch_options import BranchOption, branch_named
-from katana450.arm.control.commands import TakeBranch
+from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.commands import Branch
 from katana450.arm.control.messages import degrees, part, short
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
@@ -78,8 +78,7 @@ class BranchList:
             tuple(map(str, self._branches)),
             hint="Moves the arm to this branch; the target of the tool stays the same",
         )
-        arm = robot.require_arm()
-        listen(take, lambda: TakeBranch(branch_named(arm, take.value)))
+        listen(take, lambda: Branch(name=take.value))
 
     def follow(self, state: State, now: float) -> None:
         """Update the branches for ``state`` at time ``now`` [s].
@@ -123,7 +122,7 @@ class BranchList:
         name = f"/branch/{branch}"
         ghost = GhostNodes(self._server, self._robot, name, COLOURS[number], OPACITY)
         for shape in ghost.shapes:
-            self._listen(shape, lambda: TakeBranch(branch))
+            self._listen(shape, lambda: Branch(name=str(branch)))
         return ghost
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, EndDrag, MoveTool, TurnTool
+from katana450.arm.control.commands import Command, EndDrag, Position, Turn
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
@@ -159,7 +159,7 @@ class Gizmo:
         if event.phase == "end":
             del self._held["move"]
         p = np.asarray(event.target.position, dtype=float) - self._arm.T_base_shoulder[:3, 3]
-        command = MoveTool(p @ self._arm.T_base_shoulder[:3, :3])
+        command = Position(p @ self._arm.T_base_shoulder[:3, :3])
         self._submit(event, actor, command, tuple(event.target.position.tolist()))
 
     def _submit(
@@ -188,14 +188,14 @@ class Gizmo:
         actor = self._gestures.actor(event.client_id)
         turn = self._turning(event, actor, "pitch")
         if turn is not None:
-            command = TurnTool(turn.pitch + turn.turned, turn.roll)
+            command = Turn(turn.pitch + turn.turned, turn.roll)
             self._submit(event, actor, command, (command.pitch, command.roll))
 
     async def _rolled(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
         turn = self._turning(event, actor, "roll")
         if turn is not None:
-            command = TurnTool(turn.pitch, turn.roll + turn.turned)
+            command = Turn(turn.pitch, turn.roll + turn.turned)
             self._submit(event, actor, command, (command.pitch, command.roll))
 
     def _turning(

@@ -114,7 +114,7 @@ class Panel:
             f"{degrees(chain.lower[axis], 2)} to {degrees(chain.upper[axis], 2)}",
         )
         slider.precision = 2
-        self._on_person(slider, lambda: cmd.SetJoint(axis, math.radians(slider.value)))
+        self._on_person(slider, lambda: cmd.Joint(axis + 1, math.radians(slider.value)))
         return slider
 
     def _finger(self, state: State) -> viser.GuiSliderHandle[float]:
@@ -130,12 +130,12 @@ class Panel:
             f"100 is open ({named(fingers.opened)})",
         )
         slider.precision = 1
-        self._on_person(slider, lambda: cmd.SetGripper(self._finger_angle(slider.value)))
+        self._on_person(slider, lambda: cmd.Gripper(self._finger_angle(slider.value)))
         ends_of = {"Open": fingers.opened, "Close": fingers.closed}
         buttons = self._gui.add_button_group(
             "Fingers", tuple(ends_of), hint="Opens or closes the gripper as far as it goes"
         )
-        self._on_person(buttons, lambda: cmd.SetGripper(ends_of[buttons.value]))
+        self._on_person(buttons, lambda: cmd.Gripper(ends_of[buttons.value]))
         return slider
 
     def _opening(self, angle: float) -> float:

@@ -37,7 +37,7 @@ class PoseForm:
             initial_value=state.tool,
             hint="The frame of the gizmo, these numbers and the read-out",
         )
-        listen(self._tool, lambda: cmd.SetTool(self._tool.value))
+        listen(self._tool, lambda: cmd.Tool(self._tool.value))
         self._priority = gui.add_dropdown(
             "Priority",
             tuple(name for name, _ in self._priorities.values()),
@@ -73,7 +73,7 @@ class PoseForm:
         copy = gui.add_button("Copy current", hint="Fills in the present pose of the tool")
         copy.on_click(self._copy)
         go = gui.add_button("Go to pose", hint="Or to the nearest possible pose")
-        listen(go, lambda: cmd.SetPose(self.display.pose(self._position.value, self._angles.value)))
+        listen(go, lambda: cmd.Pose(self.display.pose(self._position.value, self._angles.value)))
 
     def follow(self, state: State) -> None:
         """Remember ``state``, whose pose can be copied."""

@@ -16,9 +16,9 @@ from typing import Any, Protocol
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from katana450.arm.control.act import Id
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import Id
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival

@@ -17,11 +17,12 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
+from katana450.arm.control.act import Id
 from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.lease import LEASE_TIMEOUT
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
-from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT, Id
+from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT
 from katana450.server.service.budget import HTTP_REQUEST_COST, Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import Dispatcher, driver_key
 from katana450.server.service.hub import Hub

@@ -96,9 +96,9 @@ class ProgramParticipant:
         ticket = None
         for command in commands:
             sent = command
-            if isinstance(command, cmd.SpeedScale):
+            if isinstance(command, cmd.Speed):
                 self._commanded = min(command.value, self.allowed)
-                sent = cmd.SpeedScale(self._commanded)
+                sent = cmd.Speed(self._commanded)
             ticket = self._hub.move(self.joined, sent)
         return ticket
 
@@ -112,13 +112,13 @@ class ProgramParticipant:
         left = None if hub.present().state.tool == tool else LeftTool(tool, self._owner)
         if self.drives and left is not None:
             with suppress(InputError, LeaseError):
-                self.send(cmd.SetTool(tool))
+                self.send(cmd.Tool(tool))
                 left = None
         stopped = hub.gate.stopped or hub.present().state.stopped
         hub.gate.ended = hub.gate.program if self.drives and stopped is not None else None
         hub.gate.program = None
         with suppress(InputError):
-            hub.gate.submit(cmd.SpeedScale(self._speed), SERVER)
+            hub.gate.submit(cmd.Speed(self._speed), SERVER)
         if self.drives:
             hub.release_lease(self.joined)
         hub.leave(self.joined, for_good=True)
@@ -143,7 +143,7 @@ class LeftTool:
         participant = self.owner if holder is None else hub.participant(holder.key)
         if participant is not None and isinstance(arm.state.mode, Idle):
             with suppress(InputError, LeaseError):
-                hub.move(participant, cmd.SetTool(self.tool))
+                hub.move(participant, cmd.Tool(self.tool))
                 if holder is None:
                     hub.release_lease(participant)
         return None

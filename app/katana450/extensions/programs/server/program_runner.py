@@ -15,6 +15,7 @@ from functools import partial
 import msgspec
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import Request
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
@@ -36,7 +37,6 @@ from katana450.extensions.programs.server.run_progress import run_progress
 from katana450.extensions.programs.server.state_line import RunNews
 from katana450.server.api import answers
 from katana450.server.api import program_requests as requests
-from katana450.server.api.fields import Request
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
