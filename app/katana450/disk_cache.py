@@ -55,7 +55,7 @@ def kept(make: Callable[[], T], kind: type[T], *inputs: bytes | str | np.ndarray
         return make()
     name = f"{make.__module__}.{make.__qualname__}"
     file = folder / _digest((_surroundings(), name, *inputs)).hex()
-    with suppress(OSError, _DamagedError):
+    with suppress(OSError, DamagedError):
         found: T = _loaded(file.read_bytes(), kind)
         with suppress(OSError):
             os.utime(file)
@@ -66,8 +66,8 @@ def kept(make: Callable[[], T], kind: type[T], *inputs: bytes | str | np.ndarray
     return value
 
 
-class _DamagedError(Exception):
-    """A file that cannot be used."""
+class DamagedError(Exception):
+    """Bytes that do not hold the value."""
 
 
 def _digest(parts: Iterable[bytes | str | np.ndarray[Any, Any]]) -> bytes:
@@ -116,22 +116,32 @@ def _folder() -> Path | None:
 
 
 def _loaded(data: bytes, kind: type[T]) -> T:
-    """Return the value in the content of a file. Raises _DamagedError."""
+    """Return the value in the content of a file. Raises DamagedError."""
     if hashlib.sha256(data[HASH_LENGTH:]).digest() != data[:HASH_LENGTH]:
-        raise _DamagedError
-    try:
-        return msgspec.msgpack.decode(data[HASH_LENGTH:], type=kind, dec_hook=_restored)
-    except (msgspec.MsgspecError, TypeError, ValueError) as error:
-        raise _DamagedError from error
+        raise DamagedError
+    return decoded(data[HASH_LENGTH:], kind)
 
 
 def _store(file: Path, value: object) -> None:
     """Write ``value`` whole or not at all. Raises InputError."""
-    content = msgspec.msgpack.encode(value, enc_hook=_plain)
+    content = encoded(value)
     write_files({file: writer_of(hashlib.sha256(content).digest() + content)}, mode=0o600)
     files = sorted(file.parent.iterdir(), key=lambda each: each.stat().st_mtime)
     for each in files[:-MAX_FILES]:
         each.unlink(missing_ok=True)
+
+
+def encoded(value: object) -> bytes:
+    """Return ``value`` as bytes from which ``decoded`` restores it. Raises TypeError."""
+    return msgspec.msgpack.encode(value, enc_hook=_plain)
+
+
+def decoded(data: bytes, kind: type[T]) -> T:
+    """Return the value of the type ``kind``; see ``kept``. Raises DamagedError; runs no code."""
+    try:
+        return msgspec.msgpack.decode(data, type=kind, dec_hook=_restored)
+    except (msgspec.MsgspecError, TypeError, ValueError) as error:
+        raise DamagedError from error
 
 
 def _plain(value: Any) -> object:

@@ -106,13 +106,16 @@ def test_the_answer_has_a_coarser_mesh_and_the_hull_of_the_whole(
     assert drawn(whole) is whole
     monkeypatch.setattr(reading, "MAX_DRAWN", 2000)
     found = answer(data, Format.WRL, "a.wrl", 1e-2, Up.Z, "")
-    faces, text = np.asarray(found["faces"]), str(found["text"])
+    assert found.shape is not None
+    assert found.body is not None
+    faces, text = found.shape.faces, found.shape.text
     assert 1000 < len(faces) <= 2000
-    assert len(np.asarray(found["colours"])) == len(faces)
+    assert found.shape.colours is not None
+    assert len(found.shape.colours) == len(faces)
     assert text.startswith("5760 triangles, 100 × 60 × 20 mm")
     assert f"It is drawn with {len(faces)} triangles, whose corners are up to" in text
     body = convex_body(whole.vertices)
-    np.testing.assert_array_equal(np.asarray(found["corners"]), body.corners)
+    np.testing.assert_array_equal(found.body.corners, body.corners)
 
 
 @pytest.mark.long

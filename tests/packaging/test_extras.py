@@ -32,7 +32,7 @@ steps:
 
 def read(data: bytes, format: Format) -> str:
     """Return why the reader refuses ``data``."""
-    return str(answer(data, format, f"a.{format.value}", None, None, "")["error"])
+    return answer(data, format, f"a.{format.value}", None, None, "").error
 
 
 def test_each_missing_extra_is_named_with_its_command(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +41,11 @@ class ConvexBody:
     off: float
     thickened: bool
     volume: float
+
+    def scaled(self, factor: float) -> ConvexBody:
+        """Return it ``factor`` times as large."""
+        corners = frozen(self.corners * factor)
+        return replace(self, corners=corners, off=self.off * factor, volume=self.volume * factor**3)
 
 
 def convex_body(points: npt.ArrayLike) -> ConvexBody:

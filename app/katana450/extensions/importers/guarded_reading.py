@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import subprocess
 import sys
@@ -10,11 +9,11 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
-import numpy as np
-
+from katana450.disk_cache import decoded
 from katana450.errors import InputError
 from katana450.extensions.convex_body import ConvexBody
 from katana450.extensions.importers.archive import ChoiceError, packed
@@ -29,7 +28,6 @@ from katana450.extensions.importers.shape_file import (
     check_file,
     label,
 )
-from katana450.maths.geometry.arrays import frozen
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.platform_support import hanging_time
 
@@ -41,6 +39,25 @@ MAX_PASSES = 8
 
 MAX_COMPANIONS = 500
 """Maximum number of files that a file may name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """The answer of the subprocess.
+
+    Attributes:
+        shape, body: the shape and its convex body; None if the file is refused.
+        error: the reason for that.
+        choices: paths of shape files, one of which must be chosen.
+        missing: paths of files that are named and not there.
+    """
+
+    shape: ShapeFile | None = None
+    body: ConvexBody | None = None
+    error: str = ""
+    choices: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+
 
 Beside = Callable[[str, int], bytes | None]
 """A function that returns the content of a file by its path in the folder of the shape file, up to
@@ -71,42 +88,25 @@ def read_shape_guarded(
     words = ["" if unit is None else str(float(unit)), "" if up is None else up.value]
     own = Path(name.replace("\\", "/")).name or f"shape.{format.value}"
     companions: dict[str, bytes] = {}
-    found = _parsed(data, [format.value, file, *words, main], file)
+    answer = _parsed(data, [format.value, file, *words, main], file)
     # What a .zip names is in it.
     for _ in range(0 if format is Format.ZIP else MAX_PASSES):
         left = MAX_FILE_BYTES - len(data) - sum(map(len, companions.values()))
-        more = _companions(found, beside, companions.keys() | {own}, file, left)
+        more = _companions(answer, beside, companions.keys() | {own}, file, left)
         if not more:
             break
         companions |= more
         bundle = packed(own, {own: data} | companions)
-        found = _parsed(bundle, [Format.ZIP.value, file, *words, own], file)
-    if "choices" in found:
-        raise ChoiceError(str(found["error"]), map(str, found["choices"]))
-    if "error" in found:
-        raise InputError(str(found["error"]))
-    shape = ShapeFile(
-        str(found["name"]),
-        found["vertices"],
-        found["faces"],
-        found.get("colours"),
-        float(found["unit"]),
-        str(found["text"]),
-        float(found["scale"]),
-        Format(str(found["format"])),
-        found["content"].tobytes() if "content" in found else data,
-    )
-    body = ConvexBody(
-        frozen(found["corners"]),
-        float(found["off"]),
-        bool(found["thickened"]),
-        float(found["volume"]),
-    )
-    return shape, body
+        answer = _parsed(bundle, [Format.ZIP.value, file, *words, own], file)
+    if answer.choices:
+        raise ChoiceError(answer.error, answer.choices)
+    if answer.shape is None or answer.body is None:
+        raise InputError(answer.error)
+    return answer.shape, answer.body
 
 
 def _companions(
-    found: dict[str, Any], beside: Beside | None, known: set[str], file: str, left: int
+    answer: Answer, beside: Beside | None, known: set[str], file: str, left: int
 ) -> dict[str, bytes]:
     """Return those files beside a file that it names and that are not ``known`` yet.
 
@@ -114,7 +114,7 @@ def _companions(
     """
     if beside is None:
         return {}
-    paths = [path for path in map(str, found["missing"]) if is_inside(path) and path not in known]
+    paths = [path for path in answer.missing if is_inside(path) and path not in known]
     if len(paths) + len(known) > MAX_COMPANIONS:
         raise InputError(f"{file} names more than {MAX_COMPANIONS} other files.")
     contents: dict[str, bytes] = {}
@@ -131,7 +131,7 @@ def _companions(
     return contents
 
 
-def _parsed(data: bytes, words: list[str], file: str) -> dict[str, Any]:
+def _parsed(data: bytes, words: list[str], file: str) -> Answer:
     """Return the answer of a new subprocess that reads ``data``."""
     # One thread, because a pool for every core would take address space, which is limited.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -154,8 +154,7 @@ def _parsed(data: bytes, words: list[str], file: str) -> dict[str, Any]:
             f"{file} cannot be read: it needs more than {SECONDS:g} s of processor time or "
             f"{MAX_MEMORY_BYTES >> 20} MiB, or the file is corrupt. Try a simpler export."
         )
-    with np.load(io.BytesIO(output), allow_pickle=False) as found:
-        return dict(found)
+    return decoded(output, Answer)
 
 
 def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:

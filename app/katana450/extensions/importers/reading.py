@@ -1,24 +1,19 @@
-"""The subprocess that reads one shape from standard input and writes .npz to standard output.
+"""The subprocess that reads one shape from standard input and writes an ``Answer``.
 
 `read_shape_guarded` starts it as ``python -m katana450.extensions.importers.reading FORMAT NAME
-UNIT UP MAIN``. It limits its memory and time before it reads its input. Keys of the .npz: those of
-`ShapeFile`, without colours if there are none, and content in place of file, unless that is the
-input itself; corners, off, thickened and volume of the convex body. Or error with a message, and
-choices if one of several files must be chosen. Always missing: paths of files that are named and
-not there.
+UNIT UP MAIN``. It limits its memory and time before it reads its input.
 """
 
 from __future__ import annotations
 
-import io
 import sys
 from dataclasses import replace
 
-import numpy as np
-
+from katana450.disk_cache import encoded
 from katana450.errors import KatanaError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.importers.archive import ChoiceError
+from katana450.extensions.importers.guarded_reading import Answer
 from katana450.extensions.importers.shape_file import (
     MAX_MEMORY_BYTES,
     SECONDS,
@@ -44,36 +39,21 @@ def main(arguments: list[str]) -> None:
         Up(up) if up else None,
         chosen,
     )
-    buffer = io.BytesIO()
-    arrays = {key: np.array(value) for key, value in found.items() if value is not None}
-    np.savez(buffer, allow_pickle=False, **arrays)
-    sys.stdout.buffer.write(buffer.getvalue())
+    sys.stdout.buffer.write(encoded(found))
 
 
 def answer(
     data: bytes, format: Format, name: str, unit: float | None, up: Up | None, main: str
-) -> dict[str, object]:
-    """Return the content of the .npz for a file; arguments as those of `read_shape`."""
-    found: dict[str, object] = {}
+) -> Answer:
+    """Return the answer for a file; arguments as those of `read_shape`."""
     missing: list[str] = []
     try:
         shape = read_shape(data, format, name, unit, up, main=main, missing=missing)
-        body = convex_body(shape.vertices * shape.scale)
-        shape = drawn(shape)
+        body = convex_body(shape.vertices * shape.scale).scaled(1.0 / shape.scale)
     except KatanaError as error:
-        found["error"] = str(error)
-        if isinstance(error, ChoiceError):
-            found["choices"] = error.choices
-    else:
-        found = vars(shape) | vars(body) | {"format": shape.format.value}
-        found["corners"] = body.corners / shape.scale
-        found["off"] = body.off / shape.scale
-        found["volume"] = body.volume / shape.scale**3
-        del found["file"]
-        if shape.file is not data:
-            found["content"] = np.frombuffer(shape.file, np.uint8)
-    found["missing"] = np.array(missing, dtype=str)
-    return found
+        choices = error.choices if isinstance(error, ChoiceError) else ()
+        return Answer(error=str(error), choices=choices, missing=tuple(missing))
+    return Answer(drawn(shape), body, missing=tuple(missing))
 
 
 def drawn(shape: ShapeFile) -> ShapeFile:
