@@ -254,15 +254,6 @@ def test_links_have_the_same_poses(
         assert compiled.link_name(len(robot.links)) is None
 
 
-@needs("gcc")
-def test_fk_and_frames_agree(katana: Robot, katana_in_c: Compiled) -> None:
-    q = np.array((0.4, -1.187, 1.484, 0.14, 0.5, 0.2))
-    arm = katana.require_arm()
-    place = [link.name for link in katana.links].index(arm.default_tool)
-    there = katana_in_c.frames(q, len(katana.links))[place]
-    np.testing.assert_allclose(arm.T_base_shoulder @ katana_in_c.tool(q[:5]), there, atol=1e-12)
-
-
 @needs("gcc", "nm")
 def test_nothing_is_allocated(tmp_path: Path, katana: Robot) -> None:
     """The objects call functions of mathematics only."""

@@ -220,14 +220,6 @@ def test_the_same_robot_gives_the_same_bytes_and_no_file_twice() -> None:
     assert len(names) == len(set(names))
 
 
-def test_a_robot_without_meshes_has_a_package_too() -> None:
-    ((name, content),) = package_files(GANTRY).items()
-    assert name == "gantry_2_description.zip"
-    assert (
-        "gantry_2_description/urdf/gantry_2.urdf" in zipfile.ZipFile(io.BytesIO(content)).namelist()
-    )
-
-
 @pytest.mark.parametrize("kind", ["glb", "urdf"])
 @pytest.mark.parametrize("suffix", [".glb", ".dae", ".xyz"])
 def test_an_unreadable_mesh_is_reported_by_name(

@@ -77,11 +77,3 @@ def test_page_shows_the_robot(urdf: Path, tmp_path: Path) -> None:
     path = tmp_path / "one.html"
     assert main(["export", "html", "--urdf", str(urdf), "--out", str(path)]) == 0
     assert f"{urdf.stem}: one pose" in path.read_text(encoding="utf-8")
-
-
-def test_name_of_a_robot_and_a_file_are_refused_together(
-    urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = ["--out", str(tmp_path / "one.png"), "--urdf", str(urdf)]
-    assert main(["render", *out, "--arm", "ur5e"]) == 1
-    assert "name two robots" in capsys.readouterr().err

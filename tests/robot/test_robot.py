@@ -59,15 +59,6 @@ def test_the_chain_agrees_with_yourdfpy_everywhere(robot: Robot, arm: MountedArm
             assert np.allclose(T, urdf.get_transform(tool), atol=1e-12)
 
 
-def test_drawn_links_have_the_poses_of_yourdfpy(robot: Robot) -> None:
-    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
-    q = np.array([0.4, -1.0, 0.7, 0.5, 1.1])
-    angles = robot.joint_values(q, 0.2)
-    urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
-    for name, T in robot.frames(angles).items():
-        assert np.allclose(T, urdf.get_transform(name), atol=1e-12), name
-
-
 def test_both_fingers_follow_one_joint(robot: Robot, arm: MountedArm) -> None:
     angles = robot.joint_values(np.zeros(5), 0.2)
     fingers = {name: angle for name, angle in angles.items() if name.startswith("finger")}
@@ -97,24 +88,6 @@ def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
     changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290')).require_arm()
     assert changed.tools["tcp"][0, 3] == pytest.approx(0.7318)
     assert math.isclose(changed.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            'xyz="0.190',
-            'xyz="wide',
-            r"edited.urdf, line \d+: xyz='wide .* 3 finite numbers",
-        ),
-    ],
-)
-def test_an_unusable_file_is_refused_with_a_reason(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
-    path = edited(tmp_path, old, new)
-    with pytest.raises(RobotDescriptionError, match=message):
-        load(path)
 
 
 def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -> None:
