@@ -6,20 +6,10 @@ import re
 from collections.abc import Mapping
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import (
-    FIELDS,
-    KEYWORDS,
-    LISTS,
-    WIDTHS,
-    Node,
-    Route,
-    Type,
-    Use,
-    Value,
-    World,
-)
+from katana450.extensions.export.vrml_node import KEYWORDS, Node, Route, Use, Value, World
 from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.vrml_reader import Reader
+from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 
 EVENTS: Mapping[tuple[str, str], Type] = {
     ("TimeSensor", "fraction_changed"): Type.FLOAT,
@@ -76,9 +66,11 @@ class StrictReader(Reader):
         if field not in FIELDS[kind]:
             raise self._error(f"{kind} has no field {field!r}")
         type_ = FIELDS[kind][field]
-        numbers = value if isinstance(value, tuple) else (value,)
+        numbers = value if isinstance(value, tuple | list) else (value,)
         if type_ is Type.BOOL and not isinstance(value, bool):
             raise self._error(f"{field} is not TRUE or FALSE")
+        if isinstance(value, list) and type_ not in LISTS:
+            raise self._error(f"{field} is not a list")
         if type_ not in WIDTHS:
             return
         if not all(isinstance(number, float | int) for number in numbers):

@@ -17,17 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.export.rows import DIGITS
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.export.vrml import part_world, views, vrml_files, world_of
-from katana450.extensions.export.vrml_node import (
-    FIELDS,
-    KEYWORDS,
-    LISTS,
-    WIDTHS,
-    Node,
-    Type,
-    Use,
-    Value,
-    World,
-)
+from katana450.extensions.export.vrml_node import KEYWORDS, Node, Use, Value, World
 from katana450.extensions.export.vrml_text import HEADER, world_text
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
@@ -35,6 +25,7 @@ from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.strict_vrml import read_world
 from tests.exchange.tools import SCREEN, needs, run
+from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 
 pytestmark = pytest.mark.long
 
@@ -62,17 +53,17 @@ def values(kind: Type, nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Valu
         case Type.STRING:
             return texts
         case Type.STRING_LIST:
-            return st.lists(texts, max_size=3).map(tuple)
+            return st.lists(texts, max_size=3)
         case Type.INT_LIST:
-            return st.lists(st.integers(-(2**31), 2**31 - 1), max_size=9).map(tuple)
+            return st.lists(st.integers(-(2**31), 2**31 - 1), max_size=9)
         case Type.NODE:
             return nodes
         case Type.NODE_LIST:
-            return st.lists(nodes, max_size=3).map(tuple)
+            return st.lists(nodes, max_size=3)
     width = WIDTHS[kind]
     if kind in LISTS:
         rows = st.lists(st.tuples(*[numbers] * width), max_size=40)
-        return rows.map(lambda rows: tuple(number for row in rows for number in row))
+        return rows.map(lambda rows: [number for row in rows for number in row])
     return numbers if width == 1 else st.tuples(*[numbers] * width)
 
 
@@ -92,8 +83,8 @@ def plain(nodes: st.SearchStrategy[Node]) -> st.SearchStrategy[Node]:
 @settings(max_examples=40)
 @given(st.lists(plain(st.just(Node("Shape"))), max_size=3), names)
 def test_any_world_is_read_back_as_it_was_written(nodes: list[Node], name: str) -> None:
-    first = Node("Group", (("children", tuple(nodes)),), name)
-    again = Node("Group", (("children", (Use(name),)),))
+    first = Node("Group", (("children", nodes),), name)
+    again = Node("Group", (("children", [Use(name)]),))
     world = World((first, again))
     assert read_world(world_text(world)) == world
 
@@ -125,7 +116,7 @@ def placed_points(world: World) -> Iterator[tuple[str, Matrix]]:
             points = field(node, "point", ()).reshape(-1, 3)
             yield name, points @ T[:3, :3].T + T[:3, 3]
         for _, value in node.fields:
-            for part in value if isinstance(value, tuple) else (value,):
+            for part in value if isinstance(value, list) else (value,):
                 if isinstance(part, Node):
                     yield from visit(part, T, name)
 

@@ -24,7 +24,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import initial_objects, world_of
-from katana450.extensions.export.vrml_node import FIELDS, Node, World
+from katana450.extensions.export.vrml_node import Node, World
 from katana450.extensions.export.vrml_nodes import VrmlNodes
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
@@ -32,6 +32,7 @@ from katana450.server.api import requests
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.joint_rotations import THERE, rotation
+from tests.exchange.vrml_types import FIELDS
 from tests.robot.public_arms import PX150, J, written
 
 

@@ -14,22 +14,13 @@ from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.trajectory_file import load_motion
 from katana450.extensions.export.vrml import views, world_of
-from katana450.extensions.export.vrml_node import (
-    FIELDS,
-    LISTS,
-    WIDTHS,
-    Node,
-    Route,
-    Type,
-    Use,
-    Value,
-    World,
-)
+from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
 from katana450.extensions.export.vrml_text import x3d_text
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, needs, run
+from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 
 INSIDE = {
     "Appearance": "appearance",
@@ -64,7 +55,7 @@ def node(element: ElementTree.Element) -> Node | Use:
                 if INSIDE[each.tag] == name:
                     fields[name] = node(each)
         elif kind is Type.NODE_LIST:
-            fields[name] = tuple(node(each) for each in element)
+            fields[name] = [node(each) for each in element]
     return Node(element.tag, tuple(fields.items()), element.attrib.get("DEF"))
 
 
@@ -76,25 +67,27 @@ def value(kind: Type, text: str) -> Value:
             return text
         case Type.STRING_LIST:
             found = re.findall(r'"((?:[^"\\]|\\.)*)"', text)
-            return tuple(re.sub(r"\\(.)", r"\1", each) for each in found)
+            return [re.sub(r"\\(.)", r"\1", each) for each in found]
     number = int if kind in (Type.INT, Type.INT_LIST) else float
-    numbers = tuple(number(each) for each in text.split())
-    return numbers if kind in LISTS or WIDTHS[kind] > 1 else numbers[0]
+    numbers = [number(each) for each in text.split()]
+    if kind in LISTS:
+        return numbers
+    return tuple(numbers) if WIDTHS[kind] > 1 else numbers[0]
 
 
 def in_order(world: World) -> World:
     """Return the world with the fields of each node in the order of the table."""
 
     def ordered(part: Any) -> Any:
-        if isinstance(part, tuple) and not isinstance(part, Use):
-            return tuple(map(ordered, part))
+        if isinstance(part, list):
+            return [ordered(each) for each in part]
         if not isinstance(part, Node):
             return part
         own = dict(part.fields)
         fields = ((name, ordered(own[name])) for name in FIELDS[part.kind] if name in own)
         return Node(part.kind, tuple(fields), part.name)
 
-    return World(tuple(map(ordered, world.nodes)), world.routes)
+    return World(tuple(ordered([*world.nodes])), world.routes)
 
 
 @pytest.mark.parametrize("plain", [False, True])
@@ -106,7 +99,7 @@ def test_world_is_read_back(tmp_path: Path, gantry: Robot, plain: bool) -> None:
     text = x3d_text(world)
     assert ("Switch" in text) is not plain
     assert world_in(text) == in_order(world)
-    named = Node("WorldInfo", (("title", 'a "b" <c> & \\'), ("info", ('d "e"', "f\\"))))
+    named = Node("WorldInfo", (("title", 'a "b" <c> & \\'), ("info", ['d "e"', "f\\"])))
     assert world_in(x3d_text(World((named,)))) == World((named,))
 
 

@@ -168,7 +168,7 @@ def world_of(
         contents.append(Node("Transform", (*_pose(each.T), ("children", shown)), name))
     nodes = [
         *_surroundings(robot, values),
-        Node("Transform", (("rotation", Z_UP), ("children", tuple(contents)))),
+        Node("Transform", (("rotation", Z_UP), ("children", contents))),
     ]
     routes: list[Route] = []
     if motion is not None:
@@ -203,18 +203,18 @@ def part_world(robot: Robot, link: Link) -> World:
     """Return one link at its place with all joints at zero, z up; all of them form the robot."""
     writing = _Writing(robot, (), plain=True)
     title = Node("WorldInfo", (("title", f"{robot.name} {link.name}"),))
-    placed = (_placed(writing, link),)
-    return World((title, Node("Transform", (("rotation", Z_UP), ("children", placed)))))
+    placed = _placed(writing, link)
+    return World((title, Node("Transform", (("rotation", Z_UP), ("children", [placed])))))
 
 
 def _surroundings(robot: Robot, values: Mapping[str, float]) -> list[Node]:
     nodes = [
         Node(
             "WorldInfo",
-            (("title", robot.name), ("info", ("Metres and radians; z of the root is up.",))),
+            (("title", robot.name), ("info", ["Metres and radians; z of the root is up."])),
         ),
-        Node("NavigationInfo", (("type", ("EXAMINE", "ANY")),)),
-        Node("Background", (("skyColor", SKY),)),
+        Node("NavigationInfo", (("type", ["EXAMINE", "ANY"]),)),
+        Node("Background", (("skyColor", [*SKY]),)),
         Node("DirectionalLight", (("direction", (0.3, -1.0, -0.4)), ("intensity", 0.6))),
     ]
     for title, view in views(robot, values).items():
@@ -239,10 +239,10 @@ def _link(writing: _Writing, link: Link, values: Mapping[str, float]) -> Node:
     """Return the node of a link and its joint, with those of all links that it carries."""
     robot = writing.robot
     # In the order of the file, so that a material is defined where it is first used.
-    contents = (
+    contents = [
         _placed(writing, link),
         *(_link(writing, other, values) for other in robot.children(link)),
-    )
+    ]
     if link.joint is None:
         return _group(contents) if len(contents) > 1 else contents[0]
     axis = robot.axis(link.joint)
@@ -252,23 +252,23 @@ def _link(writing: _Writing, link: Link, values: Mapping[str, float]) -> Node:
         return Node("Transform", (moved, ("children", contents)), name)
     point = robot.home[link.name][:3, 3]
     back = _shifted(-point, contents)
-    turned = (("rotation", (*_rounded(axis, 9), value)), ("children", (back,)))
-    return _shifted(point, (Node("Transform", turned, name),))
+    turned = (("rotation", (*_rounded(axis, 9), value)), ("children", [back]))
+    return _shifted(point, [Node("Transform", turned, name)])
 
 
-def _shifted(by: FloatArray, children: tuple[Node, ...]) -> Node:
+def _shifted(by: FloatArray, children: list[Node]) -> Node:
     return Node("Transform", (("translation", _rounded(by, 9)), ("children", children)))
 
 
 def _group(children: Sequence[Node]) -> Node:
-    return Node("Group", (("children", tuple(children)),))
+    return Node("Group", (("children", [*children]),))
 
 
 def _placed(writing: _Writing, link: Link) -> Node:
     """Return the Transform of a link with its shapes, as placed with all joints at zero."""
     names = writing.names
     name, dressed = names.links[link.name], names.dressed.get(link.name)
-    shown = () if dressed is None else _dressed(writing, link.shapes, link.colour, name, dressed)
+    shown = [] if dressed is None else _dressed(writing, link.shapes, link.colour, name, dressed)
     pose = _pose(writing.robot.home[link.name])
     return Node("Transform", (*pose, ("children", shown)), name)
 
@@ -284,14 +284,14 @@ def _dressed(
     colour: Sequence[float],
     name: str,
     dressed: NodeNames,
-) -> tuple[Node, ...]:
+) -> list[Node]:
     """Return the Switch of a link or object: its shapes as made, and again to be painted.
 
     A plain world has the shapes as made alone.
     """
     made = [_shape(writing, shape) for shape in shapes]
     if writing.plain:
-        return tuple(made)
+        return made
     colours = (("diffuseColor", _rounded(colour, 4)), ("transparency", 0.0))
     paint: Node | Use = Node("Material", colours, dressed.paint)
     painted: list[Node] = []
@@ -303,8 +303,8 @@ def _dressed(
         one = Node("Appearance", (("material", paint),))
         painted.append(Node("Shape", (("appearance", one), (field, Use(surface_name)))))
         paint = Use(dressed.paint)
-    choices = (_group(made), _group(painted))
-    return (Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance),)
+    choices: list[Node] = [_group(made), _group(painted)]
+    return [Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance)]
 
 
 def _shape(writing: _Writing, shape: VisualMesh) -> Node:
@@ -319,9 +319,9 @@ def _shape(writing: _Writing, shape: VisualMesh) -> Node:
     surface = Node(
         "IndexedFaceSet",
         (
-            ("coord", Node("Coordinate", (("point", _rounded(shape.vertices, DIGITS)),))),
-            ("normal", Node("Normal", (("vector", _rounded(shape.normals, NORMAL_DIGITS)),))),
-            ("coordIndex", tuple(index.ravel().tolist())),
+            ("coord", Node("Coordinate", (("point", [*_rounded(shape.vertices, DIGITS)]),))),
+            ("normal", Node("Normal", (("vector", [*_rounded(shape.normals, NORMAL_DIGITS)]),))),
+            ("coordIndex", index.ravel().tolist()),
         ),
     )
     return Node("Shape", (("appearance", appearance), ("geometry", surface)))
@@ -342,12 +342,12 @@ def _interpolator(joint: Joint, robot: Robot, motion: RecordedMotion, names: Vrm
     name = f"{names.joints[joint.name]}{names.way}"
     axis = robot.axis(joint)
     t, values = motion.keys(joint.name)
-    keys = ("key", tuple((t / motion.t[-1]).tolist()))
+    keys = ("key", (t / motion.t[-1]).tolist())
     if joint.slides:
         rows = values[:, None] * axis
-        return Node("PositionInterpolator", (keys, ("keyValue", _rounded(rows, 9))), name)
+        return Node("PositionInterpolator", (keys, ("keyValue", [*_rounded(rows, 9)])), name)
     rows = np.column_stack((np.broadcast_to(axis, (len(t), 3)), values))
-    return Node("OrientationInterpolator", (keys, ("keyValue", _rounded(rows, 9))), name)
+    return Node("OrientationInterpolator", (keys, ("keyValue", [*_rounded(rows, 9)])), name)
 
 
 def _rounded(values: object, digits: int) -> tuple[float, ...]:

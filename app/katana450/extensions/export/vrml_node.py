@@ -1,125 +1,18 @@
-"""A VRML97 world as immutable values: nodes with their fields, and routes between their events.
+"""A VRML97 world as values: nodes with their fields, and routes between their events.
 
-Only the nodes that the export writes are listed. Their field names and types are those of ISO/IEC
-14772-1:1997, chapter 6.
+The form of a value shows the type of its field, so that no table of types is needed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
-from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-
-
-class Type(Enum):
-    """The VRML type of a field: SF types have a single value, MF types a list of values."""
-
-    BOOL = "SFBool"
-    INT = "SFInt32"
-    INT_LIST = "MFInt32"
-    FLOAT = "SFFloat"
-    FLOAT_LIST = "MFFloat"
-    TIME = "SFTime"
-    PAIR = "SFVec2f"
-    PAIR_LIST = "MFVec2f"
-    VECTOR = "SFVec3f"
-    VECTOR_LIST = "MFVec3f"
-    COLOR = "SFColor"
-    COLOR_LIST = "MFColor"
-    ROTATION = "SFRotation"
-    ROTATION_LIST = "MFRotation"
-    STRING = "SFString"
-    STRING_LIST = "MFString"
-    NODE = "SFNode"
-    NODE_LIST = "MFNode"
-
-
-WIDTHS: Mapping[Type, int] = MappingProxyType(
-    {
-        Type.INT: 1,
-        Type.INT_LIST: 1,
-        Type.FLOAT: 1,
-        Type.FLOAT_LIST: 1,
-        Type.TIME: 1,
-        Type.PAIR: 2,
-        Type.PAIR_LIST: 2,
-        Type.VECTOR: 3,
-        Type.VECTOR_LIST: 3,
-        Type.COLOR: 3,
-        Type.COLOR_LIST: 3,
-        Type.ROTATION: 4,
-        Type.ROTATION_LIST: 4,
-    }
-)
-"""Count of numbers in a single value of each numeric type."""
-
-LISTS = frozenset(kind for kind in Type if kind.value.startswith("MF"))
-"""Types whose value is a list of any length."""
-
-_CHILDREN = {"children": Type.NODE_LIST}
-
-FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
-    {
-        "WorldInfo": {"title": Type.STRING, "info": Type.STRING_LIST},
-        "NavigationInfo": {
-            "type": Type.STRING_LIST,
-            "headlight": Type.BOOL,
-            "speed": Type.FLOAT,
-        },
-        "Background": {"skyColor": Type.COLOR_LIST},
-        "Viewpoint": {
-            "position": Type.VECTOR,
-            "orientation": Type.ROTATION,
-            "fieldOfView": Type.FLOAT,
-            "description": Type.STRING,
-        },
-        "DirectionalLight": {
-            "direction": Type.VECTOR,
-            "intensity": Type.FLOAT,
-            "ambientIntensity": Type.FLOAT,
-        },
-        "Group": _CHILDREN,
-        "Switch": {"whichChoice": Type.INT, "choice": Type.NODE_LIST},
-        "Transform": {
-            "translation": Type.VECTOR,
-            "center": Type.VECTOR,
-            "rotation": Type.ROTATION,
-            **_CHILDREN,
-        },
-        "Shape": {"appearance": Type.NODE, "geometry": Type.NODE},
-        "Appearance": {"material": Type.NODE},
-        "Material": {
-            "diffuseColor": Type.COLOR,
-            "specularColor": Type.COLOR,
-            "ambientIntensity": Type.FLOAT,
-            "shininess": Type.FLOAT,
-            "transparency": Type.FLOAT,
-        },
-        "IndexedFaceSet": {
-            "solid": Type.BOOL,
-            "coord": Type.NODE,
-            "normal": Type.NODE,
-            "coordIndex": Type.INT_LIST,
-        },
-        "Coordinate": {"point": Type.VECTOR_LIST},
-        "Normal": {"vector": Type.VECTOR_LIST},
-        "TimeSensor": {
-            "cycleInterval": Type.TIME,
-            "loop": Type.BOOL,
-            "startTime": Type.TIME,
-        },
-        "OrientationInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.ROTATION_LIST},
-        "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
-    }
-)
-"""Fields of each kind of node that the export writes, with their types."""
 
 KEYWORDS = frozenset(
     [
@@ -140,11 +33,11 @@ class Use(NamedTuple):
 class Node:
     """A node of a VRML world.
 
-    The value of a field is a bool, float, str, Node or Use, or a tuple of these. A list of vectors
-    is one flat tuple of numbers.
+    The value of a field is a bool, float, str, Node or Use; a tuple of the numbers of a vector; or
+    a list. A list of vectors is one flat list of numbers.
 
     Attributes:
-        kind: type name of the node, such as ``Transform``; a key of FIELDS.
+        kind: type name of the node, such as ``Transform``.
         fields: name and value of each field that is set.
         name: its DEF name; None without one.
     """
@@ -161,12 +54,12 @@ class Node:
         """Yield this node, then all nodes inside it, in the order in which a file has them."""
         yield self
         for _, value in self.fields:
-            for part in value if isinstance(value, tuple) else (value,):
+            for part in value if isinstance(value, list) else (value,):
                 if isinstance(part, Node):
                     yield from part.walk()
 
 
-Value = bool | float | str | Node | Use | tuple["float | str | Node | Use", ...]
+Value = bool | float | str | Node | Use | tuple[float, ...] | list[Any]
 """The value of a field."""
 
 

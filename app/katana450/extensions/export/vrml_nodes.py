@@ -11,6 +11,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
-from katana450.extensions.export.vrml_node import WIDTHS, Type, axis_angle
+from katana450.extensions.export.vrml_node import axis_angle
 from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.touch_model import TouchModel
@@ -34,6 +35,22 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from katana450.server.service.nodes import Nodes
+
+
+class Type(Enum):
+    """The VRML type of a field."""
+
+    INT = "SFInt32"
+    FLOAT = "SFFloat"
+    FLOAT_LIST = "MFFloat"
+    PAIR = "SFVec2f"
+    VECTOR = "SFVec3f"
+    COLOR = "SFColor"
+    ROTATION = "SFRotation"
+
+
+WIDTHS = {Type.INT: 1, Type.FLOAT: 1, Type.VECTOR: 3, Type.COLOR: 3, Type.ROTATION: 4}
+"""Count of numbers in a value of each type that can be set."""
 
 FieldValue = float | list[float]
 """The value of a field: one number or several."""

@@ -9,16 +9,7 @@ import re
 from collections.abc import Mapping
 from xml.sax.saxutils import quoteattr
 
-from katana450.extensions.export.vrml_node import (
-    FIELDS,
-    LISTS,
-    WIDTHS,
-    Node,
-    Type,
-    Use,
-    Value,
-    World,
-)
+from katana450.extensions.export.vrml_node import Node, Use, Value, World
 
 HEADER = "#VRML V2.0 utf8"
 """First line of a VRML file."""
@@ -34,8 +25,8 @@ X3D_HEADER = (
 )
 """Beginning of an X3D file: the profile that has Switch, sensors and interpolators."""
 
-ROWS_A_LINE = 16
-"""Rows of numbers per line: few enough for old readers, enough for small files."""
+NUMBERS_A_LINE = 48
+"""Numbers per line: few enough for old readers, enough for small files."""
 
 _ZERO_AFTER = re.compile(r"\.0(?![0-9e])")
 
@@ -71,22 +62,19 @@ def _write(parts: list[str], node: Node | Use, depth: int) -> None:
         return
     parts.append(f"{indent}{'' if node.name is None else f'DEF {node.name} '}{node.kind} {{\n")
     for name, value in node.fields:
-        kind = FIELDS[node.kind][name]
-        if kind is Type.NODE:
-            parts.append(f"{indent} {name}\n")
-            for child in _children(value):
-                _write(parts, child, depth + 1)
-        elif kind is Type.NODE_LIST:
-            parts.append(f"{indent} {name} [\n")
-            for child in _children(value):
-                _write(parts, child, depth + 2)
-            parts.append(f"{indent} ]\n")
-        else:
-            text = _quoted(value) if isinstance(value, str) else _plain(kind, value)
+        children = _children(value)
+        if not children:
+            text = _quoted(value) if isinstance(value, str) else _plain(value)
             text = text.upper() if isinstance(value, bool) else text
-            space = " " if kind is Type.STRING_LIST else ""
-            text = f"[{space}{text}{space}]" if kind in LISTS else text
+            text = f"[ {text} ]" if isinstance(value, list) else text
             parts.append(f"{indent} {name} {text}\n")
+            continue
+        is_list = isinstance(value, list)
+        parts.append(f"{indent} {name}{' [' if is_list else ''}\n")
+        for child in children:
+            _write(parts, child, depth + 2)
+        if is_list:
+            parts.append(f"{indent} ]\n")
     parts.append(f"{indent}}}\n")
 
 
@@ -98,14 +86,16 @@ def _write_element(parts: list[str], node: Node | Use, kinds: Mapping[str, str])
     parts.append(f"<{node.kind}" + ("" if node.name is None else f' DEF="{node.name}"'))
     children: list[Node | Use] = []
     for name, value in node.fields:
-        kind = FIELDS[node.kind][name]
-        if kind in (Type.NODE, Type.NODE_LIST):
-            children += _children(value)
+        children += _children(value)
+        # A field of no nodes cannot be told from another list without values: both are defaults.
+        if _children(value) or value == []:
+            continue
+        if isinstance(value, str) or (isinstance(value, list) and isinstance(value[0], str)):
+            attribute = quoteattr(value if isinstance(value, str) else _plain(value))
         else:
-            text = value if isinstance(value, str) else _plain(kind, value)
             # The ends of lines between numbers stay as they are.
-            is_text = kind in (Type.STRING, Type.STRING_LIST)
-            parts.append(f" {name}=" + (quoteattr(text) if is_text else f'"{text}"'))
+            attribute = f'"{_plain(value)}"'
+        parts.append(f" {name}={attribute}")
     if not children:
         parts.append("/>\n")
         return
@@ -116,24 +106,21 @@ def _write_element(parts: list[str], node: Node | Use, kinds: Mapping[str, str])
 
 
 def _children(value: Value) -> list[Node | Use]:
-    """Return the nodes in the value of a field of nodes."""
-    # A reference is a tuple too.
-    items = value if isinstance(value, tuple) and not isinstance(value, Use) else (value,)
+    """Return the nodes in the value of a field; none for another field."""
+    items = value if isinstance(value, list) else [value]
     return [item for item in items if isinstance(item, Node | Use)]
 
 
-def _plain(kind: Type, value: Value) -> str:
+def _plain(value: Value) -> str:
     """Return a value other than nodes and a single text, as both formats write it."""
     if isinstance(value, bool):
         return str(value).lower()
-    items = value if isinstance(value, tuple) else (value,)
-    if kind is Type.STRING_LIST:
-        return " ".join(_quoted(str(text)) for text in items)
-    numbers = list(map(repr, items))
-    step = WIDTHS[kind] * ROWS_A_LINE
-    rows = [" ".join(numbers[start : start + step]) for start in range(0, len(numbers), step)]
+    items = value if isinstance(value, list | tuple) else (value,)
+    words = [_quoted(item) if isinstance(item, str) else repr(item) for item in items]
+    starts = range(0, len(words), NUMBERS_A_LINE)
+    text = "\n".join(" ".join(words[start : start + NUMBERS_A_LINE]) for start in starts)
     # 2 for 2.0. The zero of 0.5 stays: VTK reads .0122 as 0.
-    return _ZERO_AFTER.sub("", "\n".join(rows))
+    return text if words and words[0].startswith('"') else _ZERO_AFTER.sub("", text)
 
 
 def _quoted(text: str) -> str:

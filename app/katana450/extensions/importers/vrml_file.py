@@ -219,7 +219,7 @@ class _Flattening:
 
 def _nodes(value: Value | None) -> list[Node]:
     """Return the nodes in a field."""
-    items = value if isinstance(value, tuple) else (value,)
+    items = value if isinstance(value, list) else (value,)
     return [item for item in items if isinstance(item, Node)]
 
 

@@ -280,9 +280,9 @@ class Reader:
             self._next = row.end(1)
             self._take()
             self._take()
-            return tuple(map(float, row[1].replace(",", " ").split()))
+            return [float(word) for word in row[1].replace(",", " ").split()]
         self._take()
-        items: list[float | str | Node | Use] = []
+        items: list[Value] = []
         while self._ahead != "]":
             item = self._item(depth)
             if isinstance(item, tuple) and not isinstance(item, Use):
@@ -290,7 +290,7 @@ class Reader:
             else:
                 items.append(item)
         self._take()
-        return tuple(items)
+        return items
 
     def _item(self, depth: int) -> Value:
         """Parse a text, a Boolean value, all numbers up to the next word, or a node."""

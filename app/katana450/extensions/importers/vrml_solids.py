@@ -87,7 +87,7 @@ def part(node: Node, field: str) -> Node | None:
 
 def texts(value: Value | None) -> tuple[str, ...]:
     """Return the texts of a field."""
-    items = value if isinstance(value, tuple) else (value,)
+    items = value if isinstance(value, list) else (value,)
     return tuple(item for item in items if isinstance(item, str))
 
 
