@@ -46,11 +46,11 @@ def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:
 @pytest.mark.parametrize(
     ("prop", "change", "message"),
     [
-        ("cup", {"height": -1.0}, "'height' is -1.0"),
+        ("cup", {"height": -1.0}, r"> 0.0 - at `\$.cup.height`"),
         ("cup", {"outer_radius": 0.01}, "no thickness"),
-        ("basin", {"mass": float("nan")}, "'mass' is nan"),
-        ("basin", {"floor_radius": 0.0}, "'floor_radius' is 0.0"),
-        ("basin", {"floor": "thick"}, "could not convert"),
+        ("basin", {"mass": float("nan")}, "JSON is malformed"),
+        ("basin", {"floor_radius": 0.0}, r"> 0.0 - at `\$.basin.floor_radius`"),
+        ("basin", {"floor": "thick"}, "Expected `float`"),
         ("table", {"x": [1.0, 0.0]}, "not an interval"),
         ("table", {"mesh": "chair.glb"}, "no mesh"),
     ],

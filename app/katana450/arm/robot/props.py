@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.errors import RobotDescriptionError
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnvironment
 from katana450.resources import PROPS_PATH
+
+Positive = Annotated[float, msgspec.Meta(gt=0.0)]
+"""A number above 0."""
 
 Point = tuple[float, float, float]
 
@@ -21,8 +23,7 @@ BASIN_AT: Point = (0.22, 0.36, 0.0)
 """[m] Places on the table in the base frame: within reach, and clear of the arm's usual paths."""
 
 
-@dataclass(frozen=True)
-class Vessel:
+class Vessel(msgspec.Struct, frozen=True):
     """A vessel for water about its own axis z, standing on z = 0.
 
     Attributes:
@@ -36,12 +37,19 @@ class Vessel:
     """
 
     mesh: Path
-    mass: float
-    inner_radius: float
-    outer_radius: float
-    height: float
-    floor: float
-    floor_radius: float
+    mass: Positive
+    inner_radius: Positive
+    outer_radius: Positive
+    height: Positive
+    floor: Positive
+    floor_radius: Positive = 0.0
+
+    def __post_init__(self) -> None:
+        """Complete a vessel with a straight inside. Raises ValueError for one without walls."""
+        if not self.floor_radius:
+            msgspec.structs.force_setattr(self, "floor_radius", self.inner_radius)
+        if not (self.inner_radius < self.outer_radius and self.floor < self.height):
+            raise ValueError(f"the walls of {self.mesh.name} have no thickness")
 
     def scale_to(self, radius: float, height: float) -> tuple[float, float, float]:
         """Return the scale along x, y, z that gives it another outer radius and height [m]."""
@@ -49,18 +57,21 @@ class Vessel:
         return wide, wide, height / self.height
 
 
-@dataclass(frozen=True)
-class TableProp:
+class TableProp(msgspec.Struct, frozen=True):
     """A board whose upper face is z = 0 of the base frame; x, y: its ends [m]."""
 
     mesh: Path
     x: tuple[float, float]
     y: tuple[float, float]
-    thickness: float
+    thickness: Positive
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for ends in the wrong order."""
+        if not (self.x[0] < self.x[1] and self.y[0] < self.y[1]):
+            raise ValueError(f"{self.x} or {self.y} is not an interval")
 
 
-@dataclass(frozen=True)
-class Props:
+class Props(msgspec.Struct, frozen=True):
     """Cup, basin and table."""
 
     cup: Vessel
@@ -77,52 +88,17 @@ class Props:
 
 def load_props(path: Path = PROPS_PATH) -> Props:
     """Read the props. Raises RobotDescriptionError if the file is missing or invalid."""
+
+    def mesh(_kind: type, name: Any) -> Path:
+        file = path.parent / str(name)
+        if not file.is_file():
+            raise ValueError(f"there is no mesh {file}")
+        return file
+
     try:
-        described = json.loads(path.read_text(encoding="utf-8"))
-        table = described["table"]
-        return Props(
-            cup=_vessel(path, described["cup"]),
-            basin=_vessel(path, described["basin"]),
-            table=TableProp(
-                _mesh(path, table),
-                _span(table["x"]),
-                _span(table["y"]),
-                _length(table, "thickness"),
-            ),
-        )
-    except (OSError, KeyError, TypeError, ValueError) as error:
-        raise RobotDescriptionError(f"{path} does not describe the props: {error!r}.") from error
-
-
-def _vessel(path: Path, described: Any) -> Vessel:
-    # A vessel without this entry has a straight inside.
-    floor_radius = "floor_radius" if "floor_radius" in described else "inner_radius"
-    lengths = ("mass", "inner_radius", "outer_radius", "height", "floor", floor_radius)
-    vessel = Vessel(_mesh(path, described), *(_length(described, key) for key in lengths))
-    if not (vessel.inner_radius < vessel.outer_radius and vessel.floor < vessel.height):
-        raise ValueError(f"the walls of {vessel.mesh.name} have no thickness")
-    return vessel
-
-
-def _mesh(path: Path, described: Any) -> Path:
-    mesh = path.parent / str(described["mesh"])
-    if not mesh.is_file():
-        raise ValueError(f"there is no mesh {mesh}")
-    return mesh
-
-
-def _length(described: Any, key: str) -> float:
-    value = float(described[key])
-    if not 0.0 < value < math.inf:
-        raise ValueError(f"{key!r} is {value}")
-    return value
-
-
-def _span(ends: Any) -> tuple[float, float]:
-    low, high = (float(end) for end in ends)
-    if not -math.inf < low < high < math.inf:
-        raise ValueError(f"{ends} is not an interval")
-    return low, high
+        return msgspec.json.decode(path.read_bytes(), type=Props, dec_hook=mesh)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise RobotDescriptionError(f"{path} does not describe the props: {error}.") from error
 
 
 def water_environment(props: Props, basin_at: Point = BASIN_AT) -> WaterEnvironment:
