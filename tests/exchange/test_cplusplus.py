@@ -33,8 +33,6 @@ void glVertex3fv(const float *v);
 void glPushMatrix(void);
 void glPopMatrix(void);
 void glMultMatrixd(const double *m);
-void glTranslated(double x, double y, double z);
-void glRotated(double angle, double x, double y, double z);
 #ifdef __cplusplus
 }
 #endif
@@ -61,8 +59,6 @@ void glVertex3fv(const float *) { corners++; }
 void glPushMatrix() {}
 void glPopMatrix() {}
 void glMultMatrixd(const double *) {}
-void glTranslated(double, double, double) {}
-void glRotated(double, double, double, double) {}
 
 int main()
 {

@@ -14,7 +14,7 @@ from importlib import resources
 import numpy as np
 
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.names import distinct
 from katana450.extensions.export.rows import indexed
@@ -459,11 +459,15 @@ def _source(robot: Robot, names: Mapping[str, str], values: Mapping[str, float])
         f"{double(joint.lower)}, {double(joint.upper)}}},\n"
         for joint in joints
     )
-    lines = "\n".join(_drawn(robot, robot.links[0], names))
+    draws = "".join(
+        f"    {names[link.name]}_draw,\n" if link.name in names else "    NULL,\n"
+        for link in robot.links
+    )
     headers = "\n".join(f'#include "{name}.h"' for name in sorted(names.values()))
     return f"""\
 #include "robot.h"
 
+#include "kinematics.h"
 {headers}
 
 #include <math.h>
@@ -478,56 +482,28 @@ const double robot_eye[3] = {{{_triple(view.eye)}}};
 const double robot_target[3] = {{{_triple(view.target)}}};
 const double robot_field_of_view = {double(FIELD_OF_VIEW)};
 
-static const double DEGREES = 57.29577951308232;
+/* The function that draws each link; a null pointer for a link without shapes. */
+static void (*const draws[ROBOT_LINKS])(void) = {{
+{draws}}};
 
 void robot_draw(const double q[])
 {{
-    (void)q;
-    (void)DEGREES;
-    glPushMatrix();
-{lines}
-    glPopMatrix();
+    double T[ROBOT_LINKS][16], columns[16];
+    int link, k;
+    robot_frames(q, T);
+    for (link = 0; link < ROBOT_LINKS; link++) {{
+        if (draws[link] == NULL)
+            continue;
+        /* OpenGL has matrices column by column. */
+        for (k = 0; k < 16; k++)
+            columns[k] = T[link][4 * (k % 4) + k / 4];
+        glPushMatrix();
+        glMultMatrixd(columns);
+        draws[link]();
+        glPopMatrix();
+    }}
 }}
 """
-
-
-def _drawn(robot: Robot, link: Link, names: Mapping[str, str]) -> Iterator[str]:
-    """Yield statements that draw a link and its children; they leave the frame changed."""
-    yield f"    /* {comment(link.name)} */"
-    T = link.T_parent_link
-    if not np.array_equal(T[:3, :3], np.eye(3)):
-        # OpenGL stores matrices by columns.
-        numbers = ", ".join(double(value) for value in T.T.ravel())
-        yield f"    {{ static const double place[16] = {{{numbers}}}; glMultMatrixd(place); }}"
-    elif T[:3, 3].any():
-        yield f"    glTranslated({_triple(T[:3, 3])});"
-    if link.joint is not None:
-        yield f"    {_moved(robot, link.joint)}"
-    if link.name in names:
-        yield f"    {names[link.name]}_draw();"
-    children = [child for child in robot.children(link) if _shows(robot, child)]
-    for child in children:
-        # The last child may change the frame, so a long chain needs no deep matrix stack.
-        if child is children[-1]:
-            yield from _drawn(robot, child, names)
-        else:
-            yield "    glPushMatrix();"
-            yield from _drawn(robot, child, names)
-            yield "    glPopMatrix();"
-
-
-def _shows(robot: Robot, link: Link) -> bool:
-    return bool(link.shapes) or any(_shows(robot, c) for c in robot.children(link))
-
-
-def _moved(robot: Robot, joint: Joint) -> str:
-    value = f"q[{robot.driven.index(joint.leader)}]"
-    if (joint.factor, joint.offset) != (1.0, 0.0):
-        value = f"({double(joint.factor)} * {value} + {double(joint.offset)})"
-    if joint.slides:
-        x, y, z = (f"{double(part)} * {value}" for part in joint.axis)
-        return f"glTranslated({x}, {y}, {z});"
-    return f"glRotated(DEGREES * {value}, {_triple(joint.axis)});"
 
 
 def _float_rows(rows: FloatArray) -> Iterator[str]:
