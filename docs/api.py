@@ -11,10 +11,10 @@ from typing import Any
 
 import msgspec
 
-from katana450.arm.control.act import Request, tag_of
+from katana450.arm.control.act import Act, Request, tag_of
 from katana450.arm.control.checked import field_schema
 from katana450.extension import extensions, load
-from katana450.extensions.api_description.messages import documentation, kinds
+from katana450.extensions.api_description.messages import documentation
 from katana450.server.api import answers, requests
 
 PAGE = Path(__file__).with_name("api.md")
@@ -178,7 +178,7 @@ def page() -> str:
     parts = [PREFACE.format(version=requests.VERSION)]
     for title, listed, tag in (
         ("Requests", sorted(requests.CORE, key=lambda kind: kind.__name__), "do"),
-        ("Answers", kinds(answers.AnyAnswer), "is"),
+        ("Answers", answers.EVERY, "is"),
     ):
         parts.append(f"## {title}\n")
         parts += [_kind(kind, tag) for kind in listed]
@@ -191,19 +191,11 @@ def page() -> str:
                     f"A server without this extension refuses them. The Python module is `{module}`.\n"
                 )
                 parts += [_kind(kind, tag) for kind in added]
-    parts.append("### In requests\n")
-    parts += [_kind(kind, None) for kind in (requests.FieldName, requests.FieldSetting)]
-    parts.append("### In answers\n")
-    parts += [
-        _kind(kind, None)
-        for kind in (
-            *(answers.Finding, answers.PartRefusal, answers.MotionEnd),
-            *(answers.Margins, answers.Water),
-            *(answers.Progress, answers.LogLine, answers.BranchOption, answers.SceneObject),
-            *(answers.Value, answers.Node, answers.Field, answers.Link),
-            *(answers.ConnectedPerson, answers.PersonConnection),
-        )
-    ]
+    for title, room in (("requests", requests), ("answers", answers)):
+        parts.append(f"### In {title}\n")
+        kinds = [kind for kind in vars(room).values() if isinstance(kind, type(msgspec.Struct))]
+        named = [kind for kind in kinds if not issubclass(kind, (Act, answers.Answer))]
+        parts += [_kind(kind, None) for kind in named if kind.__name__[0] != "_"]
     return "\n".join(parts)
 
 

@@ -16,7 +16,6 @@ import jsonschema
 import pytest
 
 from katana450.arm.control.act import tag_of
-from katana450.extensions.api_description.messages import kinds
 from katana450.extensions.api_description.openapi import openapi_json
 from katana450.server.api import answers, requests
 from tests.api.test_documented import EVERY_REQUEST
@@ -99,9 +98,7 @@ def test_fields_are_described_with_their_units() -> None:
 def checked(message: dict[str, Any]) -> str:
     """Return the name of a message that fits the schema of its name."""
     message = dict(message)
-    name = next(
-        each.__name__ for each in kinds(answers.AnyAnswer) if tag_of(each.__name__) == message["is"]
-    )
+    name = next(each.__name__ for each in answers.EVERY if tag_of(each.__name__) == message["is"])
     schema = {"$ref": f"#/components/schemas/{name}", "components": openapi()["components"]}
     jsonschema.Draft202012Validator(schema).validate(message)
     return name
@@ -124,7 +121,7 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
         ]
         for request in asked:
             seen.add(checked(lines.answer(**request)))
-    assert seen == {kind.__name__ for kind in kinds(answers.AnyAnswer)} - {"Mesh", "Scene"}
+    assert seen == {kind.__name__ for kind in answers.EVERY} - {"Mesh", "Scene"}
     with pytest.raises(jsonschema.ValidationError):
         checked({"is": "echo", "n": "one"})
     # A pose is four rows of four numbers.

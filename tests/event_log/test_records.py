@@ -18,7 +18,7 @@ from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.outcome import refused
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
 from katana450.client import connect
-from katana450.extensions.event_log.compact import MAX_TEXT, compact_command, compact_request
+from katana450.extensions.event_log.compact import MAX_TEXT, compact_act
 from katana450.extensions.event_log.record_limits import LIMITS
 from katana450.extensions.event_log.record_maker import STREAM_GAP, RecordMaker
 from katana450.extensions.event_log.record_sender import RecordSender
@@ -158,15 +158,15 @@ def test_participant_is_described_without_its_key() -> None:
 
 
 def test_values_are_bounded_and_without_secrets() -> None:
-    hello = compact_request(requests.Hello(name="x" * 40, token="secret"))
+    hello = compact_act(requests.Hello(name="x" * 40, token="secret"))
     assert "secret" not in str(hello)
-    assert compact_command(cmd.Tool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
+    assert compact_act(cmd.Tool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
     batch = cmd.Batch(tuple(cmd.Tool("x" * 1000) for _ in range(1000)))
     person = replace(ANNA.person, name="A\n\u2028\x1b[31m\ud800" * 200_000)
     (found,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
     assert found["what"]["count"] == 1000
     assert len(encoded(1, found)) <= MAX_LINE_BYTES
-    assert compact_command(cmd.Pose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
+    assert compact_act(cmd.Pose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
 
 
 def test_flood_of_one_participant_is_counted_and_leaves_room_for_others() -> None:

@@ -23,7 +23,7 @@ from katana450.extensions.real_arm.link.arm_link import ArmLink
 from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTransport
 from katana450.extensions.real_arm.link.tcp import TcpTransport
 from katana450.server.api import answers
-from katana450.server.api.arm_answers import MeasuredArm
+from katana450.server.api.answers import MeasuredArm
 from tests.browser.server import APP, AppServer, free_port
 from tests.real_arm.emulated import ROOT, TIMEOUT, emulator
 

@@ -358,7 +358,7 @@ class AsyncClient:
         except msgspec.MsgspecError as error:
             self._lose(f"The server sent an unknown message: {error}.")
 
-    def _dispatch(self, answer: answers.AnyAnswer) -> None:
+    def _dispatch(self, answer: answers.Answer) -> None:
         future = self._waiting.get(answer.id)
         if future is not None and not future.done():
             if isinstance(answer, answers.Refused):

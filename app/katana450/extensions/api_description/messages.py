@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from typing import Any, Union, get_args
+from typing import Any, Union
 
 import msgspec
 
@@ -25,11 +25,6 @@ ABOUT = (
 
 REFERENCE = "#/components/schemas/{name}"
 """Reference to the schema of a class."""
-
-
-def kinds(union: Any) -> tuple[type[msgspec.Struct], ...]:
-    """Return the message classes of a union, in order."""
-    return get_args(union)
 
 
 def summary(kind: type) -> str:
@@ -55,12 +50,12 @@ def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str,
     Each field is described by the entry of its class under ``Attributes``. ``asked``: the requests
     of the server.
     """
-    shapes: list[Any] = [Union[asked], answers.AnyAnswer]  # noqa: UP007
+    shapes: list[Any] = [Union[asked], Union[answers.EVERY]]  # noqa: UP007
     (request, answer), components = msgspec.json.schema_components(
         shapes, schema_hook=field_schema, ref_template=REFERENCE
     )
     components = {name: _portable(schema) for name, schema in components.items()}
-    messages = {each.__name__: each for each in (*asked, *kinds(answers.AnyAnswer))}
+    messages = {each.__name__: each for each in (*asked, *answers.EVERY)}
     for name, schema in components.items():
         text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
         if name in messages:

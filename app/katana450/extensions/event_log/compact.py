@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Act, Command, content_names
+from katana450.arm.control.act import Act, content_names
 from katana450.maths.planning.plan import Plan
 
 MAX_TEXT = 200
@@ -33,20 +33,16 @@ def text(value: object) -> str:
     return found if len(found) <= MAX_TEXT else f"{found[:MAX_TEXT]}... ({len(found)} characters)"
 
 
-def compact_command(command: Command) -> dict[str, Any]:
-    """Return the name of ``command`` and its values."""
-    if isinstance(command, cmd.Batch):
-        parts = [compact_command(part) for part in command.parts[:MAX_ITEMS]]
-        return {"command": "Batch", "count": len(command.parts), "parts": parts}
-    content = {"command": type(command).__name__, **_fields(command, 0)}
-    if isinstance(command, cmd.SetAxes):
-        content["values"] = {str(axis): _number(value) for axis, value in command.values}
+def compact_act(act: Act) -> dict[str, Any]:
+    """Return the name of ``act`` and its values."""
+    if isinstance(act, cmd.Batch):
+        parts = [compact_act(part) for part in act.parts[:MAX_ITEMS]]
+        return {"command": "Batch", "count": len(act.parts), "parts": parts}
+    kind = "command" if isinstance(act, cmd.Command) else "request"
+    content = {kind: type(act).__name__, **_fields(act, 0)}
+    if isinstance(act, cmd.SetAxes):
+        content["values"] = {str(axis): _number(value) for axis, value in act.values}
     return content
-
-
-def compact_request(request: msgspec.Struct) -> dict[str, Any]:
-    """Return the name of ``request`` and its values."""
-    return {"request": type(request).__name__, **_fields(request, 0)}
 
 
 def compact(value: Any, depth: int = 0) -> Any:

@@ -10,16 +10,14 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Command
+from katana450.arm.control.act import Act, Command
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.state import Outcome, Verdict
-from katana450.extensions.event_log.compact import compact, compact_command, compact_request, text
+from katana450.extensions.event_log.compact import compact, compact_act, text
 from katana450.extensions.event_log.record_limits import RecordLimits
 from katana450.extensions.event_log.records import Record, utc
 from katana450.server.service.recorder import LeaseChange, Note
@@ -266,12 +264,7 @@ def _stream_key(note: Note, command: Command) -> StreamKey | None:
 
 
 def _content(what: Any) -> Any:
-    match what:
-        case Command():
-            return compact_command(what)
-        case msgspec.Struct():
-            return compact_request(what)
-    return compact(what)
+    return compact_act(what) if isinstance(what, Act) else compact(what)
 
 
 def _who(actor: Actor | None) -> dict[str, str]:

@@ -5,68 +5,17 @@ Lengths are in m, angles in rad, times in s.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Union
 
 import msgspec
 
-from katana450.server.api.arm_answers import Margins, MeasuredArm, Water
-from katana450.server.api.fields import VERSION, Answer, Numbers
-from katana450.server.api.outcome_answers import Done, Finding, MotionEnd, PartRefusal, Refused
-from katana450.server.api.people_answers import ConnectedPerson, People, PersonConnection
-from katana450.server.api.program_answers import Progress
-from katana450.server.api.scene_answers import (
-    Field,
-    Link,
-    Links,
-    Mesh,
-    Node,
-    Objects,
-    Scene,
-    SceneObject,
-    Value,
-    Values,
-    World,
-)
-
-__all__ = [
-    "Answer",
-    "AnyAnswer",
-    "Arm",
-    "BranchOption",
-    "Branches",
-    "ConnectedPerson",
-    "Done",
-    "Echo",
-    "EventLog",
-    "Field",
-    "Finding",
-    "Link",
-    "Links",
-    "LogLine",
-    "Loop",
-    "Margins",
-    "MeasuredArm",
-    "Mesh",
-    "MotionEnd",
-    "Node",
-    "Numbers",
-    "Objects",
-    "PartRefusal",
-    "People",
-    "PersonConnection",
-    "Progress",
-    "Refused",
-    "Scene",
-    "SceneObject",
-    "State",
-    "Value",
-    "Values",
-    "Water",
-    "Welcome",
-    "World",
-    "decoded",
-    "encoded",
-]
+from katana450.server.api.fields import VERSION
+from katana450.server.api.fields import Answer as Answer
+from katana450.server.api.fields import Numbers as Numbers
+from katana450.server.api.outcome_answers import *
+from katana450.server.api.outcome_answers import Finding
+from katana450.server.api.scene_answers import *
+from katana450.server.api.scene_answers import Value
 
 
 class Welcome(Answer, frozen=True, kw_only=True):
@@ -98,6 +47,132 @@ class Echo(Answer, frozen=True, kw_only=True):
     """
 
     n: int
+
+
+class Progress(msgspec.Struct, frozen=True, kw_only=True):
+    """The program that is being planned, is running, or ran last.
+
+    Attributes:
+        name: Name of the program.
+        by: Name of its owner.
+        status: planning, cancelled, refused, ready, running, paused, blocked, done, stopped or
+            failed.
+        step: Number of the present step.
+        steps: Number of steps.
+        line: Line of the present step in the script.
+        task: Present task in words.
+        fraction: Fraction of the task that is done, or of all planning.
+        seconds: Expected duration of the longest possible run, without awaited conditions [s].
+        seconds_left: Expected time until the run ends [s], on the same clock; 0 if none runs.
+        why: What is wrong with the program, why it was planned again or not run, or which times of
+            the script it does not keep.
+        skipped: Numbers of the steps of alternatives that the run has not taken.
+        unattended: Whether it runs without heartbeats of its owner.
+        began: Time at which the run began, in UTC, in ISO 8601; null before that.
+        breakpoints: Numbers of the steps before which it pauses.
+        can_continue: Whether it was interrupted, and nothing has changed that prevents continue.
+    """
+
+    name: str
+    by: str
+    status: str
+    step: int = 0
+    steps: int = 0
+    line: int = 0
+    task: str = ""
+    fraction: float = 0.0
+    seconds: float = 0.0
+    seconds_left: float = 0.0
+    why: str = ""
+    skipped: tuple[int, ...] = ()
+    unattended: bool = False
+    began: str | None = None
+    breakpoints: tuple[int, ...] = ()
+    can_continue: bool = False
+
+
+class Margins(msgspec.Struct, frozen=True, kw_only=True):
+    """Distances to joint limits, singularity and contact.
+
+    Attributes:
+        limit: Distance of the joint nearest to one of its limits from that limit [rad]; negative
+            beyond it.
+        axis: Number of that joint, counted from 1.
+        limits: (n,) Distance of each joint from its nearer limit [rad]; negative beyond it.
+        smallest_singular_value: Smallest singular value of the Jacobian over the characteristic
+            length of the arm [1]; 0 in a singularity.
+        condition_number: Largest over smallest singular value [1]; null from 1e6, in a singularity.
+        manipulability: Product of the singular values [1] (Yoshikawa 1985); 0 in a singularity.
+        clearance: Distance of the two nearest parts [m]; null where contacts are not checked.
+        parts: The two nearest parts; null where contacts are not checked.
+    """
+
+    limit: float
+    axis: int
+    limits: Numbers
+    smallest_singular_value: float
+    condition_number: float | None
+    manipulability: float
+    clearance: float | None
+    parts: tuple[str, str] | None
+
+
+class Water(msgspec.Struct, frozen=True, kw_only=True):
+    """Water by its place.
+
+    Attributes:
+        cup_ml: Volume in the cup, without the film on its wall [ml].
+        film_ml: Volume of the film on the wall of the cup [ml].
+        basin_ml: Volume in the basin [ml].
+        air_ml: Volume in free flight [ml].
+        spilled_ml: Volume elsewhere [ml].
+        vessels_ml: Volume in each other vessel, with its film, by its name [ml].
+        margin_to_rim: Height of the lip of the vessel in the hand, or of the cup, above its water
+            [m]; negative while water flows out.
+    """
+
+    cup_ml: float
+    film_ml: float
+    basin_ml: float
+    air_ml: float
+    spilled_ml: float
+    vessels_ml: dict[str, float]
+    margin_to_rim: float
+
+
+class MeasuredArm(msgspec.Struct, frozen=True, kw_only=True):
+    """Measurements and mode of an arm that a driver reports. ``q`` of the state is measured too.
+
+    Attributes:
+        mode: disconnected, connected, uncalibrated, calibrating, holding, moving, collided, fault
+            or lost.
+        note: Sentence about the mode; empty if there is nothing to say.
+        acts: Acts that are possible now, see ``operate_arm``.
+        t: Time of the measurement [s], on the clock of the state.
+        expected: (n + 1,) Joints and finger joint where the arm should have been then [rad].
+        tracking_error: Maximum difference of a joint from there [rad].
+        axis: Number of that joint, counted from 1.
+        speeds: (n + 1,) Measured speeds [rad/s]; null if they are not measured.
+        round_trip: Time of the newest exchange with the arm [s].
+        stop_time: Time to rest of the newest stop, as measured [s]; null before the first.
+        stop_angle: Maximum angle of a joint in it [rad]; null before the first.
+        stop_distance: Travel of the tool in it [m]; null before the first, and if it is not known.
+        sensors: Raw values of the sensors of the gripper; empty without sensors.
+    """
+
+    mode: str
+    note: str
+    acts: list[str]
+    t: float
+    expected: Numbers
+    tracking_error: float
+    axis: int
+    speeds: Numbers | None
+    round_trip: float
+    stop_time: float | None
+    stop_angle: float | None
+    stop_distance: float | None
+    sensors: list[float]
 
 
 class State(Answer, frozen=True, kw_only=True):
@@ -343,29 +418,73 @@ class Loop(Answer, frozen=True, kw_only=True):
     lost: int
 
 
-AnyAnswer = (
-    Welcome
-    | Done
-    | Refused
-    | Echo
-    | State
-    | Arm
-    | EventLog
-    | Branches
-    | Loop
-    | Objects
-    | Values
-    | World
-    | Links
-    | Mesh
-    | Scene
-    | People
+class PersonConnection(msgspec.Struct, frozen=True, kw_only=True):
+    """An open connection of a person.
+
+    Attributes:
+        kind: ``page``; ``scene``, the 3D view of a page; ``program`` on a websocket; ``lines``, a
+            program on the TCP port; ``posts``, a program that sends single requests over HTTP.
+        name: Name of the page or program that others see.
+        number: Number of the page or program, for ``give``; null for a scene.
+        address: Address of the client, as the server sees it.
+        since: Time at which it was opened, in UTC, in ISO 8601.
+    """
+
+    kind: str
+    name: str
+    number: int | None
+    address: str
+    since: str
+
+
+class ConnectedPerson(msgspec.Struct, frozen=True, kw_only=True):
+    """A person with all connections: everybody who uses one link; without links, one browser.
+
+    Attributes:
+        person: Number for ``kick``.
+        name: Name of the link or, without links, of the first page or program.
+        role: viewer, operator or admin.
+        link: Number of the access link; null without links.
+        you: Whether this is the person who asks.
+        drives: Whether the person holds the lease, or owns the program that holds it.
+        asks: Whether the person asks for the lease.
+        program: Name of the running program that the person owns; null without one.
+        refused: Number of requests that were refused so far.
+        kept_out: Time [s] for which the person is kept out; null unless kicked.
+        connections: Open connections, the oldest first.
+    """
+
+    person: int
+    name: str
+    role: str
+    link: str | None
+    you: bool
+    drives: bool
+    asks: bool
+    program: str | None
+    refused: int
+    kept_out: float | None
+    connections: tuple[PersonConnection, ...]
+
+
+class People(Answer, frozen=True, kw_only=True):
+    """Everybody who is connected or kept out."""
+
+    people: tuple[ConnectedPerson, ...]
+
+
+EVERY: tuple[type[Answer], ...] = tuple(
+    kind
+    for kind in globals().values()
+    if isinstance(kind, type) and issubclass(kind, Answer) and kind is not Answer
 )
+"""The classes of all answers."""
 
-_decoder: msgspec.json.Decoder[AnyAnswer] = msgspec.json.Decoder(AnyAnswer)
+_KINDS: Any = Union[EVERY]  # noqa: UP007
+_decoder: msgspec.json.Decoder[Answer] = msgspec.json.Decoder(_KINDS)
 
 
-def decoded(text: str | bytes) -> AnyAnswer:
+def decoded(text: str | bytes) -> Answer:
     """Return the answer in ``text``. Raises msgspec.MsgspecError if it is invalid."""
     return _decoder.decode(text)
 

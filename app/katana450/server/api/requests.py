@@ -14,23 +14,32 @@ import msgspec
 from msgspec import Meta
 
 from katana450.arm.control.act import *
-from katana450.arm.control.act import Id, MotionRequest, Request, Traits, tag_of
+from katana450.arm.control.act import Id, MotionRequest, Name, Request, Traits, tag_of
 from katana450.arm.control.arm_commands import *
-from katana450.arm.control.checked import decoded_field
+from katana450.arm.control.checked import Transform, decoded_field
 from katana450.arm.control.joint_commands import *
 from katana450.arm.control.motion_commands import *
 from katana450.arm.control.object_commands import *
 from katana450.arm.control.scene_objects import Attachment as Attachment
 from katana450.arm.control.scene_objects import Shape as Shape
 from katana450.arm.control.tool_commands import *
+from katana450.arm.control.tool_commands import Frame
 from katana450.errors import InputError
 from katana450.server.api.fields import *
-from katana450.server.api.fields import MAX_REQUEST_BYTES, MAX_STATES_PER_SECOND, ROOT
-from katana450.server.api.lease_requests import *
-from katana450.server.api.people_requests import *
-from katana450.server.api.scene_requests import *
-from katana450.server.api.scene_requests import FieldName
+from katana450.server.api.fields import (
+    ADMIN,
+    LEASE,
+    MAX_REQUEST_BYTES,
+    MAX_STATES_PER_SECOND,
+    ROOT,
+    FieldValue,
+    Key,
+    NodeName,
+)
 from katana450.server.api.stop_requests import *
+
+MAX_TIME_OUT = 86_400.0
+"""Maximum time [s] for which an admin keeps somebody out without revoking the link."""
 
 
 class Heartbeat(Request, frozen=True, kw_only=True):
@@ -61,6 +70,219 @@ class Redo(MotionRequest, frozen=True):
     """Repeat the change by this client that was undone last, if no other change followed."""
 
     traits: ClassVar[Traits] = Traits(extension=True)
+
+
+class Acquire(Request, frozen=True):
+    """Acquire the lease if it is free. A command does this by itself while the lease is free."""
+
+    traits: ClassVar[Traits] = LEASE
+
+
+class Take(Request, frozen=True):
+    """Take the lease from its holder. For admins only."""
+
+    traits: ClassVar[Traits] = LEASE
+
+
+class Ask(Request, frozen=True):
+    """Ask the holder of the lease to hand it over.
+
+    While a program holds the lease, the owner of the program is asked.
+    """
+
+    traits: ClassVar[Traits] = LEASE
+
+
+class Withdraw(Request, frozen=True):
+    """Withdraw your own request for the lease."""
+
+    traits: ClassVar[Traits] = LEASE
+
+
+class ReleaseLease(Request, frozen=True):
+    """Release the lease, so that others can acquire it."""
+
+    traits: ClassVar[Traits] = LEASE
+
+
+class Give(Request, frozen=True, kw_only=True):
+    """Hand the lease over to another page or program.
+
+    The holder may do this, and the owner of the running program, which ends the program.
+
+    Attributes:
+        to: Number of the page or program.
+    """
+
+    traits: ClassVar[Traits] = LEASE
+
+    to: int
+
+
+class Decline(Request, frozen=True, kw_only=True):
+    """Decline the request of another page or program for the lease.
+
+    The holder may do this, and the owner of the running program.
+
+    Attributes:
+        to: Number of the page or program.
+    """
+
+    traits: ClassVar[Traits] = LEASE
+
+    to: int
+
+
+class Rename(Request, frozen=True, kw_only=True):
+    """Choose the name that others see. Refused if it is empty, too long or taken.
+
+    Attributes:
+        name: Name, of at most 24 characters. That of an access link cannot be changed.
+    """
+
+    traits: ClassVar[Traits] = Traits()
+
+    name: Annotated[str, Meta(max_length=200)]
+
+
+class ListPeople(Request, frozen=True):
+    """List everybody who is connected or kept out. For admins only."""
+
+    traits: ClassVar[Traits] = Traits(admin=True, answered=True, extension=True)
+
+
+class Kick(Request, frozen=True, kw_only=True):
+    """Close all connections of a person, and keep the person out for a while. For admins only.
+
+    The person can still stop the arm over HTTP. A running program of the person ends, also an
+    unattended one.
+
+    Attributes:
+        person: Number of the person in ``people``.
+        seconds: Time [s] after which the person may come back; 0 lets the person in at once.
+        revoke: Whether to revoke the access link for good. An admin's link is revoked by
+            ``katana450 access revoke`` alone.
+    """
+
+    traits: ClassVar[Traits] = ADMIN
+
+    person: int
+    seconds: Annotated[float, Meta(ge=0.0, le=MAX_TIME_OUT)] = 60.0
+    revoke: bool = False
+
+
+class Place(Request, frozen=True, kw_only=True, eq=False):
+    """Create an object, or change one. Fields that are not given keep their values.
+
+    Attributes:
+        name: Name of the object.
+        T: (4, 4) Pose in ``frame``; the object's own frame is in the middle of its underside. A new
+            object without ``T`` is placed where there is room in front of the arm. An object that
+            can be held, vessels and the basin are refused where nothing carries them: they stand
+            on the table or on another object.
+        near: (2,) Point of the table [m] in the base frame. A new object without ``T`` is placed
+            there or near it, where there is room beside other objects and the arm in its ready
+            posture.
+        frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
+        shape: Shape that is checked for contacts.
+        size: Size of the shape [m]: box (x, y, z), cylinder and vessel (radius, height), sphere
+            (radius). The size of a mesh is that of its file.
+        mesh: Key of the mesh, from the answer to its upload.
+        can_be_held: Whether the fingers may touch the object; they hold it between both sides.
+        scale: Factor on the size.
+        colour: Colour such as "#94a3b8", or "own" for the colour of the file.
+        opacity: Opacity, 1 for an opaque object.
+        hidden: Whether the object is not drawn. It is checked for contacts nevertheless.
+    """
+
+    traits: ClassVar[Traits] = Traits(extension=True)
+
+    name: Name
+    T: Transform | None = None
+    near: tuple[float, float] | None = None
+    frame: Frame = Frame.BASE
+    shape: Shape | None = None
+    size: Annotated[list[float], Meta(min_length=1, max_length=3)] | None = None
+    mesh: Key | None = None
+    can_be_held: bool | None = None
+    scale: Annotated[float, Meta(ge=1e-3, le=1e3)] | None = None
+    colour: Annotated[str, Meta(pattern="^(own|#[0-9a-f]{6})$")] | None = None
+    opacity: Annotated[float, Meta(ge=0.05, le=1.0)] | None = None
+    hidden: bool | None = None
+
+
+class Load(Request, frozen=True, kw_only=True):
+    """Replace all objects and the water by those of an uploaded scene. The arm does not move.
+
+    Attributes:
+        scene: Key of the scene, from the answer to its upload.
+    """
+
+    traits: ClassVar[Traits] = Traits(extension=True)
+
+    scene: Key
+
+
+class FieldName(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A field of a node of the VRML world.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+    """
+
+    node: NodeName
+    field: NodeName
+
+
+class FieldSetting(FieldName, frozen=True, kw_only=True):
+    """A field of a node of the VRML world, and its new value.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        value: New value; null restores the original one.
+    """
+
+    value: FieldValue
+
+
+class Set(MotionRequest, frozen=True, kw_only=True):
+    """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
+
+    If one field cannot be set, none is. The names are those of `katana450 export vrml`; ``query``
+    with ``world`` lists them. A ``rotation`` of a joint does not place the joint: it is a command
+    to move there, under the rules of ``joints``.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        value: New value. Null restores the original colour, transparency or choice.
+        more: Further fields to set at the same time.
+    """
+
+    traits: ClassVar[Traits] = Traits()
+
+    node: NodeName
+    field: NodeName
+    value: FieldValue
+    more: tuple[FieldSetting, ...] = ()
+
+
+class Get(Request, frozen=True, kw_only=True):
+    """Read fields of the VRML world by the DEF names of their nodes, as VR Source does.
+
+    Attributes:
+        node: DEF name of the node.
+        field: Name of the field.
+        more: Further fields to read at the same time.
+    """
+
+    traits: ClassVar[Traits] = Traits(question=True, answered=True)
+
+    node: NodeName
+    field: NodeName
+    more: tuple[FieldName, ...] = ()
 
 
 class Watch(Request, frozen=True, kw_only=True):
