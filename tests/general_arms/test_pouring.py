@@ -26,7 +26,7 @@ from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.simulation import Simulation
 from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.tilting import UNDERSIDES
+from katana450.extensions.programs.vessel_turn import UNDERSIDES
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3

@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-import numpy as np
-import numpy.typing as npt
 from numpy.polynomial.polynomial import polyval
 
 from katana450.arm.control.pouring import CUP, is_vessel
@@ -23,7 +21,6 @@ from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pour_rate import RatedTilt, RatePlan
 from katana450.extensions.programs.pour_tilt import film_after, tilt_for
-from katana450.extensions.programs.rolling import Rolling, lip_of, over_vessel
 from katana450.extensions.programs.schema_parts import (
     OBJECT,
     Schema,
@@ -34,24 +31,17 @@ from katana450.extensions.programs.schema_parts import (
 from katana450.extensions.programs.script_context import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.tilting import AIM, EMPTY_TILT, Tilting, about_the_lip
 from katana450.extensions.programs.tool_planning import AnyCurve
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.extensions.programs.vessel_turn import VesselTurn, turns_over
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import VesselWater
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
-
-POUR_TURN = math.radians(165.0)
-"""[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
 
 POUR_PACE = 0.3
 """[1] Fraction of the speed while pouring: slow enough for a thin, coherent stream."""
 
 PART_PACE = 0.12
 """[1] Fraction of the speed while a part is poured: the water in the cup hardly swings."""
-
-ABOVE_RIM = 0.13
-"""[m] Height of the tool above the basin's rim: the cup turns over between them."""
 
 MAX_POUR_PITCH = math.radians(60.0)
 """[rad] Maximum pitch of the tool for a pour."""
@@ -70,9 +60,6 @@ LAST_FRACTION = 0.1
 
 RATE_UNIT = "ml/s"
 """Unit of a rate in a script."""
-
-MAX_TILT = EMPTY_TILT
-"""[rad] Maximum tilt about the lip, for a part and for a rate."""
 
 REACTION_TIME = 0.25
 """[s] Time in which a cup that turns back still pours at the same flow."""
@@ -177,15 +164,11 @@ class Pour:
                 "with `side: front`."
             )
         try:
-            if isinstance(level, ToolTarget):
-                turn = self._turn(builder, vessel, level, rest)
-                rated = self._rated(builder, vessel, rest)
-                builder.first(
-                    (turn, -turn),
-                    lambda turn: self._pour(builder, vessel, below, level, turn, rated, rest),
-                )
-            else:
-                self._pour_about_the_lip(builder, vessel, below, rest)
+            tilt, rated = self._tilt(builder, vessel, rest), self._rated(builder, vessel, rest)
+            builder.first(
+                turns_over(builder, vessel, below, tilt, is_rated=rated is not None),
+                lambda way: self._turned(builder, vessel, way, rated, rest),
+            )
         except InputError as error:
             message = f"The {vessel.name} cannot be emptied into {self.into}"
             raise error.after(message) from error
@@ -214,70 +197,43 @@ class Pour:
             )
         return max(held - self.volume, 0.0)
 
-    def _turn(
-        self, builder: PlanBuilder, vessel: SceneObject, level: ToolTarget, rest: float
-    ) -> float:
-        """Return the roll [rad] of the tilted cup; ``rest`` [m^3] is what stays in it."""
-        if self.volume is None or builder.plan_context.session.pouring is None:
-            return POUR_TURN
-        roll = float(_roll_of(self._tilt(builder, vessel, rest), level.pitch))
-        if roll >= POUR_TURN:
-            raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
-        return roll
+    def _tilt(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> float | None:
+        """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup.
 
-    def _tilt(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> float:
-        """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup."""
+        None if all of it is poured.
+        """
         pouring = builder.plan_context.session.pouring
         if self.volume is None or pouring is None:
-            return EMPTY_TILT
+            return None
         inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
         film = film_after(self.volume, rest, PART_TIME, inside)
         return float(tilt_for(PART_FLOW, rest - film, inside))
 
-    def _pour_about_the_lip(
-        self, builder: PlanBuilder, vessel: SceneObject, below: SceneObject, rest: float
-    ) -> None:
-        """Plan the pour of an arm outside the five-axis family. Raises InputError if it cannot."""
-        tilt, rated = self._tilt(builder, vessel, rest), self._rated(builder, vessel, rest)
-        if rated is None and tilt > MAX_TILT:
-            raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
-        if rated is not None and rated.tilts.max() > MAX_TILT:
-            raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
-        environment = builder.plan_context.session.environment
-        T = environment.pose(vessel, builder.state.x_setpoint)
-        rim = builder.point(T[:3, 3] + vessel.height * T[:3, 2], in_base=True)
-        over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height), in_base=True)
-        size, aim = (vessel.extent[0], vessel.height), AIM if is_vessel(below) else 0.0
-        ways = about_the_lip(builder, rim, size, over, aim)
-        builder.first(ways, lambda way: self._tilted(builder, vessel, way, tilt, rated, rest))
-
-    def _tilted(
+    def _turned(
         self,
         builder: PlanBuilder,
         vessel: SceneObject,
-        way: Tilting,
-        tilt: float,
+        way: VesselTurn,
         rated: RatedTilt | None,
         rest: float,
     ) -> None:
         """Append the motions of ``way`` with their pace, and the draining."""
+        fitted = None if rated is None else rated.fitted(way.angles(rated.tilts))
         carry(builder, way.at, f"over {self.into}")
-        pace = POUR_PACE if self.volume is None else PART_PACE
+        pace, end = POUR_PACE if self.volume is None else PART_PACE, way.end
         builder.note("slowly", SetSpeed(pace), builder.state)
-        if rated is None:
-            builder.lead([way.arc(tilt, 0.0, tilt)], POURING)
+        if rated is None or fitted is None:
+            builder.lead([way.line(0.0, end)], POURING)
         else:
-            fitted = rated.fitted(rated.tilts)
-            first, last = (float(polyval(end, fitted)) for end in (-1, 1))
-            start, end = way.arc(first, 0.0, first), way.arc(tilt - last, last, tilt)
-            self._pour_at_rate(builder, rated.duration, start, way.by(fitted), end)
-            tilt = tilt if self.volume is None else last
+            first, last = (float(polyval(place, fitted)) for place in (-1, 1))
+            curves = way.line(0.0, first), way.by(fitted), way.line(last, end)
+            self._pour_at_rate(builder, rated.duration, *curves)
+            end = end if self.volume is None else last
         if self.shake:
-            up = tilt - SHAKE_ANGLE
-            shake = way.arc(-SHAKE_ANGLE, tilt, up), way.arc(SHAKE_ANGLE, up, tilt)
-            builder.lead([*shake] * self.shake, "shake")
+            back = way.end - math.copysign(SHAKE_ANGLE, way.end)
+            builder.lead([way.line(end, back), way.line(back, end)] * self.shake, "shake")
         self._drain(builder, vessel, rest)
-        builder.lead([way.arc(-tilt, tilt, 0.0)], "turn back")
+        builder.lead([way.line(end, 0.0)], "turn back")
 
     def _drain(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> None:
         """Append the wait until the last water, or the part, has run out."""
@@ -313,65 +269,6 @@ class Pour:
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
         return RatePlan.of(out, self.rate).tilts(held, inside)
 
-    def _pour(
-        self,
-        builder: PlanBuilder,
-        vessel: SceneObject,
-        below: SceneObject,
-        level: ToolTarget,
-        turn: float,
-        rated: RatedTilt | None,
-        rest: float,
-    ) -> None:
-        chain = builder.chain
-        # The turn is limited to the range of the wrist.
-        room = 0.995 * (chain.upper[4] if turn > 0.0 else -chain.lower[4])
-        turn = math.copysign(min(abs(turn), room - abs(level.roll)), turn)
-        way = self._over(builder, vessel, below, level, turn)
-        at = way.at
-        carry(builder, at, f"over {self.into}")
-        pace = POUR_PACE if self.volume is None else PART_PACE
-        builder.note("slowly", SetSpeed(pace), builder.state)
-        down = at.roll + turn
-        if rated is None:
-            builder.lead([way.line(at.roll, down)], POURING)
-        else:
-            rolls = _roll_of(rated.tilts, at.pitch)
-            if rolls.max() > abs(turn) and rolls.max() >= POUR_TURN:
-                raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
-            fitted = rated.fitted(at.roll + math.copysign(1.0, turn) * rolls)
-            first, last = (float(polyval(end, fitted)) for end in (-1, 1))
-            start, end = way.line(at.roll, first), way.line(last, down)
-            self._pour_at_rate(builder, rated.duration, start, way.by(fitted), end)
-            down = down if self.volume is None else last
-        if self.shake:
-            back = at.roll + turn - math.copysign(SHAKE_ANGLE, turn)
-            builder.lead([way.line(down, back), way.line(back, down)] * self.shake, "shake")
-        self._drain(builder, vessel, rest)
-        builder.lead([way.line(down, at.roll)], "turn back")
-
-    def _over(
-        self,
-        builder: PlanBuilder,
-        vessel: SceneObject,
-        below: SceneObject,
-        level: ToolTarget,
-        turn: float,
-    ) -> Rolling:
-        """Return the roll over the middle of the object ``below``."""
-        if is_vessel(below):
-            return over_vessel(builder, vessel, below, level, turn)
-        over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height + ABOVE_RIM), in_base=True)
-        position = over
-        for _ in range(3):
-            # Iterate until the lip is over the basin's middle when the cup lies on its side, or
-            # is tilted as far as it will be.
-            at = replace(level, position=position)
-            tilted = 0.5 * turn if self.volume is None else turn
-            side = builder.joints_of(replace(at, roll=level.roll + tilted))
-            position = position + (over - lip_of(builder, vessel, side)[0]) * (1.0, 1.0, 0.0)
-        return Rolling(replace(level, position=position), turn)
-
 
 def _rate(value: YamlValue) -> float:
     """Read a flow in ml/s, as a number or a text such as 10 ml/s; return it in m^3/s."""
@@ -380,16 +277,6 @@ def _rate(value: YamlValue) -> float:
             number = float(value.held.removesuffix(RATE_UNIT))
             value = replace(value, kind="number", number=number, unit=PLAIN)
     return ML * read.number(1.0, 50.0, RATE_UNIT)(value)
-
-
-def _roll_of(tilt: npt.ArrayLike, pitch: float) -> FloatArray:
-    """Return the roll [rad] of a tool with ``pitch`` [rad] at which a cup has ``tilt`` [rad].
-
-    Rolling by phi tilts it by cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2. The result is pi
-    where no roll tilts it that far.
-    """
-    steep = math.sin(pitch) ** 2
-    return np.arccos(np.clip((np.cos(tilt) - steep) / (1.0 - steep), -1.0, 1.0))
 
 
 STEPS: dict[str, type[Step]] = {"pour": Pour}
