@@ -19,8 +19,8 @@ from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.clocked_run import Planned, run_by_clock
+from katana450.extensions.programs.curves import PoseTurn
 from katana450.extensions.programs.plan_builder import TICK, PlanContext
-from katana450.extensions.programs.pose_curve import PoseTurn
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse

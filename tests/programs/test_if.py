@@ -190,7 +190,7 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
 
 
 def test_tool_point_is_measured_in_the_frame_of_the_script(stage: Stage, empty: State) -> None:
-    p = PlanBuilder(stage.plan_context, empty).at.position
+    p = PlanBuilder(stage.plan_context, empty).target.position
     T = stage.plan_context.T_base_shoulder
     for frame, z in (("shoulder", p[2]), ("base", (T[:3, :3] @ p + T[:3, 3])[2])):
         bounds = f"{{at_least: {1e3 * z - 0.1:.4f}, at_most: {1e3 * z + 0.1:.4f}}}"

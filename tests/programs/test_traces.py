@@ -13,7 +13,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_along
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.extensions.programs.curve import Linear, ToolArc
+from katana450.extensions.programs.curves import Linear, ToolArc
 from katana450.extensions.programs.server.traces import (
     BAD_COLOUR,
     GOOD_COLOUR,

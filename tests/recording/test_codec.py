@@ -30,9 +30,17 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.robot.props import load_props, water_environment
-from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
-from katana450.extensions.programs.pose_curve import TurnedCurve
-from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
+from katana450.extensions.programs.curves import (
+    Curve,
+    Linear,
+    Swing,
+    ToolArc,
+    ToolLine,
+    ToolLines,
+    ToolScrew,
+    ToolTurn,
+    TurnedCurve,
+)
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.recording.codec import (
     Codec,

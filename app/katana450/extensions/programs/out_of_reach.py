@@ -35,7 +35,7 @@ STEP = 0.1
 WIDER = math.radians(5.0)
 """[rad] Angle by which a limit is widened to find out whether it binds."""
 
-SAMPLES = 33
+SAMPLES = 65
 """Number of places of a path that are compared."""
 
 CLEAR_TURN = math.radians(1.0)

@@ -29,7 +29,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.path import Path, joint_derivatives
@@ -181,13 +181,6 @@ class PlanBuilder:
     def q(self) -> FloatArray:
         """The present joints (n,) [rad]."""
         return self.state.setpoint
-
-    @property
-    def at(self) -> ToolTarget:
-        """The present target of a tool of the five-axis family."""
-        found = self.target
-        assert isinstance(found, ToolTarget)
-        return found
 
     @property
     def planning(self) -> ToolPlanning:

@@ -19,8 +19,7 @@ from katana450.extensions.programs.drain import Drain
 from katana450.extensions.programs.expression import PLAIN
 from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.pour_rate import RatedTilt, RatePlan
-from katana450.extensions.programs.pour_tilt import film_after, tilt_for
+from katana450.extensions.programs.pour_tilt import RatedTilt, RatePlan, film_after, tilt_for
 from katana450.extensions.programs.schema_parts import (
     OBJECT,
     Schema,

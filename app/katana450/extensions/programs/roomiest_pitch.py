@@ -10,9 +10,8 @@ from typing import Final
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.programs.curve import ToolArc
+from katana450.extensions.programs.curves import Swing, ToolArc
 from katana450.extensions.programs.jet_posture import posture
-from katana450.extensions.programs.tool_curves import Swing
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch

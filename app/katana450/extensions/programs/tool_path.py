@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from katana450 import tolerances
+from katana450.arm.control.messages import axis_names
 from katana450.caching import cached_property
 from katana450.errors import PathError
-from katana450.extensions.programs.curve import Curve, ToolCoordinates
+from katana450.extensions.programs.curves import Curve, ToolCoordinates
 from katana450.extensions.programs.jet_posture import posture
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -191,27 +192,11 @@ class ToolPath(CurvePath):
 
         Extremes between two places are those of the cubic through their angles and rates.
         """
-        slack, lower, upper = tolerances.LIMIT_SLACK, self.chain.lower, self.chain.upper
-        beyond = np.maximum(lower - q, q - upper)
-        extreme = peaks(q, qd, np.diff(self._sigma)[:, None])
-        over = np.maximum(beyond[:-1], np.maximum(lower - extreme, extreme - upper))
-        over[-1] = np.maximum(over[-1], beyond[-1])
-        if over.max() <= slack:
-            return
-        place = int(np.flatnonzero((over > slack).any(axis=1))[0])
-        axis = int(over[place].argmax())
-        worst = float(np.maximum(beyond, 0.0)[:, axis].max(initial=float(over[:, axis].max())))
-        limit = lower[axis] if q[place, axis] < 0.5 * (lower + upper)[axis] else upper[axis]
-        sigma = float(self._sigma[place])
-        if place > 0 and beyond[place, axis] > slack:
-            passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
-            sigma -= float(passed) * (sigma - float(self._sigma[place - 1]))
-        raise PathError(
-            f"The path takes axis {axis + 1} over its limit of {np.degrees(limit):.1f} deg "
-            f"{at_place(sigma)}, by up to {np.degrees(worst):.3g} deg later on. "
-            "Shift the path, or give it another pitch or roll.",
-            self._target(sigma).position.tolist(),
-        )
+        refusal = limit_refusal(self.chain, self._sigma, q, qd)
+        if refusal is not None:
+            sigma, why = refusal
+            point = self._target(sigma).position.tolist()
+            raise PathError(f"{why} Shift the path, or give it another pitch or roll.", point)
 
 
 def at_place(sigma: float) -> str:
@@ -219,7 +204,42 @@ def at_place(sigma: float) -> str:
     return f"{100.0 * sigma:.1f} % along it, at {{point}}"
 
 
-def peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
+def limit_refusal(
+    chain: Chain, sigma: FloatArray, q: FloatArray, qd: FloatArray
+) -> tuple[float, str] | None:
+    """Return the place where an axis first exceeds its limit, and a sentence; None without one.
+
+    Extremes between two places are those of the cubic through their angles and rates.
+
+    Args:
+        chain: the arm with its tool.
+        sigma: (N,) rising places.
+        q: (N, n) angles there [rad].
+        qd: (N, n) rates there [rad].
+    """
+    slack, lower, upper = tolerances.LIMIT_SLACK, chain.lower, chain.upper
+    beyond = np.maximum(lower - q, q - upper)
+    extreme = _peaks(q, qd, np.diff(sigma)[:, None])
+    over = np.maximum(beyond[:-1], np.maximum(lower - extreme, extreme - upper))
+    over[-1] = np.maximum(over[-1], beyond[-1])
+    if over.max() <= slack:
+        return None
+    place = int(np.flatnonzero((over > slack).any(axis=1))[0])
+    axis = int(over[place].argmax())
+    worst = float(np.maximum(beyond, 0.0)[:, axis].max(initial=float(over[:, axis].max())))
+    limit = lower[axis] if q[place, axis] < 0.5 * (lower + upper)[axis] else upper[axis]
+    first = float(sigma[place])
+    if place > 0 and beyond[place, axis] > slack:
+        passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
+        first -= float(passed) * (first - float(sigma[place - 1]))
+    return first, (
+        f"The path takes axis {axis + 1}, {axis_names(chain.names)[axis]}, over its limit of "
+        f"{np.degrees(limit):.1f} deg {at_place(first)}, by up to {np.degrees(worst):.3g} deg "
+        "later on."
+    )
+
+
+def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
     """Return the extreme (N, n) inside each piece of length `h` (N, 1), or its start if none."""
     a, b = q[:-1], q[1:]
     da, db = h * qd[:-1], h * qd[1:]

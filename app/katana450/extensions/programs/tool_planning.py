@@ -21,12 +21,21 @@ from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
-from katana450.extensions.programs.following import CurveSearch, LostPathError
-from katana450.extensions.programs.pose_curve import PoseCurve, PoseLines, TurnedCurve
+from katana450.extensions.programs.curves import (
+    Curve,
+    Linear,
+    PoseCurve,
+    PoseLines,
+    ToolArc,
+    ToolLine,
+    ToolLines,
+    ToolScrew,
+    TurnedCurve,
+    screw_points,
+)
+from katana450.extensions.programs.pose_path import CurveSearch, LostPathError
 from katana450.extensions.programs.roomiest_pitch import roomiest
 from katana450.extensions.programs.step_target import Angles
-from katana450.extensions.programs.tool_curves import ToolLines, ToolScrew, screw_points
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

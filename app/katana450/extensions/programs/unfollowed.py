@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
-from katana450.extensions.programs.following import LostPathError
 from katana450.extensions.programs.out_of_reach import farthest, near_points
 from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.pose_path import LostPathError
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch

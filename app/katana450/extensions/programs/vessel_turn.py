@@ -20,10 +20,8 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.approach import UP
-from katana450.extensions.programs.curve import ToolLine
+from katana450.extensions.programs.curves import PoseTurn, ToolLine, ToolTurn
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.pose_curve import PoseTurn
-from katana450.extensions.programs.tool_curves import ToolTurn
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

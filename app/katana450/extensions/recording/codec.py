@@ -28,10 +28,21 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.curve import Curve, Linear, ToolArc, ToolLine
-from katana450.extensions.programs.pose_curve import PoseCurve, PoseLines, PoseTurn, TurnedCurve
+from katana450.extensions.programs.curves import (
+    Curve,
+    Linear,
+    PoseCurve,
+    PoseLines,
+    PoseTurn,
+    Swing,
+    ToolArc,
+    ToolLine,
+    ToolLines,
+    ToolScrew,
+    ToolTurn,
+    TurnedCurve,
+)
 from katana450.extensions.programs.pose_path import PosePath
-from katana450.extensions.programs.tool_curves import Swing, ToolLines, ToolScrew, ToolTurn
 from katana450.extensions.programs.tool_path import ToolPath
 from katana450.extensions.programs.trajectory_path import TrajectoryPath
 from katana450.extensions.recording.former_forms import FORMER, command_form, upgraded

@@ -1,0 +1,513 @@
+"""Curves of the tool as functions of one parameter.
+
+Each curve is a formula of sigma, which runs from 0 to 1, and is evaluated on jets. Every place on
+it is therefore exact, and so are its derivatives. The five-axis family has curves of the tool
+point, pitch and roll. Other arms have curves of poses: of fewer than six axes their rotations are
+those with axis 1 at zero, as in `ToolPose`. Lengths in m, angles in rad, frame {S}.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import ClassVar, Final, NamedTuple, Protocol
+
+import numpy as np
+
+from katana450.caching import cached_property
+from katana450.errors import InputError
+from katana450.extensions.general_arms.pose_equations import PoseJets
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.jet_posture import facing
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.jet import Jet, atan2, sin_cos, sqrt
+from katana450.maths.planning.polyline import Polyline
+
+TURN_LENGTH = 0.25
+"""Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
+
+VIA_TOLERANCE = 1e-9
+"""Vias nearer to each other than this [m] are the same."""
+
+UNIT: Final = 1e-9
+"""[1] Maximum error of the length of a unit vector."""
+
+Profile = Callable[[Jet], Jet]
+"""An angle along a curve [rad], as a function of sigma."""
+
+Terms = list[list[float]]
+"""For x, y and z of a turned vector the terms with the cosine, with the sine, and without both."""
+
+
+class ToolCoordinates(NamedTuple):
+    """The five freedoms of the tool as jets: the tool point x, y, z in {S}, pitch and roll."""
+
+    x: Jet
+    y: Jet
+    z: Jet
+    pitch: Jet
+    roll: Jet
+
+
+class Curve(Protocol):
+    """The tool along a path."""
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places between 0 and 1 where one formula ends and another begins, in rising order."""
+        ...
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        ...
+
+
+class PoseCurve(Protocol):
+    """The pose of the tool along a path."""
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places between 0 and 1 where one formula ends and another begins, in rising order."""
+        ...
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        ...
+
+
+class _OneFormula:
+    """A curve of one formula, which has no joins."""
+
+    joins: ClassVar[tuple[float, ...]] = ()
+
+
+class _Legs:
+    """A curve of straight legs and rounded corners."""
+
+    _line: Polyline
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where legs and corners meet."""
+        return self._line.joins
+
+
+@dataclass(frozen=True)
+class Linear:
+    """An angle that changes evenly from `start` to `end` [rad]; constant where they are equal."""
+
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        finite_array((self.start, self.end), (2,), "The ends of an angle's profile")
+
+    def __call__(self, sigma: Jet) -> Jet:
+        """Return the angle [rad] at `sigma`."""
+        return self.start + (self.end - self.start) * sigma
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLine(_OneFormula):
+    """A straight path from one target to another, on which pitch and roll turn evenly.
+
+    With both targets at one point the tool only turns, as when a cup is emptied.
+    """
+
+    start: ToolTarget
+    end: ToolTarget
+
+    def __post_init__(self) -> None:
+        for name, target in (("start", self.start), ("end", self.end)):
+            numbers = np.append(target.position, (target.pitch, target.roll))
+            finite_array(numbers, (5,), f"The {name} of a line")
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        x, y, z = (
+            a + (b - a) * sigma
+            for a, b in zip(self.start.position.tolist(), self.end.position.tolist(), strict=True)
+        )
+        pitch = Linear(self.start.pitch, self.end.pitch)(sigma)
+        return ToolCoordinates(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
+
+
+@dataclass(frozen=True, eq=False)
+class ToolArc(_OneFormula):
+    """A turn of the tool point by `angle` [rad] about an axis, also by more than a whole circle.
+
+    Attributes:
+        start: first point (3,) [m].
+        centre, axis: a point (3,) on the axis [m] and its direction (3,).
+        angle: the angle of the turn [rad].
+        pitch, roll: pitch and roll of the tool along the arc.
+        climb: motion along the axis over the whole turn [m].
+    """
+
+    start: FloatArray
+    centre: FloatArray
+    axis: FloatArray
+    angle: float
+    pitch: Profile
+    roll: Profile
+    climb: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, what in (("start", "start"), ("centre", "centre"), ("axis", "axis")):
+            value = finite_array(getattr(self, name), (3,), f"The {what} of an arc")
+            object.__setattr__(self, name, frozen(value))
+        finite_array((self.angle, self.climb), (2,), "Angle and climb of an arc")
+        length = math.hypot(*self.axis)
+        if length == 0.0:
+            raise InputError("The axis of an arc is zero; give it a direction.")
+        object.__setattr__(self, "axis", frozen(self.axis / length))
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        s, c = sin_cos(self.angle * sigma)
+        x, y, z = (c * u + s * v + (f + k * sigma) for u, v, f, k in self._terms)
+        return ToolCoordinates(x, y, z, self.pitch(sigma), self.roll(sigma))
+
+    @cached_property
+    def _terms(self) -> list[list[float]]:
+        """The terms of x, y, z: with the cosine, with the sine, constant, with sigma."""
+        arm = self.start - self.centre
+        along = (arm @ self.axis) * self.axis
+        # The quarter turn of a radius has its length, so this is a circle to rounding.
+        terms = arm - along, np.cross(self.axis, arm), self.centre + along, self.climb * self.axis
+        rows: list[list[float]] = np.stack(terms, axis=1).tolist()
+        return rows
+
+
+@dataclass(frozen=True)
+class Swing:
+    """An angle that follows a circle: mean + sine sin(t) + cosine cos(t) [rad].
+
+    t runs from `begin` through `angle` [rad], as along the arc that the angle belongs to.
+    """
+
+    mean: float
+    sine: float
+    cosine: float
+    begin: float
+    angle: float
+
+    def __post_init__(self) -> None:
+        numbers = (self.mean, self.sine, self.cosine, self.begin, self.angle)
+        finite_array(numbers, (5,), "The numbers of an angle's profile")
+
+    def __call__(self, sigma: Jet) -> Jet:
+        """Return the angle [rad] at `sigma`."""
+        s, c = sin_cos(self.begin + self.angle * sigma)
+        return self.mean + self.sine * s + self.cosine * c
+
+
+def rounded(
+    vias: FloatArray, distances: FloatArray, angles: FloatArray, blend: FloatArray
+) -> Polyline:
+    """Return the legs through the vias of a tool, with rounded corners.
+
+    Args:
+        vias: (m, k) coordinates of the tool, two or more rows.
+        distances: (m - 1,) how far each leg moves the tool point [m].
+        angles: (m - 1,) how far each leg turns the tool [rad].
+        blend: (m - 2,) see `Polyline`.
+
+    Raises InputError for fewer than two vias, and for a leg that neither moves nor turns the tool.
+    """
+    lengths = np.maximum(distances, TURN_LENGTH * angles)
+    if len(vias) < 2 or (lengths <= VIA_TOLERANCE).any():
+        raise InputError("Lines need at least two vias, each different from the one before.")
+    return Polyline(frozen(vias), lengths, blend)
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLines(_Legs):
+    """Straight lines from target to target with rounded corners; pitch and roll turn evenly.
+
+    Corners are those of `Polyline`.
+
+    Attributes:
+        vias: two or more targets, the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
+    """
+
+    vias: tuple[ToolTarget, ...]
+    blend: FloatArray
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
+        numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
+        legs = np.diff(numbers, axis=0)
+        angles = np.abs(legs[:, 3:]).max(axis=1, initial=0.0)
+        line = rounded(numbers, np.linalg.norm(legs[:, :3], axis=1), angles, self.blend)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        return ToolCoordinates(*self._line.at(sigma))
+
+
+def screw_points(p: FloatArray, twist: FloatArray) -> ToolLine | ToolArc:
+    """Return the path of the point ``p`` (3,) [m] along ``twist`` (6,), with pitch and roll 0."""
+    omega, v = twist[:3], twist[3:]
+    turn = math.hypot(*omega)
+    if turn == 0.0:
+        return ToolLine(ToolTarget(p, 0.0, 0.0), ToolTarget(p + v, 0.0, 0.0))
+    centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
+    return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
+
+
+@dataclass(frozen=True, eq=False)
+class ToolScrew(_OneFormula):
+    """A motion of the tool along a twist (omega, v) in {S} from its pose at `q`, for five axes.
+
+    The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to
+    that motion that the arm's plane allows; yaw follows from the arm. Sources: Lynch & Park (2017),
+    ch. 3.3; for the nearest orientation maths/kinematics/orientation.py. Raises InputError for a
+    tool point beside the roll axis: the plane then depends on the turn, and the turn on the plane.
+    """
+
+    chain: Chain
+    branch: Branch
+    q: FloatArray
+    twist: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", frozen(self.chain.check_q(self.q)))
+        twist = finite_array(self.twist, (6,), "The twist of a screw")
+        object.__setattr__(self, "twist", frozen(twist))
+        if arm_of(self.chain).off_axis > 0.0:
+            raise InputError(
+                "A screw path needs a tool point on the roll axis; this one is "
+                f"{1e3 * arm_of(self.chain).off_axis:.3g} mm beside it. Give pitch and roll "
+                "along an arc instead."
+            )
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        arm = arm_of(self.chain)
+        x, y, z, _, _ = self._point_path.at(sigma)
+        # The orientation of {K} in {C} as a quaternion, turned by the twist.
+        (w0, x0, y0, z0), (a, b, c), turn = self._turning
+        s, k = sin_cos((0.5 * turn) * sigma)
+        W = k * w0 - s * (a * x0 + b * y0 + c * z0)
+        X = k * x0 + s * (a * w0 + b * z0 - c * y0)
+        Y = k * y0 + s * (b * w0 + c * x0 - a * z0)
+        Z = k * z0 + s * (c * w0 + a * y0 - b * x0)
+        # In the arm's plane.
+        alpha1, _, _ = facing(arm, self.branch.shoulder, x, y, z)
+        s, k = sin_cos(0.5 * alpha1)
+        W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
+        total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)
+        return ToolCoordinates(x, y, z, total + difference, total - difference)
+
+    @cached_property
+    def _point_path(self) -> ToolLine | ToolArc:
+        """The path of the tool point."""
+        return screw_points(forward(self.chain, self.q)[:3, 3], self.twist)
+
+    @cached_property
+    def _turning(self) -> tuple[list[float], list[float], float]:
+        """The quaternion of {K} in {C} at the start, the axis in {C}, and the angle."""
+        arm = arm_of(self.chain)
+        R = arm.pose(forward(self.chain, self.q))[:3, :3]
+        omega = self.twist[:3]
+        turn = math.hypot(*omega)
+        axis = arm.T_C_S[:3, :3] @ omega / (turn or 1.0)
+        return so3.to_quaternion(R).tolist(), axis.tolist(), turn
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTurn(_OneFormula):
+    """A turn of the tool about its own axis by a polynomial, with one pitch.
+
+    Attributes:
+        target: point and pitch; its roll is not used.
+        rolls: coefficients (n,) of the roll [rad], of the powers of 2 sigma - 1.
+        offsets: coefficients (m, 3) of the way of the tool point from ``target`` [m]; None if it
+            stays there.
+    """
+
+    target: ToolTarget
+    rolls: FloatArray
+    offsets: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        rolls = finite_array(self.rolls, (np.size(self.rolls),), "The coefficients of a roll")
+        object.__setattr__(self, "rolls", frozen(rolls))
+        if self.offsets is not None:
+            shape = (max(len(self.offsets), 1), 3)
+            offsets = finite_array(self.offsets, shape, "The coefficients of a way")
+            object.__setattr__(self, "offsets", frozen(offsets))
+
+    def at(self, sigma: Jet) -> ToolCoordinates:
+        """Return the tool at `sigma`, one place or many."""
+        position = self.target.position.tolist()
+        if self.offsets is None:
+            x, y, z = (place + 0.0 * sigma for place in position)
+        else:
+            ways = zip(position, self.offsets.T.tolist(), strict=True)
+            x, y, z = (place + _polynomial(each, sigma) for place, each in ways)
+        roll = _polynomial(self.rolls.tolist(), sigma)
+        return ToolCoordinates(x, y, z, self.target.pitch + 0.0 * sigma, roll)
+
+
+@dataclass(frozen=True, eq=False)
+class TurnedCurve:
+    """A curve of the tool point on which the tool turns evenly about one axis.
+
+    Attributes:
+        points: the curve of the tool point; its pitch and roll are not used.
+        R: rotation (3, 3) at the start.
+        turn: rotation vector (3,) of the whole turn [rad], zero to keep the orientation.
+    """
+
+    points: Curve
+    R: FloatArray
+    turn: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, shape in (("R", (3, 3)), ("turn", (3,))):
+            value = finite_array(getattr(self, name), shape, "The rotation of a curve")
+            object.__setattr__(self, name, frozen(value))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The joins of the curve of the point."""
+        return self.points.joins
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        x, y, z = self.points.at(sigma)[:3]
+        angle, terms = self._terms
+        if not angle:
+            one, two, three = (tuple(map(Jet.constant, column)) for column in self.R.T.tolist())
+        else:
+            s, c = sin_cos(angle * sigma)
+            one, two, three = (_turned(each, s, c) for each in terms)
+        return PoseJets(x, y, z, (one, two, three))  # type: ignore[arg-type]
+
+    @cached_property
+    def _terms(self) -> tuple[float, list[Terms]]:
+        """The angle [rad], and the terms of each column."""
+        angle = math.hypot(*self.turn)
+        axis = self.turn / (angle or 1.0)
+        return angle, [_terms(column, axis) for column in self.R.T]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTurn(_OneFormula):
+    """A turn of the tool about an axis beside it, by a polynomial.
+
+    Attributes:
+        start: the pose from which the angle counts.
+        point, axis: (3,) [m] and unit vector (3,) of the axis.
+        angles: coefficients (n,) of the angle [rad], of the powers of 2 sigma - 1.
+        axis_in_pose: the axis in the frame of the rotation of ``start``; None if it is the same.
+    """
+
+    start: ToolPose
+    point: FloatArray
+    axis: FloatArray
+    angles: FloatArray
+    axis_in_pose: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        # At least one coefficient is needed.
+        sizes = {"point": 3, "axis": 3, "angles": max(np.size(self.angles), 1)}
+        if self.axis_in_pose is not None:
+            sizes["axis_in_pose"] = 3
+        for name, size in sizes.items():
+            value = finite_array(getattr(self, name), (size,), f"The {name} of a turn")
+            if name.startswith("axis") and abs(math.hypot(*value) - 1.0) > UNIT:
+                raise InputError(f"The {name} of a turn is not a unit vector.")
+            object.__setattr__(self, name, frozen(value))
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        sine, cosine = sin_cos(_polynomial(self.angles.tolist(), sigma))
+        beside = self.start.position - self.point
+        x, y, z = (
+            place + each
+            for place, each in zip(
+                self.point.tolist(), _turned(_terms(beside, self.axis), sine, cosine), strict=True
+            )
+        )
+        axis = self.axis if self.axis_in_pose is None else self.axis_in_pose
+        turned = (_turned(_terms(c, axis), sine, cosine) for c in self.start.R.T)
+        return PoseJets(x, y, z, tuple(turned))  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseLines(_Legs):
+    """Straight lines from pose to pose with rounded corners.
+
+    On each line the tool turns about one axis. Corners are those of `Polyline`; the rotations are
+    quaternions along a polyline, divided by their length.
+
+    Attributes:
+        vias: two or more poses, the first and last are start and end.
+        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
+            1.
+    """
+
+    vias: tuple[ToolPose, ...]
+    blend: FloatArray
+    _line: Polyline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        turns = [so3.to_quaternion(via.R) for via in self.vias]
+        for number, after in enumerate(turns[1:], start=1):
+            # A quaternion and its opposite are the same rotation; the nearer one is taken.
+            turns[number] = math.copysign(1.0, float(turns[number - 1] @ after)) * after
+        rows = np.array(
+            [[*via.position, *turn] for via, turn in zip(self.vias, turns, strict=True)]
+        )
+        numbers = finite_array(rows, (len(rows), 7), "The vias of lines")
+        apart = np.array([one.apart(other) for one, other in pairwise(self.vias)]).reshape(-1, 2)
+        line = rounded(numbers, apart[:, 0], apart[:, 1], self.blend)
+        object.__setattr__(self, "blend", line.blend)
+        object.__setattr__(self, "_line", line)
+
+    def at(self, sigma: Jet) -> PoseJets:
+        """Return the pose at `sigma`, one place or many."""
+        x, y, z, *turn = self._line.at(sigma)
+        length = sqrt(sum((each * each for each in turn), start=Jet.constant(0.0)))
+        w, a, b, c = (each / length for each in turn)
+        one = (1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b + w * c), 2.0 * (a * c - w * b))
+        two = (2.0 * (a * b - w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c + w * a))
+        three = (2.0 * (a * c + w * b), 2.0 * (b * c - w * a), 1.0 - 2.0 * (a * a + b * b))
+        return PoseJets(x, y, z, (one, two, three))
+
+
+def _polynomial(coefficients: Sequence[float], sigma: Jet) -> Jet:
+    """Return the polynomial of 2 sigma - 1."""
+    *lower, highest = coefficients
+    s, value = 2.0 * sigma - 1.0, highest + 0.0 * sigma
+    for coefficient in reversed(lower):
+        value = value * s + coefficient
+    return value
+
+
+def _terms(v: FloatArray, axis: FloatArray) -> Terms:
+    """Return the terms of a turn of the vector ``v`` (3,) about the unit vector ``axis`` (3,)."""
+    along = (axis @ v) * axis
+    terms: Terms = np.stack((v - along, np.cross(axis, v), along), axis=1).tolist()
+    return terms
+
+
+def _turned(terms: Terms, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
+    """Return the vector of ``terms``, turned by an angle."""
+    return tuple(cosine * c + sine * s + f for c, s, f in terms)
