@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.messages import COMMANDS, EPISODES
 from tests.recording.recorded import Commands, random_commands, record
@@ -37,17 +37,17 @@ def write_copy(
         change: changes each message.
     """
     with RecordingFile.open(source) as file, out.open("wb") as target:
-        copy = RecordingCopy(target, {**file.metadata, **(metadata or {})}, file.attachments())
+        copy = MessageWriter(target, {**file.metadata, **(metadata or {})}, file.attachments())
         for message in file.messages(*file.counts()):
             if gap is not None and message.topic == COMMANDS and message.t > file.start + gap:
                 lost = {"t": message.t, "missing": "the disk was slow", "ticks": 7}
-                copy.add(message._replace(data=json.dumps(lost).encode()))
+                copy.copy(message._replace(data=json.dumps(lost).encode()))
                 gap = None
-            copy.add(change(message))
+            copy.copy(change(message))
         at = round(1e9 * file.end)
         for each in episodes:
-            copy.add(Message(EPISODES, 0, at, json.dumps(each).encode()))
-        copy.close()
+            copy.copy(Message(EPISODES, 0, at, json.dumps(each).encode()))
+        copy.finish()
     return out
 
 

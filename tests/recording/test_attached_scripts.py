@@ -23,8 +23,8 @@ from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.programs.script_files import script_text
-from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.keeping import whole_copy
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import FOLDER, script_runs
@@ -284,9 +284,9 @@ def test_changed_text_is_refused(tmp_path: Path) -> None:
         attachments = [
             replace(each, data=each.data.replace(b"S0", b"S1")) for each in file.attachments()
         ]
-        copy = RecordingCopy(out, file.metadata, attachments)
+        copy = MessageWriter(out, file.metadata, attachments)
         for message in file.messages(*file.counts()):
-            copy.add(message)
-        copy.close()
+            copy.copy(message)
+        copy.finish()
     with pytest.raises(InputError, match="is not the text that ran"):
         _ = katana450.open(changed).programs

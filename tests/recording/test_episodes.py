@@ -33,7 +33,7 @@ from katana450.extensions.recording.episodes.episode_file import (
 )
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episode_files
 from katana450.extensions.recording.episodes.episode_requests import episode_request
-from katana450.extensions.recording.episodes.undoable_judgement import UNDO_SECONDS
+from katana450.extensions.recording.episodes.keeper import UNDO_SECONDS
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter

@@ -20,7 +20,7 @@ from katana450.arm.control.lease import Role
 from katana450.extensions.recording import claimed_folder as claims
 from katana450.extensions.recording.claimed_folder import CLAIM, remove_abandoned
 from katana450.extensions.recording.datasets.new_folder import new_folder
-from katana450.extensions.recording.live.route import recording_routes
+from katana450.extensions.recording.live.recording_routes import RecordingRoutes
 from katana450.extensions.recording.playback import routes as routes_module
 from katana450.extensions.recording.playback.routes import OTHER, PlaybackRoutes
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
@@ -130,7 +130,7 @@ def test_download_is_sent_in_parts_and_removed(
     ring.mkdir()
     (ring / "1.mcap").write_bytes(content)
     store = RecordingStore(ring)
-    download = recording_routes(context(), store)[0].endpoint
+    download = RecordingRoutes(context(), store).routes()[0].endpoint
     scope = {"type": "http", "method": "GET", "query_string": b"", "headers": []}
     sent: list[dict[str, Any]] = []
 

@@ -9,7 +9,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from multiprocessing import Pipe
@@ -26,11 +26,12 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.live import record_end, ring, route
-from katana450.extensions.recording.live.record_end import RecordEnd, lost_records
-from katana450.extensions.recording.live.record_wire import RecordDeserializer
+from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.live.jobs import RecordingJob
+from katana450.extensions.recording.live.record_end import RecordEnd
+from katana450.extensions.recording.live.record_wire import LostTicks, RecordDeserializer
+from katana450.extensions.recording.live.recording_routes import RecordingRoutes
 from katana450.extensions.recording.live.ring import Ring
-from katana450.extensions.recording.live.route import recording_routes
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, STATE
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.store import RecordingStore
@@ -133,7 +134,7 @@ def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
     context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     request = Request({"type": "http", "query_string": b"", "headers": []})
     with pytest.raises(HTTPException) as caught:
-        asyncio.run(recording_routes(context, RecordingStore(folder))[0].endpoint(request))
+        asyncio.run(RecordingRoutes(context, RecordingStore(folder)).routes()[0].endpoint(request))
     # An operator passes the check of the role, and learns that the folder is still empty.
     assert caught.value.status_code == (403 if role is Role.VIEWER else 409)
     assert ("may watch" if role is Role.VIEWER else "has no recording") in caught.value.detail
@@ -142,15 +143,16 @@ def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
 def test_script_leaves_no_file_even_if_nobody_takes_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def made(*command: str) -> None:
+    async def made(_job: RecordingJob, command: Sequence[str]) -> str:
         Path(command[-1]).write_bytes(b"recorded")
+        return ""
 
-    monkeypatch.setattr(route, "_record", made)
+    monkeypatch.setattr(RecordingJob, "_result", made)
     who = Identity("session", "Ada", Role.OPERATOR)
     context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     store = RecordingStore(folder)
     request = Request({"type": "http", "query_string": b"", "headers": []})
-    answer = asyncio.run(recording_routes(context, store)[1].endpoint(request))
+    answer = asyncio.run(RecordingRoutes(context, store).routes()[1].endpoint(request))
     assert answer.body == b"recorded"
     # The answer was not sent: the connection broke.
     assert not [each for each in store.new_path().parent.iterdir() if each.is_dir()]
@@ -330,12 +332,12 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
             message = theirs.recv_bytes()
         except EOFError:
             break
-        gap = lost_records(message)
-        if gap is None:
-            received += deserializer.loaded(message)
-        else:
+        records = deserializer.loaded(message)
+        if isinstance(records, LostTicks):
             before_gap = before_gap or len(received)
-            lost += gap[0]
+            lost += records.count
+        else:
+            received += records
     assert lost > 0
     assert len(received) + lost == len(taken)
     assert received[0].t == taken[0].t
@@ -353,7 +355,7 @@ def test_ticks_are_sent_in_batches_and_the_last_ones_soon() -> None:
         end.put(each)
     end.attach(ours)
     deserializer = RecordDeserializer()
-    batches = [deserializer.loaded(theirs.recv_bytes()) for _ in range(2)]
+    batches = [list(deserializer.loaded(theirs.recv_bytes())) for _ in range(2)]
     assert list(map(len, batches)) == [record_end.BATCH] * 2
     # After a motion nothing comes that fills the batch.
     for each in records[-3:]:

@@ -24,9 +24,9 @@ import katana450
 from katana450.arm.control.lease import Role
 from katana450.cli.main import main
 from katana450.extensions import progress
-from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.live.job_routes import JobRoutes
+from katana450.extensions.recording.live.recording_routes import RecordingRoutes
 from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore
 from katana450.server.service.identity import Identity
@@ -128,12 +128,12 @@ def test_difference_is_stated_with_its_time_and_size(page: Page, tmp_path: Path)
     path, changed = tmp_path / "all.mcap", tmp_path / "changed.mcap"
     path.write_bytes(page.ask("")[1])
     with RecordingFile.open(path) as file, changed.open("wb") as out:
-        copy, count = RecordingCopy(out, file.metadata, file.attachments()), 0
+        copy, count = MessageWriter(out, file.metadata, file.attachments()), 0
         for message in file.messages(*file.counts()):
             count += message.topic == COMMANDS
             other = message.data.replace(b'"digest":"', b'"digest":"0')
-            copy.add(message._replace(data=other) if count == 60 else message)
-        copy.close()
+            copy.copy(message._replace(data=other) if count == 60 else message)
+        copy.finish()
     status, answer = page.upload(changed)
     assert status == 200, answer
     name = json.loads(answer)["name"]
@@ -238,7 +238,7 @@ def test_viewers_begin_no_job(tmp_path: Path) -> None:
     who = Identity("session", "Vera", Role.VIEWER)
     context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
     request = Request({"type": "http", "query_string": b"do=csv", "headers": [], "path_params": {}})
-    for route in JobRoutes(context, RecordingStore(tmp_path)).routes():
+    for route in RecordingRoutes(context, RecordingStore(tmp_path)).routes()[2:]:
         with pytest.raises(HTTPException) as caught:
             asyncio.run(route.endpoint(request))
         assert caught.value.status_code == 403

@@ -22,7 +22,7 @@ from katana450.arm.control.scene_objects import Shape
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.extensions.programs.script import parse
-from katana450.extensions.recording.live.route import recording_routes
+from katana450.extensions.recording.live.recording_routes import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
@@ -126,7 +126,7 @@ def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_pat
     store = RecordingStore(recorded.parent)
     request = Request({"type": "http", "query_string": b"", "headers": []})
     with pytest.raises(HTTPException, match="is a recording of") as caught:
-        asyncio.run(recording_routes(context, store)[1].endpoint(request))
+        asyncio.run(RecordingRoutes(context, store).routes()[1].endpoint(request))
     assert caught.value.status_code == 409
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -191,11 +191,8 @@ class Recording:
     @property
     def settings(self) -> Mapping[str, Any]:
         """Settings of the session. Raises InputError for a recording without them."""
-        try:
-            found: Mapping[str, Any] = json.loads(self.metadata["settings"])
-        except (KeyError, ValueError, RecursionError) as error:
-            raise InputError(f"{self.path} does not state its settings.") from error
-        return found
+        with RecordingFile.open(self.path) as file:
+            return msgspec.structs.asdict(file.settings)
 
     def verify(self, urdf: str | os.PathLike[str] | None = None) -> Verification:
         """Simulate the commands again, and return the comparison with every recorded tick.

@@ -7,7 +7,6 @@ import math
 from pathlib import Path
 
 from katana450.extensions.recording.datasets.export_options import add_export_options
-from katana450.extensions.recording.episodes.episode_options import add_episode_options
 
 URL = "http://127.0.0.1:8080"
 """Default address of the server."""
@@ -95,7 +94,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     )
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    add_episode_options(
+    _add_episode_options(
         acts.add_parser("episodes", help="list and recover the episodes in a folder")
     )
     export = acts.add_parser("export", help="write recordings for other programs")
@@ -107,6 +106,17 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     for each in (trim, export):
         add_part_options(each)
     add_part_options(again, episode=True)
+
+
+def _add_episode_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands of ``katana450 record episodes`` to ``parser``."""
+    acts = parser.add_subparsers(dest="episode_act", required=True, metavar="list | recover")
+    acts.add_parser("list", help="list the episodes in a folder")
+    acts.add_parser(
+        "recover", help="finish the episode that ran when a server ended, without that server"
+    )
+    for act in acts.choices.values():
+        act.add_argument("folder", type=Path, metavar="FOLDER")
 
 
 def add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False) -> None:

@@ -96,14 +96,12 @@ def routes(context: RouteContext) -> list[BaseRoute]:
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
-        from katana450.extensions.recording.live.job_routes import JobRoutes
-        from katana450.extensions.recording.live.route import recording_routes
+        from katana450.extensions.recording.live.recording_routes import RecordingRoutes
         from katana450.extensions.recording.playback.routes import PlaybackRoutes
         from katana450.extensions.recording.playback.store import RecordingStore
 
         store = RecordingStore(folder)
-        made: list[BaseRoute] = [*recording_routes(context, store)]
-        made += JobRoutes(context, store).routes()
+        made: list[BaseRoute] = [*RecordingRoutes(context, store).routes()]
         made += PlaybackRoutes(context, store).routes()
         if episodes is not None and link is not None:
             made += EpisodeRoutes(context, episodes, link).routes()

@@ -87,7 +87,6 @@ def _page(options: argparse.Namespace, file: RecordingFile, start: float, end: f
 def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
     from katana450.extensions.recording.datasets.player_files import (
         PictureViews,
-        is_bare,
         write_film_of,
     )
 
@@ -96,7 +95,7 @@ def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: f
         raise InputError(f"A film has one view, not {len(views)}. Export one film for each.")
     size = options.size or DEFAULT_SIZES["mp4"]
     fps = DEFAULT_FPS["mp4"] if options.fps is None else options.fps
-    pictures = PictureViews(views, size, options.urdf, is_bare(file))
+    pictures = PictureViews(views, size, options.urdf, file.settings.bare)
     robot = _robot(file, options.urdf)
     count = write_film_of(file, options.out, (start, end), fps, robot, pictures, size)
     return _counted(count, "picture")
@@ -118,12 +117,12 @@ def _lerobot(options: argparse.Namespace) -> Exported:
     if not views:
         return export_lerobot(options.files, options.out, asked)
     from katana450.extensions.media.film import check_filmable
-    from katana450.extensions.recording.datasets.player_files import PictureViews, is_bare
+    from katana450.extensions.recording.datasets.player_files import PictureViews
 
     check_filmable(size, asked.fps)
     with RecordingFile.open(files_of(options.files)[0]) as first:
         robot = _robot(first, options.urdf)
-        pictures = PictureViews(views, size, options.urdf, is_bare(first))
+        pictures = PictureViews(views, size, options.urdf, first.settings.bare)
     return export_lerobot(options.files, options.out, asked, robot.session, pictures.pictures)
 
 

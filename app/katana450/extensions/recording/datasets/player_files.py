@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -59,14 +58,6 @@ class PictureViews:
         """Yield the pictures of all views for each of the ``count`` states."""
         with RenderingPool(self._shots, self._urdf, self._bare, count) as pool:
             yield pool.pictures(states)
-
-
-def is_bare(file: RecordingFile) -> bool:
-    """Return whether ``file`` is of an arm without gripper. Raises InputError."""
-    try:
-        return bool(json.loads(file.metadata.get("settings", ""))["bare"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{file.path} does not state the settings of its session.") from error
 
 
 def write_page_of(file: RecordingFile, out: Path, times: FloatArray, robot: DescribedRobot) -> int:

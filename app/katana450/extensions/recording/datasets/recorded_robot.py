@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from pathlib import Path
 
@@ -33,15 +32,11 @@ def recorded_robot(file: RecordingFile) -> Robot:
     Raises InputError or RobotDescriptionError if its description is missing or invalid.
     """
     urdf = attached_urdf(file)
-    try:
-        used = json.loads(file.metadata.get("settings", ""))
-        tool, without_gripper = used["tool"], bool(used["bare"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{file.path} does not state the settings of its session.") from error
+    settings = file.settings
     # The name comes from the file, so only its end is used, which tells what to expand.
     name = f"robot{XACRO if urdf.name.endswith(XACRO) else URDF}"
     with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
         path = Path(folder) / name
         path.write_bytes(urdf.data)
-        robot = read_robot(path, None if tool is None else str(tool), find_arm)
-        return bare(robot) if without_gripper else robot
+        robot = read_robot(path, settings.tool, find_arm)
+        return bare(robot) if settings.bare else robot

@@ -13,22 +13,13 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.sampling import MAX_STEP, sampled
-from katana450.extensions.recording.files.checking import TickReader
+from katana450.extensions.recording.files.recorded_states import MOMENT, simulated_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import (
-    CHECKPOINTS,
-    COMMANDS,
-    PLANS,
-    SOLIDS,
     STATE,
-    TickMessage,
 )
-from katana450.extensions.recording.replay import after, check_fits
 from katana450.maths.geometry.arrays import FloatArray, frozen
-
-MOMENT = 1e-6
-"""[s] Time that is less than any between two ticks."""
 
 
 def columns_from(file: RecordingFile, start: float, end: float) -> dict[str, FloatArray]:
@@ -56,43 +47,15 @@ class RecordedStates:
         table = columns_from(self._file, float(times[0]), float(times[-1]))
         q = sampled(table["t"], table["q"], times)
         gripper = sampled(table["t"], table["gripper"], times)
-        ticks = self._simulated(float(times[0]), float(times[-1]))
-        known, following = None, next(ticks, None)
+        begin, end = float(times[0]), float(times[-1])
+        states = simulated_states(self._file, self._session, begin, end, self._lose)
+        known, following = None, next(states, None)
         for number, t in enumerate(times.tolist()):
-            while following is not None and (known is None or following[0] <= t + MOMENT):
-                known, following = following[1], next(ticks, None)
+            while following is not None and (known is None or following.t <= t + MOMENT):
+                known, following = following, next(states, None)
             if known is None:
                 raise InputError(f"{self._file.path} has no complete state before {t:.3f} s.")
             yield replace(known, q=frozen(q[number]), gripper=float(gripper[number]))
 
-    def _simulated(self, start: float, end: float) -> Iterator[tuple[float, State]]:
-        """Yield time [s] and state of all ticks from the last complete state before ``start``."""
-        file, reader = self._file, TickReader()
-        checkpoint = file.last_before(CHECKPOINTS, start)
-        begin = file.start if checkpoint is None else checkpoint.t - MOMENT
-        for message in file.messages(PLANS, SOLIDS, end=end):
-            reader.add_shared(message)
-        state: State | None = None
-        begun = False
-        for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
-            if message.topic == CHECKPOINTS:
-                state, begun = reader.checkpoint(message), True
-                check_fits(self._session, state)
-                yield message.t, state
-                continue
-            tick = reader.tick(message)
-            if isinstance(tick, TickMessage):
-                self.unknown += tick.ticks
-                state = None
-                continue
-            if state is None:
-                self.unknown += begun
-                continue
-            try:
-                state = after(self._session, state, tick)
-            except InputError:
-                # Rules of another version refuse it. The next complete state is exact again.
-                self.unknown += 1
-                state = None
-                continue
-            yield tick.t, state
+    def _lose(self, ticks: int) -> None:
+        self.unknown += ticks

@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,13 +40,29 @@ from katana450.extensions.recording.episodes.episode_requests import (
 )
 from katana450.extensions.recording.episodes.interrupted import finish_interrupted
 from katana450.extensions.recording.episodes.running_episode import MAX_SECONDS, RunningEpisode
-from katana450.extensions.recording.episodes.undoable_judgement import (
-    UNDO_SECONDS,
-    UndoableJudgement,
-)
 from katana450.extensions.recording.live.ring import Ring
 
+UNDO_SECONDS = 10.0
+"""[s] Time in which the last judgement can be undone."""
+
 log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class UndoableJudgement:
+    """The last judgement, discard or re-record.
+
+    Attributes:
+        number: the episode.
+        before: its outcome before; None if it was discarded, or is the one that runs.
+        until: time [s] from which it cannot be undone any more.
+        replaced: for a re-record, the episodes that were to be replaced before it; else None.
+    """
+
+    number: int
+    before: EpisodeOutcome | None
+    until: float
+    replaced: tuple[int, ...] | None = None
 
 
 class EpisodeKeeper:

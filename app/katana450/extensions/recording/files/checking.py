@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -149,11 +148,9 @@ def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot
             f"{file.path} is a recording of {file.metadata.get('urdf', 'another robot')!r}, not of "
             f"{path}. Name the same URDF, with its meshes beside it, by --urdf."
         )
+    used = file.settings
     try:
-        used = json.loads(file.metadata.get("settings", ""))
-        ready = tuple(float(each) for each in used["ready"])
-        settings = Settings(ready=ready, bare=bool(used["bare"]))
-        tool = None if used["tool"] is None else str(used["tool"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        settings = Settings(ready=used.ready, bare=used.bare)
+    except (ValueError, TypeError) as error:
         raise InputError(f"{file.path} does not state the settings of its session.") from error
-    return find_robot(settings, path, tool)
+    return find_robot(settings, path, used.tool)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import logging
 import secrets
 import time
@@ -11,6 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
+
+import msgspec
 
 from katana450.arm.control.scene_objects import Environment
 from katana450.arm.robot.robot import Robot
@@ -62,6 +63,22 @@ def attached_scene(path: Path) -> tuple[Attachment, ...]:
         return ()
 
 
+class RecordedSettings(msgspec.Struct, frozen=True):
+    """Settings of a recorded session, as its metadata state them.
+
+    Attributes:
+        ready: the ready posture [rad or m].
+        bare: whether the gripper was taken off the arm.
+        rate: ticks per second [Hz].
+        tool: the link to which targets refer; None for that of the file.
+    """
+
+    ready: tuple[float, ...]
+    bare: bool
+    rate: float
+    tool: str | None
+
+
 @dataclass(frozen=True, eq=False)
 class RecordingHeader:
     """The beginning of a recording.
@@ -103,13 +120,13 @@ def header_of(
         described = urdf.read_bytes()
     except OSError as error:
         raise InputError(f"{urdf} cannot be read: {error.strerror or error}.") from error
-    used = {"ready": settings.ready, "bare": settings.bare, "rate": settings.rate, "tool": tool}
+    used = RecordedSettings(tuple(settings.ready), settings.bare, settings.rate, tool)
     metadata = {
         "format": FORMAT,
         "robot": robot.name,
         "urdf": urdf.name,
         "urdf_sha256": hashlib.sha256(described).hexdigest(),
-        "settings": json.dumps(used),
+        "settings": msgspec.json.encode(used).decode(),
         # The clock of states begins at an arbitrary time.
         "utc_offset_ns": str(time.time_ns() - time.perf_counter_ns()),
         **fingerprint(),

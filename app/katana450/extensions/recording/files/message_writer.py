@@ -33,6 +33,7 @@ from katana450.extensions.recording.files.mcap_records import (
     write_end,
     write_records,
 )
+from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.messages import TOPICS
 
 CHUNK_BYTES = 1 << 20
@@ -101,6 +102,10 @@ class MessageWriter:
         content += data
         if len(content) > CHUNK_BYTES:
             self._end_chunk()
+
+    def copy(self, message: Message) -> None:
+        """Write ``message`` of another recording, unless its topic is not one of recordings."""
+        self.add(message.topic, message.number, message.log_time, message.data)
 
     def _end_chunk(self) -> None:
         if self._index:

@@ -8,22 +8,23 @@ from __future__ import annotations
 import math
 import re
 import struct
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
+import msgspec
 import zstandard
 from mcap.exceptions import InvalidMagic, McapError
 from mcap.reader import SeekingReader
 from mcap.records import Chunk, ChunkIndex
-from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 
 from katana450.errors import InputError
-from katana450.extensions.recording.files.header import METADATA, Attachment
+from katana450.extensions.recording.files.header import METADATA, Attachment, RecordedSettings
 from katana450.extensions.recording.state_message import NANO, nanoseconds
 
 MAX_CHUNK_BYTES = 64_000_000
@@ -34,6 +35,14 @@ MAX_RECORD_BYTES = 256_000_000
 
 PART_START: Final = "part_start_s"
 """Name of the metadata with the start of a part that was cut out of a recording [s]."""
+
+HEAD: Final = struct.Struct("<BQ")
+"""Operation code and length of a record."""
+
+MESSAGE: Final = struct.Struct("<HIQQ")
+"""Start of a message: channel, number of the tick, log time and publish time [ns]."""
+
+MESSAGE_CODE = 0x05
 
 WHOLE: Final = re.compile(r"-?[0-9]{1,19}")
 """Pattern of a whole number of nanoseconds."""
@@ -111,14 +120,45 @@ def checked_size(chunk: Chunk) -> int:
     return size
 
 
-def unpacked(chunk: Chunk) -> list[Any]:
-    """Return the records in ``chunk``. Raises one of FAULTS."""
+def chunk_content(chunk: Chunk, limit: int) -> bytes:
+    """Return the records in ``chunk``, of up to ``limit`` bytes. Raises one of FAULTS."""
     if chunk.compression not in ("", "zstd"):
         raise ValueError(f"its chunks are compressed by {chunk.compression!r}, not by zstd")
     size = checked_size(chunk)
-    if size > MAX_CHUNK_BYTES:
-        raise ValueError(f"a chunk has {size} bytes, more than {MAX_CHUNK_BYTES}")
-    return breakup_chunk(chunk, validate_crc=True)
+    if size > limit:
+        raise ValueError(f"a chunk has {size} bytes, more than {limit}")
+    content = chunk.data
+    if chunk.compression == "zstd":
+        content = zstandard.ZstdDecompressor().decompress(chunk.data)
+    if chunk.uncompressed_crc not in (0, zlib.crc32(content)):
+        raise ValueError("the checksum of a chunk is wrong")
+    return content
+
+
+def unpacked(chunk: Chunk) -> list[Any]:
+    """Return the records in ``chunk``. Raises one of FAULTS."""
+    chunk_content(chunk, MAX_CHUNK_BYTES)
+    return breakup_chunk(chunk)
+
+
+def messages_in(content: bytes, channels: Mapping[int, str]) -> Iterator[Message]:
+    """Yield the messages of ``channels`` in the records of a chunk.
+
+    Most messages of a chunk are of others. Skipping these here takes a tenth of the time that a
+    reader of whole records takes.
+    """
+    at, end = 0, len(content)
+    while at < end:
+        code, length = HEAD.unpack_from(content, at)
+        at += HEAD.size
+        if length > end - at:
+            raise EOFError("a record is longer than its chunk")
+        if code == MESSAGE_CODE:
+            channel, number, log_time, _ = MESSAGE.unpack_from(content, at)
+            topic = channels.get(channel)
+            if topic is not None:
+                yield Message(topic, number, log_time, content[at + MESSAGE.size : at + length])
+        at += length
 
 
 def records_at(stream: BoundedStream, offset: int) -> Iterator[Any]:
@@ -231,6 +271,14 @@ class RecordingFile:
         return self._stream.size
 
     @property
+    def settings(self) -> RecordedSettings:
+        """Settings of the session. Raises InputError for a recording without them."""
+        try:
+            return msgspec.json.decode(self.metadata.get("settings", ""), type=RecordedSettings)
+        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            raise InputError(f"{self.path} does not state the settings of its session.") from error
+
+    @property
     def utc_offset(self) -> float:
         """Seconds to add to the times of the recording for seconds since the epoch."""
         return utc_offset_of(self.metadata)
@@ -288,12 +336,8 @@ class RecordingFile:
             chunk = next(records_at(self._stream, index.chunk_start_offset))
             if not isinstance(chunk, Chunk):
                 raise ValueError("its index is wrong")
-            return [
-                Message(topic, record.sequence, record.log_time, record.data)
-                for record in unpacked(chunk)
-                if isinstance(record, McapMessage)
-                and (topic := self._topics.get(record.channel_id, "")) in topics
-            ]
+            channels = {each: topic for each, topic in self._topics.items() if topic in topics}
+            return list(messages_in(chunk_content(chunk, MAX_CHUNK_BYTES), channels))
 
 
 def utc_offset_of(metadata: Mapping[str, str]) -> float:

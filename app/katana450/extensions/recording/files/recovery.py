@@ -5,7 +5,6 @@ What a damaged chunk held is missing, and the new file says how many ticks that 
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,10 +17,11 @@ from mcap.records import Message as McapMessage
 from katana450.atomic import write_files
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import json_text
-from katana450.extensions.recording.files.copying import RecordingCopy
 from katana450.extensions.recording.files.header import METADATA, Attachment
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import (
     FAULTS,
+    HEAD,
     BoundedStream,
     Message,
     RecordingFile,
@@ -37,9 +37,6 @@ from katana450.extensions.recording.messages import (
     TickMessage,
 )
 from katana450.platform_support import claim_file
-
-RECORD_HEAD = struct.Struct("<BQ")
-"""Kind and length of a record."""
 
 
 @dataclass
@@ -109,7 +106,7 @@ def recover(path: Path, out: Path) -> Recovered | None:
             write_files(
                 {
                     out: lambda target: _write(
-                        file, RecordingCopy(target, metadata, attachments), recovered
+                        file, MessageWriter(target, metadata, attachments), recovered
                     )
                 }
             )
@@ -169,14 +166,14 @@ def _records(stream: BoundedStream, recovered: Recovered) -> Iterator[Any]:
 def _length_at(stream: BoundedStream, offset: int) -> int:
     """Return the length of the record at ``offset``, or of all from there on if it is unknown."""
     left = stream.size - offset
-    if offset == 0 or left < RECORD_HEAD.size:
+    if offset == 0 or left < HEAD.size:
         return left
     stream.seek(offset)
-    length = RECORD_HEAD.size + RECORD_HEAD.unpack(stream.read(RECORD_HEAD.size))[1]
+    length = HEAD.size + HEAD.unpack(stream.read(HEAD.size))[1]
     return int(min(length, left))
 
 
-def _write(file: BinaryIO, copy: RecordingCopy, recovered: Recovered) -> None:
+def _write(file: BinaryIO, copy: MessageWriter, recovered: Recovered) -> None:
     """Write the whole chunks of ``file`` to ``copy``, and count them in ``recovered``."""
     topics: dict[int, str] = {}
     # Values that other messages name by their keys, and the number of the newest tick.
@@ -203,16 +200,16 @@ def _write(file: BinaryIO, copy: RecordingCopy, recovered: Recovered) -> None:
                     lost = 0 if newest is None else message.number - newest - 1
                     if topic == COMMANDS and lost > 0:
                         recovered.missing_ticks += lost
-                        copy.add(_gap(message, lost))
+                        copy.copy(_gap(message, lost))
                 if topic == COMMANDS:
                     newest = message.number
                 recovered.start = recovered.start if recovered.messages else message.t
                 recovered.start = min(recovered.start, message.t)
                 recovered.end = max(recovered.end, message.t)
                 recovered.messages += 1
-                copy.add(message)
+                copy.copy(message)
         copy.flush()
-    copy.close()
+    copy.finish()
 
 
 def _gap(message: Message, ticks: int) -> Message:

@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 from katana450.atomic import write_files
 from katana450.errors import InputError
-from katana450.extensions.recording.files.copying import RecordingCopy
+from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import (
     PART_START,
     Message,
@@ -103,7 +103,7 @@ def _write(
     start, end = part
     metadata = {**files[0].metadata, PART_START: repr(start)}
     attachments, runs = scripts_in(files, start, end)
-    copy = RecordingCopy(target, metadata, attachments)
+    copy = MessageWriter(target, metadata, attachments)
     needed: set[bytes] = set()
     for message in _simulated(files, begin, end):
         needed.update(KEY.findall(message.data))
@@ -113,28 +113,28 @@ def _write(
             key = KEY.search(message.data)
             if key is not None and key[1] in needed - given:
                 given.add(key[1])
-                copy.add(message)
+                copy.copy(message)
     copy.flush()
     chunk_ends = start
     if episode is not None:
         # The part begins with it, although an arm at rest may have no states until later.
-        copy.add(Message(EPISODES, 0, nanoseconds(start), episode))
+        copy.copy(Message(EPISODES, 0, nanoseconds(start), episode))
     for run in runs:
         if run.start < start:
-            copy.add(Message(EVENTS, 0, nanoseconds(start), begun_before(run, start)))
+            copy.copy(Message(EVENTS, 0, nanoseconds(start), begun_before(run, start)))
     number = 0
     for message in _merged(files, begin, start, end):
         number = message.number
         if episode is None or message.topic != EPISODES:
-            copy.add(message)
+            copy.copy(message)
         if message.t >= chunk_ends:
             copy.flush()
             chunk_ends = message.t + CHUNK_SECONDS
     if episode is not None:
         # In a chunk of its own, which is found at once.
         copy.flush()
-        copy.add(Message(EPISODES, number, nanoseconds(end), episode))
-    copy.close()
+        copy.copy(Message(EPISODES, number, nanoseconds(end), episode))
+    copy.finish()
 
 
 def _simulated(

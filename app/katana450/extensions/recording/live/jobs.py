@@ -60,6 +60,13 @@ class RecordingJob:
         """Begin, in the running event loop."""
         self._task = asyncio.create_task(self._run())
 
+    async def done_within(self, seconds: float) -> None:
+        """Do the work. Raises JobError with the reason, and TimeoutError after ``seconds`` [s]."""
+        task = self._task = asyncio.create_task(self._run())
+        await asyncio.wait_for(task, seconds)
+        if self.status is not JobStatus.DONE:
+            raise JobError(self.words)
+
     async def close(self) -> None:
         """Cancel what is not done, and remove all that was made."""
         if self._task is not None and not self._task.done():

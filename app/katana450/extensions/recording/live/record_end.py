@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 
 from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.arm.runtime.tick import TickRecord
-from katana450.extensions.recording.live.record_wire import RecordSerializer
+from katana450.extensions.recording.live.record_wire import LostTicks, RecordSerializer
 
 MAX_WAITING = 3000
 """Number of records that wait for a slow reader, 30 s of motion; the next ones are lost."""
@@ -103,7 +103,7 @@ class RecordEnd:
                         self._waiting.extendleft(reversed(records))
                         raise
                 if self._lost:
-                    self._report_lost(pipe)
+                    self._report_lost(pipe, serializer)
         with suppress(OSError):
             pipe.close()
 
@@ -115,32 +115,15 @@ class RecordEnd:
         if not (self._waiting or self._lost or ended):
             self._any.wait()
 
-    def _report_lost(self, pipe: Connection) -> None:
+    def _report_lost(self, pipe: Connection, serializer: RecordSerializer) -> None:
         """Send the number of lost records. Until it is 0, the control thread adds no record."""
         with self._losing:
             lost, until, self._lost = self._lost, self._lost_until, 0
         # A record that was added since then is sent later, in this thread.
         try:
-            pipe.send_bytes(lost_message(lost, until))
+            pipe.send_bytes(serializer.dumped(LostTicks(lost, until)))
         except OSError:
             # To be reported by the next pipe.
             with self._losing:
                 self._lost += lost
             raise
-
-
-def lost_message(count: int, until: float) -> bytes:
-    """Return the message that ``count`` records until the time ``until`` [s] were lost."""
-    return f"{LOST.decode()}{count} {until!r}".encode()
-
-
-LOST = b"lost "
-"""Start of the message about lost records; that of a record begins with another byte."""
-
-
-def lost_records(message: bytes) -> tuple[int, float] | None:
-    """Return how many records were lost, and until which time [s]; None for another message."""
-    if not message.startswith(LOST):
-        return None
-    count, until = message[len(LOST) :].split()
-    return int(count), float(until)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import pickle
+from typing import NamedTuple
 
 from katana450.arm.runtime.tick import TickRecord
 
@@ -19,6 +20,16 @@ BEGIN, CONTINUATION = b"\x01", b"\x02"
 """First byte of a message: whether it refers to nothing, or to messages before it."""
 
 
+class LostTicks(NamedTuple):
+    """A number of ticks that were lost, until the time ``until`` [s]."""
+
+    count: int
+    until: float
+
+
+Sent = list[TickRecord] | LostTicks
+
+
 class RecordSerializer:
     """Serializer at the end of the arm."""
 
@@ -27,12 +38,12 @@ class RecordSerializer:
         self._pickler = pickle.Pickler(self._file, pickle.HIGHEST_PROTOCOL)
         self._remembered = 0
 
-    def dumped(self, records: list[TickRecord]) -> bytes:
+    def dumped(self, records: Sent) -> bytes:
         """Return ``records`` as bytes, for the next message."""
         first = self._remembered == 0
         if first:
             self._pickler.clear_memo()
-        self._remembered += len(records)
+        self._remembered += 1 if isinstance(records, LostTicks) else len(records)
         if self._remembered >= MAX_REMEMBERED:
             self._remembered = 0
         self._file.seek(0)
@@ -49,8 +60,8 @@ class RecordDeserializer:
         self._file = io.BytesIO()
         self._unpickler = pickle.Unpickler(self._file)
 
-    def loaded(self, data: bytes) -> list[TickRecord]:
-        """Return the records in ``data``."""
+    def loaded(self, data: bytes) -> Sent:
+        """Return the records in ``data``, or the number of those that were lost."""
         if data.startswith(BEGIN):
             self._file = io.BytesIO()
             self._unpickler = pickle.Unpickler(self._file)
@@ -58,5 +69,5 @@ class RecordDeserializer:
         self._file.truncate()
         self._file.write(data)
         self._file.seek(len(BEGIN))
-        records: list[TickRecord] = self._unpickler.load()
+        records: Sent = self._unpickler.load()
         return records

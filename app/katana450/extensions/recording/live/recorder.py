@@ -147,8 +147,7 @@ def _listener(
 
 def _receive(pipe: Connection, ring: Ring) -> None:
     """Write what comes by ``pipe`` until the other end closes it."""
-    from katana450.extensions.recording.live.record_end import lost_records
-    from katana450.extensions.recording.live.record_wire import RecordDeserializer
+    from katana450.extensions.recording.live.record_wire import LostTicks, RecordDeserializer
 
     deserializer, synced = RecordDeserializer(), time.monotonic()
     try:
@@ -156,14 +155,12 @@ def _receive(pipe: Connection, ring: Ring) -> None:
             # Without anything to sync there is nothing to do until the next record.
             left = max(synced + SYNC_INTERVAL - time.monotonic(), 0.0)
             if not ring.unsynced or pipe.poll(left):
-                message = pipe.recv_bytes()
-                lost = lost_records(message)
+                records = deserializer.loaded(pipe.recv_bytes())
                 with ring.lock:
-                    if lost is None:
-                        ring.put_all(deserializer.loaded(message))
+                    if isinstance(records, LostTicks):
+                        ring.lost(records.until, records.count)
                     else:
-                        count, until = lost
-                        ring.lost(until, count)
+                        ring.put_all(records)
             if ring.unsynced and time.monotonic() - synced >= SYNC_INTERVAL:
                 with ring.lock:
                     ring.sync()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from argparse import Namespace
 from pathlib import Path
@@ -68,8 +67,7 @@ def part_and_script(
     None: see ``shown_part``. Raises InputError as ``read_part`` and ``again_script``.
     """
     part = read_part(file, *shown_part(file, start, end), name=file.path.name)
-    bare = bool(json.loads(file.metadata["settings"])["bare"])
-    return part, again_script(part, found.session.require_arm(), bare=bare)
+    return part, again_script(part, found.session.require_arm(), bare=file.settings.bare)
 
 
 def _left_out(part: RecordedPart) -> str:
