@@ -74,21 +74,25 @@ def test_parquet_has_the_columns_of_csv_with_units(run: Path, tmp_path: Path) ->
     assert found.schema.metadata[b"robot"] == b"katana450"
 
 
-@pytest.mark.parametrize("kind", ["parquet", "lerobot"])
-def test_missing_pyarrow_is_reported(
+@pytest.mark.parametrize(
+    ("kind", "library"),
+    [("parquet", "pyarrow"), ("lerobot", "pyarrow"), ("rosbag2", "rosbags")],
+)
+def test_missing_library_is_reported(
     run: Path,
     tmp_path: Path,
     kind: str,
+    library: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    for name in [name for name in sys.modules if name.partition(".")[0] == "pyarrow"]:
+    for name in [name for name in sys.modules if name.partition(".")[0] == library] or [library]:
         monkeypatch.setitem(sys.modules, name, None)
     why = refusal(capsys, run, "--format", kind, "--task", "x", "--out", tmp_path / "out")
-    if kind == "parquet":
-        assert "parquet has no --task" in why
+    if kind != "lerobot":
+        assert f"{kind} has no --task" in why
         why = refusal(capsys, run, "--format", kind, "--out", tmp_path / "out")
-    assert "pip install pyarrow" in why
+    assert "pip install pyarrow rosbags" in why
     assert not list(tmp_path.iterdir())
 
 

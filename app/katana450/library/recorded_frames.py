@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 
-from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import TickReader
+from katana450.extensions.recording.files.recorded_states import MOMENT
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     PLANS,
     SOLIDS,
-    ObjectPose,
     StateMessage,
 )
+from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.maths.geometry.arrays import finite_array, frozen
 from katana450.maths.motion.limiter import JointMotion
 
@@ -44,49 +43,41 @@ class RecordedFrames:
         """
         with RecordingFile.open(path) as file:
             first, last = file.start + start, min(file.start + end, file.end)
-            self._forms, self._standing = _forms(file)
+            self._standing = _first_state(file)
+            self._offset = file.utc_offset + MOMENT
             begin = state_at(file, first)
             found = [] if begin is None else [msgspec.structs.replace(begin, t=first)]
             found += [row for row in rows(file, first, last) if not found or row.t > first]
         if not found or any(row.position is None for row in found):
             raise InputError(f"{path} has no states of an arm with a tool in that part.")
-        poses: dict[str, ObjectPose] = {}
-        self._frames: list[tuple[StateMessage, dict[str, ObjectPose]]] = []
-        due = -math.inf
-        for number, row in enumerate(found):
-            row.move_objects(poses)
-            if row.t >= due or number == len(found) - 1:
-                self._frames.append((row, dict(poses)))
-                due = row.t + MIN_STEP
-        self.points = frozen([row.position for row, _ in self._frames])  # type: ignore[arg-type]
-        self.t = frozen([row.t - first for row, _ in self._frames])
-        self._path = path
-        self._n = len(robot.session.ready)
+        frames: list[StateMessage] = []
+        for row in found:
+            if not frames or row is found[-1] or row.t >= frames[-1].t + MIN_STEP:
+                frames.append(row)
+        self._times = [row.t for row in frames]
+        self.points = frozen([row.position for row in frames])  # type: ignore[arg-type]
+        self.t = frozen([row.t - first for row in frames])
+        self._path, self._n = path, len(robot.session.ready)
+        self._run = PlaybackRun(lambda: [path])
+        self._run.update()
 
     def state(self, number: int) -> State:
         """Return the state of the frame ``number``, to be drawn. Raises InputError."""
-        row, poses = self._frames[number]
+        moment = self._run.at(self._times[number] + self._offset)
+        assert moment is not None
+        row = moment.row
         q = finite_array(row.joints, (self._n,), f"The joints in {self._path}")
-        objects = tuple(
-            replace(self._forms[name], T=frozen(pose.T), held=False, fixed=False)
-            for name, pose in poses.items()
-            if name in self._forms
-        )
         return replace(
             self._standing, q=q, motion=JointMotion.rest(q), goal=q, gripper=row.gripper,
-            gripper_setpoint=row.gripper, objects=objects, poured=None, grip=None,
+            gripper_setpoint=row.gripper, objects=moment.objects, poured=None, grip=None,
         )  # fmt: skip
 
 
-def _forms(file: RecordingFile) -> tuple[dict[str, SceneObject], State]:
-    """Return the objects of all complete states by name, and the first of these states."""
-    reader, forms, standing = TickReader(), {}, None
+def _first_state(file: RecordingFile) -> State:
+    """Return the first complete state."""
+    reader = TickReader()
     for message in file.messages(PLANS, SOLIDS):
         reader.add_shared(message)
     for message in file.messages(CHECKPOINTS):
-        state = reader.checkpoint(message)
-        standing = standing or state
-        forms.update({each.name: each for each in state.objects})
-    if standing is None:
-        raise InputError(f"{file.path} has no complete state.")
-    return forms, standing
+        return reader.checkpoint(message)
+    raise InputError(f"{file.path} has no complete state.")

@@ -16,7 +16,11 @@ from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.new_folder import new_folder
 from katana450.extensions.recording.datasets.recorded_robot import attached_urdf, recorded_robot
 from katana450.extensions.recording.files.checking import content_of
-from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.files.recording_file import (
+    Message,
+    RecordingFile,
+    utc_offset_ns,
+)
 from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
 from katana450.extensions.recording.files.table import LEAST
 from katana450.extensions.recording.messages import (
@@ -109,7 +113,7 @@ class _Bag:
         typesys = library("rosbags.typesys", "datasets", "Bags of ROS 2")
         self._file, self._robot, self._writer = file, robot, writer
         self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-        self._offset = _utc_offset(file)
+        self._offset = utc_offset_ns(file.metadata)
         self._root = robot.links[0].name
         self._objects: dict[str, ObjectPose] = {}
         self._shown: int | None = None
@@ -129,8 +133,10 @@ class _Bag:
         begun = False
         for message in self._messages(start, end):
             t = message.log_time + self._offset
-            if t >= MAX_TIME:
-                raise InputError(f"{self._file.path} is damaged: its times are beyond 2038.")
+            if not 0 <= t < MAX_TIME:
+                raise InputError(
+                    f"{self._file.path} is damaged: its times are not from 1970 to 2038."
+                )
             if not begun:
                 begun = True
                 urdf = attached_urdf(self._file).data.decode(errors="replace")
@@ -232,13 +238,6 @@ class _Bag:
         if link.joint is not None:
             T = T @ link.joint.motion(values[link.joint.name])
         return link.parent or self._root, link.name, pose_of(np.asarray(T))
-
-
-def _utc_offset(file: RecordingFile) -> int:
-    """Return what to add to the times of ``file`` for those since the epoch [ns]."""
-    text = file.metadata.get("utc_offset_ns", "")
-    # ``file.utc_offset`` is a float, which is exact to 0.2 us only.
-    return int(text) if text.isdigit() and len(text) < 20 else 0
 
 
 def _latched() -> list[Any]:

@@ -342,8 +342,13 @@ class RecordingFile:
 
 def utc_offset_of(metadata: Mapping[str, str]) -> float:
     """Return the seconds from times of a recording to those since the epoch; 0 if unknown."""
+    return utc_offset_ns(metadata) / NANO
+
+
+def utc_offset_ns(metadata: Mapping[str, str]) -> int:
+    """Return that time in nanoseconds, which is exact."""
     text = metadata.get("utc_offset_ns", "")
-    return int(text) / NANO if WHOLE.fullmatch(text) else 0.0
+    return int(text) if WHOLE.fullmatch(text) else 0
 
 
 def nanoseconds_of(t: float) -> float:

@@ -74,14 +74,14 @@ class Block:
         self._parcels: list[tuple[float, Parcel]] = []
         for message in self._states:
             if LEFT in message.data:
-                row = state_row(message)
+                row = content_of(message, StateMessage)
                 if row.water is not None and row.water.left is not None:
                     ml, start, velocity, span = row.water.left
                     new = Parcel(round(ml * MILLILITRE), start, velocity, 0.0, span)
                     self._parcels.append((row.t, new))
             # Most states name no object, and are decoded when they are shown.
             if any(each in message.data for each in CHANGES):
-                row = state_row(message)
+                row = content_of(message, StateMessage)
                 poses = dict(poses)
                 row.move_objects(poses)
                 if len(poses) > MAX_POSES:
@@ -109,7 +109,7 @@ class Block:
         number = bisect_right(self._times, nanoseconds_of(t)) - 1
         if number < 0:
             return None
-        row, poses = state_row(self._states[number]), self._poses[number]
+        row, poses = content_of(self._states[number], StateMessage), self._poses[number]
         objects = tuple(
             # Drawn where it was, so the arm of today does not carry it.
             replace(self._described[name], T=frozen(pose.T), held=False, fixed=False)
@@ -152,11 +152,6 @@ def still_flying(water: Water, environment: WaterEnvironment) -> Water:
     level = environment.basin.level(water.basin * FEMTOLITRE)
     flying = (each for each in water.parcels if landing(each, environment, level).age > each.age)
     return replace(water, parcels=tuple(flying))
-
-
-def state_row(message: Message) -> StateMessage:
-    """Return the state in ``message``. Raises InputError."""
-    return content_of(message, StateMessage)
 
 
 def _vessel(water: VesselWaterMessage, T: FloatArray) -> VesselWater:

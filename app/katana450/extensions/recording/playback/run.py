@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from katana450.errors import InputError
+from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
@@ -26,7 +27,6 @@ from katana450.extensions.recording.playback.rows import (
     Describer,
     Description,
     RecordedMoment,
-    state_row,
 )
 from katana450.extensions.recording.playback.spans import Span, spans_of
 
@@ -176,7 +176,7 @@ class PlaybackRun:
                         states = file.index.messages(chunk, STATE)
                         before = [each for each in states if each.t <= t]
                         if before:
-                            return state_row(before[-1])
+                            return content_of(before[-1], StateMessage)
             return None
 
     def _places(self, t: float) -> Iterator[_Place]:
