@@ -114,13 +114,13 @@ EXTENSIONS = (
             CliCommand(
                 "record",
                 "keep, verify, repair and cut recordings",
-                f"{HERE}.recording.record_options:add_record_options",
+                f"{HERE}.recording.options:add_record_options",
                 f"{HERE}.recording.serve_parts:record",
             ),
             CliCommand(
                 "score",
                 "measure and compare recordings",
-                f"{HERE}.recording.scoring.score_options:add_score_options",
+                f"{HERE}.recording.options:add_score_options",
                 f"{HERE}.recording.scoring.score_command:score_files",
             ),
         ),

@@ -12,12 +12,6 @@ from pathlib import Path
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.episode_cuts import DEFAULT_OUTCOMES, files_of
-from katana450.extensions.recording.datasets.export_options import (
-    DEFAULT_FPS,
-    DEFAULT_SIZES,
-    OPTION_NAMES,
-    USED,
-)
 from katana450.extensions.recording.datasets.lerobot_export import (
     Exported,
     LerobotOptions,
@@ -30,6 +24,12 @@ from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.options import (
+    DEFAULT_FPS,
+    DEFAULT_SIZES,
+    OPTION_NAMES,
+    USED,
+)
 
 
 def check_options(options: argparse.Namespace) -> None:

@@ -1,0 +1,302 @@
+"""Options of ``katana450 record`` and ``score``, apart from their work: they load nothing heavy."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+URL = "http://127.0.0.1:8080"
+"""Default address of the server."""
+
+MIN_SPEED = 0.01
+"""[1] Smallest fraction of its speed at which a program runs."""
+
+FORMATS = {
+    "csv": "t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it",
+    "mcap": "a recording",
+    "parquet": "the columns of csv in a Parquet file",
+    "rosbag2": "a folder that ROS 2 plays as a bag",
+    "lerobot": "a folder that LeRobot reads as a dataset, version 3.0",
+    "html": "a page that plays it",
+    "mp4": "a film",
+}
+"""Formats of exports and what they are."""
+
+OUTCOMES = ("success", "failure", "unjudged", "unfinished")
+"""Outcomes of episodes, of which a dataset takes the first two by default."""
+
+VIEWS = ("free", "front", "side", "top", "tool")
+"""Cameras, as `katana450 render` has them. Without that extension only pictures are missing."""
+
+MIN_SIDE, MAX_SIDE = 16, 4096
+"""[px] Range of width and height of pictures."""
+
+DEFAULT_SIZES = {"lerobot": (320, 240), "mp4": (1280, 720)}
+"""Width and height of pictures [px] by format."""
+
+DEFAULT_FPS = {"lerobot": 30, "mp4": 25}
+"""Frames per second by format."""
+
+USED = {
+    "task": ("lerobot",),
+    "outcomes": ("lerobot",),
+    "views": ("lerobot", "mp4"),
+    "size": ("lerobot", "mp4"),
+    "fps": ("lerobot", "mp4"),
+    "urdf": ("lerobot", "html", "mp4"),
+}
+"""Formats that use an option; the others refuse it."""
+
+OPTION_NAMES = {"views": "--view"}
+"""Names of options that differ from those of their values."""
+
+
+def add_record_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands of ``katana450 record`` to ``parser``."""
+    acts = parser.add_subparsers(
+        dest="act",
+        required=True,
+        metavar="keep | list | info | recover | verify | again | trim | export | episodes",
+    )
+    keep = acts.add_parser(
+        "keep", help="keep what a server has just recorded, whether it still runs or not"
+    )
+    keep.add_argument(
+        "folder",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the last ten minutes, which the server names at its start",
+    )
+    keep.add_argument(
+        "--last",
+        type=_seconds,
+        default=math.inf,
+        metavar="S",
+        help="seconds before the end of the recording (default: all)",
+    )
+    for name, end in (("--since", "begin"), ("--until", "end")):
+        keep.add_argument(
+            name,
+            type=_seconds,
+            metavar="S",
+            help=f"{end} of the part, in seconds since 1970 (UTC)",
+        )
+    keep.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
+    listed = acts.add_parser("list", help="list the recordings in a folder")
+    listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
+    info = acts.add_parser("info", help="describe a recording")
+    info.add_argument("file", type=Path, metavar="FILE")
+    recover = acts.add_parser("recover", help="repair a recording after a crash")
+    recover.add_argument("file", type=Path, metavar="FILE")
+    recover.add_argument(
+        "--out", type=Path, metavar="FILE", help="new file (default: replace the broken one)"
+    )
+    verify = acts.add_parser(
+        "verify", help="simulate the recorded commands again and compare every tick"
+    )
+    verify.add_argument("file", type=Path, metavar="FILE")
+    _add_urdf_option(verify)
+    verify.add_argument("--json", action="store_true", help="print the result as JSON")
+    again = acts.add_parser("again", help="drive an arm along a recorded motion, or simulate it")
+    again.add_argument("file", type=Path, metavar="FILE")
+    again.add_argument(
+        "--headless", action="store_true", help="simulate it in the recorded scene, without server"
+    )
+    again.add_argument(
+        "--out", type=Path, metavar="FILE", help="write the script instead of running it"
+    )
+    again.add_argument(
+        "--speed", type=_speed, default=1.0, help="fraction of the recorded speed (default: 1)"
+    )
+    again.add_argument("--url", default=URL, help="address of the server (default: %(default)s)")
+    again.add_argument(
+        "--token", default="", help="token of an access link, if the server needs one"
+    )
+    again.add_argument(
+        "--unattended",
+        action="store_true",
+        help="let it run on when this command is ended or loses its connection",
+    )
+    _add_urdf_option(again)
+    trim = acts.add_parser("trim", help="write a part of a recording, or join several")
+    trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    _add_episode_options(
+        acts.add_parser("episodes", help="list and recover the episodes in a folder")
+    )
+    export = acts.add_parser("export", help="write recordings for other programs")
+    _add_export_options(export)
+    for each in (trim, export):
+        each.add_argument(
+            "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
+        )
+    for each in (trim, export):
+        _add_part_options(each)
+    _add_part_options(again, episode=True)
+
+
+def add_score_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 score`` to ``parser``."""
+    parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="recordings")
+    _add_part_options(parser, episode=True)
+    parser.add_argument(
+        "--target",
+        action="append",
+        default=[],
+        type=_target,
+        metavar="OBJECT=X,Y[,Z]",
+        help="place at which an object should stand at the end, in mm in the base frame",
+    )
+    parser.add_argument(
+        "--like",
+        type=Path,
+        metavar="FILE",
+        help="a recording at whose end the objects stand where they should",
+    )
+    parser.add_argument(
+        "--sort",
+        default="duration_s",
+        metavar="MEASURE",
+        help="measure by which several recordings are sorted (default: %(default)s)",
+    )
+    parser.add_argument("--json", action="store_true", help="print the measures as JSON")
+    _add_urdf_option(parser)
+
+
+def _add_episode_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommands of ``katana450 record episodes`` to ``parser``."""
+    acts = parser.add_subparsers(dest="episode_act", required=True, metavar="list | recover")
+    acts.add_parser("list", help="list the episodes in a folder")
+    acts.add_parser(
+        "recover", help="finish the episode that ran when a server ended, without that server"
+    )
+    for act in acts.choices.values():
+        act.add_argument("folder", type=Path, metavar="FOLDER")
+
+
+def _add_export_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 record export`` to ``parser``."""
+    parser.add_argument(
+        "files",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="recordings; for lerobot also folders of episodes",
+    )
+    listed = "; ".join(f"{name}: {what}" for name, what in FORMATS.items())
+    parser.add_argument(
+        "--format",
+        choices=tuple(FORMATS),
+        default="csv",
+        help=f"{listed} (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--task", metavar="TEXT", help="lerobot: task of recordings and episodes without one"
+    )
+    parser.add_argument(
+        "--outcomes",
+        type=_outcomes,
+        metavar="LIST",
+        help="lerobot: outcomes of the episodes to take, of "
+        f"{', '.join(OUTCOMES)} (default: success,failure)",
+    )
+    parser.add_argument(
+        "--view",
+        dest="views",
+        action="append",
+        choices=VIEWS,
+        help="lerobot: camera whose pictures each frame has, several times for several "
+        "(default: none); mp4: camera of the film (default: free)",
+    )
+    sizes = ", ".join(f"{w}x{h} for {name}" for name, (w, h) in DEFAULT_SIZES.items())
+    parser.add_argument(
+        "--size", type=_size, metavar="WxH", help=f"pixels of pictures (default: {sizes})"
+    )
+    rates = ", ".join(f"{fps} for {name}" for name, fps in DEFAULT_FPS.items())
+    parser.add_argument(
+        "--fps", type=int, metavar="N", help=f"frames per second (default: {rates})"
+    )
+    _add_urdf_option(parser, "for pictures and pages: ")
+
+
+def _add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False) -> None:
+    """Add the options that choose a part of a recording to ``parser``.
+
+    ``episode``: whether the default is None, for the episode of a file that is one.
+    """
+    whole = "that of the episode, or else of the recording" if episode else "that of the recording"
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=_seconds,
+        default=None if episode else 0.0,
+        metavar="S",
+        help=f"start of the part, in seconds after the start of the recording (default: {whole})",
+    )
+    parser.add_argument(
+        "--to",
+        dest="end",
+        type=_seconds,
+        default=None if episode else math.inf,
+        metavar="S",
+        help=f"end of the part, in seconds after the start of the recording (default: {whole})",
+    )
+
+
+def _add_urdf_option(parser: argparse.ArgumentParser, use: str = "") -> None:
+    parser.add_argument(
+        "--urdf",
+        type=Path,
+        metavar="FILE",
+        help=f"{use}the recorded robot, if it is not the Katana450 of this program",
+    )
+
+
+def _speed(text: str) -> float:
+    value = _seconds(text)
+    if not MIN_SPEED <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"a fraction from {MIN_SPEED:g} to 1, not {text!r}")
+    return value
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not value >= 0.0:
+        raise argparse.ArgumentTypeError(f"a number of seconds from 0, not {text!r}")
+    return value
+
+
+def _outcomes(text: str) -> tuple[str, ...]:
+    found = tuple(each.strip() for each in text.split(","))
+    if not set(found) <= set(OUTCOMES):
+        raise argparse.ArgumentTypeError(
+            f"expected some of {', '.join(OUTCOMES)}, separated by commas, not {text!r}"
+        )
+    return found
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.split("x"))
+    except ValueError:
+        width = height = 0
+    if not (MIN_SIDE <= width <= MAX_SIDE and MIN_SIDE <= height <= MAX_SIDE):
+        raise argparse.ArgumentTypeError(
+            f"expected two numbers from {MIN_SIDE} to {MAX_SIDE}, such as 320x240, not {text!r}"
+        )
+    return width, height
+
+
+def _target(text: str) -> tuple[str, tuple[float, float, float]]:
+    name, _, place = text.partition("=")
+    try:
+        numbers = [1e-3 * float(each) for each in place.split(",")]
+    except ValueError:
+        numbers = []
+    if not name or len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"expected OBJECT=X,Y or OBJECT=X,Y,Z, not {text!r}")
+    x, y, z = (*numbers, math.nan)[:3]
+    return name, (x, y, z)
