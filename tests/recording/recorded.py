@@ -29,7 +29,7 @@ from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.recording.files.header import Attachment, RecordingHeader, header_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.messages import StateMessage, TargetMessage
+from katana450.extensions.recording.messages import StateRow, TargetMessage
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.resources import URDF_PATH
@@ -43,11 +43,11 @@ ADA = Actor(Person("session-of-ada/1", "Ada", Role.ADMIN, address="10.0.0.7"), C
 FAILING_EVERY = 300
 
 
-def state_message(setpoint: list[float], **changes: Any) -> StateMessage:
+def state_message(setpoint: list[float], **changes: Any) -> StateRow:
     """Return the message of a state at ``setpoint``, with ``changes`` of its other fields."""
     fields: dict[str, Any] = {"qd": [], "target": TargetMessage(), "findings": [], "mode": "Idle"}
     fields |= {"gripper": 0.0, "gripper_setpoint": 0.0, "speed": 1.0, "status": "ok", "t": 0.0}
-    return StateMessage(**fields | {"setpoint": setpoint} | changes)
+    return StateRow(**fields | {"setpoint": setpoint} | changes)
 
 
 @cache

@@ -335,7 +335,7 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
         records = deserializer.loaded(message)
         if isinstance(records, LostTicks):
             before_gap = before_gap or len(received)
-            lost += records.count
+            lost += records.ticks
         else:
             received += records
     assert lost > 0

@@ -18,7 +18,7 @@ from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     PLANS,
     SOLIDS,
-    StateMessage,
+    StateRow,
 )
 from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.maths.geometry.arrays import finite_array, frozen
@@ -50,7 +50,7 @@ class RecordedFrames:
             found += [row for row in rows(file, first, last) if not found or row.t > first]
         if not found or any(row.position is None for row in found):
             raise InputError(f"{path} has no states of an arm with a tool in that part.")
-        frames: list[StateMessage] = []
+        frames: list[StateRow] = []
         for row in found:
             if not frames or row is found[-1] or row.t >= frames[-1].t + MIN_STEP:
                 frames.append(row)

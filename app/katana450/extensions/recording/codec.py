@@ -171,7 +171,7 @@ class Codec:
         return self.decoded(typing.get_type_hints(kind)[name], form)
 
 
-class Form(NamedTuple):
+class TextForm(NamedTuple):
     """The form of the values of one type: types of its JSON, and the function that reads it."""
 
     json: tuple[type, ...]
@@ -180,22 +180,22 @@ class Form(NamedTuple):
 
 
 @cache
-def form_of(hint: Any) -> Form:
+def form_of(hint: Any) -> TextForm:
     """Return the form of the type ``hint``. Raises TypeError for a type that is not recorded."""
     origin, parts = typing.get_origin(hint), typing.get_args(hint)
     if hint in MEMBERS or origin in MEMBERS:
         return form_of(MEMBERS.get(hint) or MEMBERS[origin])
     if hint is float:
-        return Form((float, int, bool, str), lambda form, _: number(form))
+        return TextForm((float, int, bool, str), lambda form, _: number(form))
     if hint in (int, bool, str):
         return _plain(hint)
     if hint is bytes:
-        return Form((str,), lambda form, _: _bytes(form))
+        return TextForm((str,), lambda form, _: _bytes(form))
     if origin is Literal:
         return _plain(type(parts[0]), parts)
     # From numpy 2.5 on, which needs Python 3.12, the alias is a type of its own.
     if origin in (np.ndarray, npt.NDArray):
-        return Form((list, dict), lambda form, _: array(form))
+        return TextForm((list, dict), lambda form, _: array(form))
     if origin is tuple:
         repeated = len(parts) == 2 and parts[1] is ...
         return _row(parts[:1] if repeated else parts, repeated=repeated)
@@ -211,18 +211,18 @@ def form_of(hint: Any) -> Form:
         return _row(kinds, made=lambda items: hint(*items))
     if dataclasses.is_dataclass(hint) or issubclass(hint, msgspec.Struct):
         record = _Record(hint)
-        return _shared(record) if hint in SHARED else Form((dict,), record.decode, record)
+        return _shared(record) if hint in SHARED else TextForm((dict,), record.decode, record)
     raise TypeError(f"{hint} is not a type of recorded values.")
 
 
-def _shared(record: _Record) -> Form:
+def _shared(record: _Record) -> TextForm:
     """Return the form of a value that is named by its key."""
     name = record.kind.__name__
 
     def decode(form: Any, shared: SharedValues) -> Any:
         return shared.value(name, form, lambda text: record.decode(json_form(text), shared))
 
-    return Form((str,), decode, record)
+    return TextForm((str,), decode, record)
 
 
 def _bytes(form: Any) -> bytes:
@@ -234,7 +234,7 @@ def _bytes(form: Any) -> bytes:
 
 def _plain(
     kind: type, allowed: tuple[Any, ...] = (), made: Callable[[Any], Any] = lambda form: form
-) -> Form:
+) -> TextForm:
     """Return the form of texts, whole numbers or truth values, of those in ``allowed`` if any."""
     named = "a whole number" if kind is int else f"of the type {kind.__name__}"
 
@@ -245,12 +245,12 @@ def _plain(
             raise FormError(f"{shown(form)} is not one of {', '.join(map(str, allowed))}")
         return made(form)
 
-    return Form((kind,), decode)
+    return TextForm((kind,), decode)
 
 
 def _row(
     hints: tuple[Any, ...], *, repeated: bool = False, made: Callable[[Any], Any] = tuple
-) -> Form:
+) -> TextForm:
     """Return the form of tuples of ``hints``; if ``repeated``, of any number of the first."""
 
     def decode(form: Any, shared: SharedValues) -> Any:
@@ -269,10 +269,10 @@ def _row(
 
     for hint in hints:
         form_of(hint)
-    return Form((list,), decode)
+    return TextForm((list,), decode)
 
 
-def _union(parts: Iterable[Any]) -> Form:
+def _union(parts: Iterable[Any]) -> TextForm:
     """Return the form of a field with several types. Classes are distinguished by their names."""
     named = [typing.get_args(MEMBERS[part]) if part in MEMBERS else (part,) for part in parts]
     kinds = [kind for group in named for kind in group]
@@ -310,7 +310,7 @@ def _union(parts: Iterable[Any]) -> Form:
             raise FormError(f"{shown(form)} has no value here")
         return found.decode(form, shared)
 
-    return Form(tuple(by_json), decode)
+    return TextForm(tuple(by_json), decode)
 
 
 class _Record:
@@ -335,7 +335,7 @@ class _Record:
         }
 
     @cached_property
-    def forms(self) -> Mapping[str, Form]:
+    def forms(self) -> Mapping[str, TextForm]:
         """The forms of the fields. They are made at the first use: classes refer to each other."""
         hints = typing.get_type_hints(self.kind)
         return {name: form_of(hints[name]) for name in self._names}

@@ -141,7 +141,7 @@ class WaterMessage(msgspec.Struct, omit_defaults=True):
     left: tuple[float, tuple[float, float, float], tuple[float, float, float], float] | None = None
 
 
-class StateMessage(msgspec.Struct, omit_defaults=True, kw_only=True):
+class StateRow(msgspec.Struct, omit_defaults=True, kw_only=True):
     """A state that changed, for people and programs.
 
     Numbers that change stand together, so that what stays the same is packed better.
@@ -280,7 +280,7 @@ TOPICS: Final = (
     Topic(CHECKPOINTS, "katana450.Checkpoint", CheckpointMessage),
     Topic(PLANS, "katana450.Plan", SharedMessage),
     Topic(SOLIDS, "katana450.Solid", SharedMessage),
-    Topic(STATE, "katana450.State", StateMessage),
+    Topic(STATE, "katana450.State", StateRow),
     Topic(JOINT_STATES, "foxglove.JointStates", JointStatesMessage),
     Topic(TF, "foxglove.FrameTransforms", TransformsMessage),
     Topic(EVENTS, "katana450.Event", EventMessage),

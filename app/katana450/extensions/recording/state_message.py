@@ -22,7 +22,7 @@ from katana450.extensions.recording.messages import (
     JointStatesMessage,
     ObjectPose,
     QuaternionMessage,
-    StateMessage,
+    StateRow,
     TargetMessage,
     TimeMessage,
     TransformMessage,
@@ -96,12 +96,12 @@ class StateMessages:
         poses = arm.T_base_shoulder @ forward_batch(arm.chain_to(states[0].tool), q)
         self._tools = {id(state): (state, T) for state, T in zip(states, poses, strict=True)}
 
-    def state(self, state: State) -> StateMessage:
+    def state(self, state: State) -> StateRow:
         """Return the message of ``state`` on the topic of states."""
         setpoint, T = state.setpoint, self.tool_pose(state)
         same = state.q is setpoint or state.q.tobytes() == setpoint.tobytes()
         objects, removed = self._changed_objects(state)
-        return StateMessage(
+        return StateRow(
             t=state.t,
             q=[] if same else state.q.tolist(),
             setpoint=setpoint.tolist(),

@@ -28,7 +28,7 @@ from katana450.extensions.recording.messages import (
     EVENTS,
     STATE,
     ObjectPose,
-    StateMessage,
+    StateRow,
 )
 from katana450.extensions.recording.state_message import NANO, Pose, pose_of
 from katana450.extras import library
@@ -146,7 +146,7 @@ class _Bag:
             if message.topic == EVENTS:
                 self._add(BAG_EVENTS, t, data=message.data.decode(errors="replace"))
             else:
-                self._add_state(t, content_of(message, StateMessage))
+                self._add_state(t, content_of(message, StateRow))
 
     def _messages(self, start: float, end: float) -> Iterator[Message]:
         """Yield states and events of the part; the first state is the one at ``start``."""
@@ -154,7 +154,7 @@ class _Bag:
         begin = max(start, file.start)
         first = file.last_before(CHECKPOINTS, begin)
         for message in file.messages(STATE, end=begin, start=begin if first is None else first.t):
-            content_of(message, StateMessage).move_objects(self._objects)
+            content_of(message, StateRow).move_objects(self._objects)
         before = file.last_before(STATE, begin)
         if before is not None:
             yield before._replace(log_time=round(begin * NANO))
@@ -188,7 +188,7 @@ class _Bag:
             effort=NONE,
         )
 
-    def _add_state(self, t: int, state: StateMessage) -> None:
+    def _add_state(self, t: int, state: StateRow) -> None:
         robot, arm = self._robot, self._robot.arm
         names = robot.driven if arm is None else arm.chain.names
         q, setpoint, qd = (

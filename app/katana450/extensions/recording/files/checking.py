@@ -27,7 +27,7 @@ from katana450.extensions.recording.messages import (
     STATE,
     CheckpointMessage,
     SharedMessage,
-    StateMessage,
+    StateRow,
     TickMessage,
 )
 from katana450.extensions.recording.replay import Checker, Verification
@@ -105,7 +105,7 @@ def verify_recording(
         if message.topic in KINDS:
             reader.add_shared(message)
         elif message.topic == STATE:
-            checker.setpoint(np.array(content_of(message, StateMessage).setpoint))
+            checker.setpoint(np.array(content_of(message, StateRow).setpoint))
         elif message.topic == CHECKPOINTS:
             if checker.state is None:
                 checker.checkpoint(reader.checkpoint(message))

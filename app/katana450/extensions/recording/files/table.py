@@ -19,7 +19,7 @@ from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     STATE,
     ObjectPose,
-    StateMessage,
+    StateRow,
 )
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
@@ -38,7 +38,7 @@ def rows(
     start: float = -math.inf,
     end: float = math.inf,
     done: Callable[[float], None] | None = None,
-) -> Iterator[StateMessage]:
+) -> Iterator[StateRow]:
     """Yield the states that were written from ``start`` to ``end`` [s].
 
     ``done`` is called with the fraction that was read. Raises InputError.
@@ -47,17 +47,17 @@ def rows(
     for message in file.messages(STATE, start=start, end=end):
         if done is not None:
             done((message.t - first) / max(last - first, LEAST))
-        yield content_of(message, StateMessage)
+        yield content_of(message, StateRow)
 
 
-def state_at(file: RecordingFile, t: float) -> StateMessage | None:
+def state_at(file: RecordingFile, t: float) -> StateRow | None:
     """Return the last state at or before ``t`` [s], with all its objects; None if there is none.
 
     Only objects that changed are in the message of a state; the others are those since the last
     complete state. Raises InputError for a damaged recording.
     """
     checkpoint = file.last_before(CHECKPOINTS, t)
-    state: StateMessage | None = None
+    state: StateRow | None = None
     objects: dict[str, ObjectPose] = {}
     for state in rows(file, -math.inf if checkpoint is None else checkpoint.t, t):
         state.move_objects(objects)

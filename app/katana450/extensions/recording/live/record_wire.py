@@ -23,7 +23,7 @@ BEGIN, CONTINUATION = b"\x01", b"\x02"
 class LostTicks(NamedTuple):
     """A number of ticks that were lost, until the time ``until`` [s]."""
 
-    count: int
+    ticks: int
     until: float
 
 

@@ -158,7 +158,7 @@ def _receive(pipe: Connection, ring: Ring) -> None:
                 records = deserializer.loaded(pipe.recv_bytes())
                 with ring.lock:
                     if isinstance(records, LostTicks):
-                        ring.lost(records.until, records.count)
+                        ring.lost(records.until, records.ticks)
                     else:
                         ring.put_all(records)
             if ring.unsynced and time.monotonic() - synced >= SYNC_INTERVAL:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.recording.messages import StateMessage
+from katana450.extensions.recording.messages import StateRow
 
 MAX_POINTS = 200
 """Number of points of a plot."""
@@ -38,8 +38,8 @@ def times_of(length: float) -> list[float]:
 
 def difference(
     times: Sequence[float],
-    first: Sequence[StateMessage | None],
-    second: Sequence[StateMessage | None],
+    first: Sequence[StateRow | None],
+    second: Sequence[StateRow | None],
     slides: Sequence[bool],
 ) -> RunDifference:
     """Return the differences of the states of two runs at ``times`` [s].

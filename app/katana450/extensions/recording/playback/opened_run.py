@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from katana450.errors import InputError
-from katana450.extensions.recording.messages import StateMessage
+from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.decoder import LENGTH
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
@@ -69,9 +69,9 @@ class OpenedRun:
         found: RecordedMoment | None = self._ask("at", t)
         return found
 
-    def rows_at(self, times: Sequence[float]) -> list[StateMessage | None]:
+    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
         """See ``PlaybackRun.rows_at``."""
-        found: list[StateMessage | None] = self._ask("rows_at", list(times))
+        found: list[StateRow | None] = self._ask("rows_at", list(times))
         return found
 
     def close(self) -> None:

@@ -18,7 +18,7 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
-from katana450.extensions.recording.messages import StateMessage
+from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.difference import difference, times_of
 from katana450.extensions.recording.playback.drawing import PlaybackWindows
 from katana450.extensions.recording.playback.folder import CONTEXTS
@@ -260,7 +260,7 @@ async def _received(request: Request, path: Path, timeout: asyncio.Timeout) -> N
         await asyncio.to_thread(file.close)
 
 
-def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateMessage | None]:
+def _rows(run: AnyRun, place: float, times: list[float]) -> list[StateRow | None]:
     spans = run.spans
     return run.rows_at([at_place(spans, place + t) for t in times])
 

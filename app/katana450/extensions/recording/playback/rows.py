@@ -14,7 +14,7 @@ from katana450.extensions.recording.files.checking import TickReader, content_of
 from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
 from katana450.extensions.recording.messages import (
     ObjectPose,
-    StateMessage,
+    StateRow,
     VesselWaterMessage,
 )
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -51,7 +51,7 @@ class RecordedMoment:
         water: the water, in which parcels that have landed may still fly; None without a cup.
     """
 
-    row: StateMessage
+    row: StateRow
     objects: tuple[SceneObject, ...]
     water: Water | None
 
@@ -74,14 +74,14 @@ class Block:
         self._parcels: list[tuple[float, Parcel]] = []
         for message in self._states:
             if LEFT in message.data:
-                row = content_of(message, StateMessage)
+                row = content_of(message, StateRow)
                 if row.water is not None and row.water.left is not None:
                     ml, start, velocity, span = row.water.left
                     new = Parcel(round(ml * MILLILITRE), start, velocity, 0.0, span)
                     self._parcels.append((row.t, new))
             # Most states name no object, and are decoded when they are shown.
             if any(each in message.data for each in CHANGES):
-                row = content_of(message, StateMessage)
+                row = content_of(message, StateRow)
                 poses = dict(poses)
                 row.move_objects(poses)
                 if len(poses) > MAX_POSES:
@@ -109,7 +109,7 @@ class Block:
         number = bisect_right(self._times, nanoseconds_of(t)) - 1
         if number < 0:
             return None
-        row, poses = content_of(self._states[number], StateMessage), self._poses[number]
+        row, poses = content_of(self._states[number], StateRow), self._poses[number]
         objects = tuple(
             # Drawn where it was, so the arm of today does not carry it.
             replace(self._described[name], T=frozen(pose.T), held=False, fixed=False)
@@ -118,7 +118,7 @@ class Block:
         )
         return RecordedMoment(row, objects, self._water_of(row, poses))
 
-    def _water_of(self, row: StateMessage, poses: Mapping[str, ObjectPose]) -> Water | None:
+    def _water_of(self, row: StateRow, poses: Mapping[str, ObjectPose]) -> Water | None:
         if row.water is None or self._water is None or CUP not in poses:
             return None
         vessels = (VesselWaterMessage(CUP, row.water.cup, row.water.lean), *row.water.vessels)

@@ -18,7 +18,7 @@ from katana450.extensions.recording.messages import (
     EVENTS,
     SOLIDS,
     STATE,
-    StateMessage,
+    StateRow,
 )
 from katana450.extensions.recording.playback.chunks import ChunkIndex, ChunkSpan
 from katana450.extensions.recording.playback.marks import Mark, add_marks
@@ -159,14 +159,14 @@ class PlaybackRun:
                 first = block
             return None if first is None else first.at(first.start)
 
-    def rows_at(self, times: Sequence[float]) -> list[StateMessage | None]:
+    def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
         """Return joints and tool at each of ``times`` [s], without objects; None before the first.
 
         This reads a second of the file at most for each, and keeps nothing.
         """
         return [self._row_at(t) for t in times]
 
-    def _row_at(self, t: float) -> StateMessage | None:
+    def _row_at(self, t: float) -> StateRow | None:
         with self._lock:
             t -= self._offset
             for file in reversed(self._files):
@@ -176,7 +176,7 @@ class PlaybackRun:
                         states = file.index.messages(chunk, STATE)
                         before = [each for each in states if each.t <= t]
                         if before:
-                            return content_of(before[-1], StateMessage)
+                            return content_of(before[-1], StateRow)
             return None
 
     def _places(self, t: float) -> Iterator[_Place]:

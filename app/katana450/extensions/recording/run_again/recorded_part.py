@@ -15,7 +15,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import rows, state_at
-from katana450.extensions.recording.messages import StateMessage
+from katana450.extensions.recording.messages import StateRow
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
 
 WAITING = (Status.PAUSED.value, Status.STOPPED.value)
@@ -108,7 +108,7 @@ def check_whole(file: RecordingFile, first: float, last: float) -> None:
         )
 
 
-def _states(file: RecordingFile, first: float, last: float) -> Iterator[StateMessage]:
+def _states(file: RecordingFile, first: float, last: float) -> Iterator[StateRow]:
     """Yield the states from ``first`` to ``last`` [s], the first with all its objects."""
     before = state_at(file, first)
     if before is not None:
@@ -118,7 +118,7 @@ def _states(file: RecordingFile, first: float, last: float) -> Iterator[StateMes
             yield row
 
 
-def _part(file: RecordingFile, found: list[StateMessage], name: str) -> RecordedPart:
+def _part(file: RecordingFile, found: list[StateRow], name: str) -> RecordedPart:
     count = len(found)
     t = np.array([row.t for row in found])
     shape = count, len(found[0].setpoint)
@@ -155,7 +155,7 @@ def _with_rests(t: FloatArray, numbers: IntArray) -> tuple[FloatArray, IntArray]
     )
 
 
-def _held(found: list[StateMessage]) -> Iterator[str]:
+def _held(found: list[StateRow]) -> Iterator[str]:
     """Yield the name of the object that the fingers hold in each state; "" for none."""
     held = ""
     for row in found:
