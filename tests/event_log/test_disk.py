@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from katana450.client import connect
+from katana450.extensions.event_log.disk_log import MAX_KEPT, LogWriter
 from katana450.extensions.event_log.folder import LogFolder
 from katana450.extensions.event_log.records import Record, record
-from katana450.extensions.event_log.writer import MAX_KEPT, LogWriter
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import CLOSING, numbered, records

@@ -20,7 +20,7 @@ from katana450.arm.control.lease import Role
 from katana450.extensions.recording import claimed_folder as claims
 from katana450.extensions.recording.claimed_folder import CLAIM, remove_abandoned
 from katana450.extensions.recording.datasets.new_folder import new_folder
-from katana450.extensions.recording.live.recording_routes import RecordingRoutes
+from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback import routes as routes_module
 from katana450.extensions.recording.playback.routes import OTHER, PlaybackRoutes
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore

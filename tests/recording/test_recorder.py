@@ -27,10 +27,9 @@ from katana450.cli.main import main
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.live import record_end, ring
-from katana450.extensions.recording.live.jobs import RecordingJob
+from katana450.extensions.recording.live.jobs import RecordingJob, RecordingRoutes
 from katana450.extensions.recording.live.record_end import RecordEnd
 from katana450.extensions.recording.live.record_wire import LostTicks, RecordDeserializer
-from katana450.extensions.recording.live.recording_routes import RecordingRoutes
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, STATE
 from katana450.extensions.recording.places import recordings_in

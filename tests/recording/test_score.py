@@ -30,15 +30,14 @@ from katana450.extensions.recording.episodes.episode import (
     message_of,
 )
 from katana450.extensions.recording.episodes.episode_file import (
+    append_message,
     shown_part,
     with_episode,
     write_episode,
 )
-from katana450.extensions.recording.files.appending import append_message
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.messages import EPISODES
-from katana450.extensions.recording.scoring.leaderboard import Leaderboard, shown
-from katana450.extensions.recording.scoring.score_command import score_file
+from katana450.extensions.recording.scoring.score_command import Leaderboard, score_file, shown
 from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored, scored
 from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
 from katana450.extensions.recording.state_message import nanoseconds

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from katana450.arm.control.commands import Command
 from katana450.caching import cached_property
 from katana450.errors import ConfigurationError, InputError
-from katana450.extensions.recording.datasets.tool_orientation import orientations
+from katana450.extensions.recording.datasets.recorded_robot import orientations
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
 from katana450.extensions.recording.files.checking import (

@@ -96,7 +96,7 @@ def routes(context: RouteContext) -> list[BaseRoute]:
 
     def make() -> list[BaseRoute]:
         from katana450.extensions.recording.episodes.routes import EpisodeRoutes
-        from katana450.extensions.recording.live.recording_routes import RecordingRoutes
+        from katana450.extensions.recording.live.jobs import RecordingRoutes
         from katana450.extensions.recording.playback.routes import PlaybackRoutes
         from katana450.extensions.recording.playback.store import RecordingStore
 

@@ -1,9 +1,11 @@
-"""The robot of a recording, from the URDF that is attached to it."""
+"""The robot of a recording, from the URDF that is attached to it, and the poses of its tool."""
 
 from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+
+import numpy as np
 
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.robot import Robot
@@ -12,6 +14,10 @@ from katana450.assembly.robot_session import find_arm
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import Attachment
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.table import rows
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.batch import forward_batch
 
 URDF, XACRO = ".urdf", ".xacro"
 """Ends of the names of descriptions."""
@@ -40,3 +46,25 @@ def recorded_robot(file: RecordingFile) -> Robot:
         path.write_bytes(urdf.data)
         robot = read_robot(path, settings.tool, find_arm)
         return bare(robot) if settings.bare else robot
+
+
+def orientations(file: RecordingFile, start: float, end: float) -> FloatArray:
+    """Return the unit quaternions (N, 4) x, y, z, w of the tool in the base frame.
+
+    There is one for each state from ``start`` to ``end`` [s]. Raises InputError for a robot without
+    a tool, and for a damaged recording.
+    """
+    arm = recorded_robot(file).arm
+    found = list(rows(file, start, end))
+    if arm is None:
+        raise InputError(f"{file.path} has no orientation: its robot has joints only.")
+    tools = [each.tool for each in found]
+    shape = (len(found), arm.chain.n)
+    joints = [each.joints for each in found]
+    q = finite_array(joints, shape, f"The joints in {file.path}")
+    quaternions = np.empty((len(found), 4))
+    for tool in dict.fromkeys(tools):
+        here = np.array([each == tool for each in tools])
+        R = (arm.T_base_shoulder @ forward_batch(arm.chain_to(tool), q[here]))[:, :3, :3]
+        quaternions[here] = [so3.to_quaternion(each)[[1, 2, 3, 0]] for each in R]
+    return frozen(quaternions)

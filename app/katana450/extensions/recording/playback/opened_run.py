@@ -1,12 +1,17 @@
 """A run in a file that somebody has opened, decoded in a process of its own.
 
-So a file of anybody neither stops the page's server for a moment nor fills its memory.
+So a file of anybody neither stops the page's server for a moment nor fills its memory. The process
+runs this module with the file as its argument. It limits its memory before it reads the file,
+answers requests one after another, and ends with its input. A request is a JSON line,
+``[method, arguments]``. An answer is a pickle after its length: whether it was successful, and the
+result or the reason.
 """
 
 from __future__ import annotations
 
 import json
 import pickle
+import struct
 import subprocess
 import sys
 import threading
@@ -15,15 +20,15 @@ import weakref
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from katana450.errors import InputError
 from katana450.extensions.recording.messages import StateRow
-from katana450.extensions.recording.playback.decoder import LENGTH
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
+from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import Span
-from katana450.platform_support import without_interrupts
+from katana450.platform_support import limit_resources, without_interrupts
 
 TIMEOUT = 30.0
 """[s] Timeout of a request to the process."""
@@ -34,7 +39,14 @@ WATCH_PERIOD = 0.5
 MAX_ANSWER_BYTES = 64_000_000
 """Maximum size of an answer; a moment has some kilobytes, and 2 MB with many solids."""
 
-DECODER = "katana450.extensions.recording.playback.decoder"
+MAX_MEMORY_BYTES = 3_000_000_000
+"""Maximum address space, a part of which libraries only reserve."""
+
+MAX_SECONDS = 3600
+"""[s] Maximum processor time of all requests for one file."""
+
+LENGTH = struct.Struct("<Q")
+"""Length of an answer [bytes]."""
 
 
 class OpenedRun:
@@ -57,7 +69,8 @@ class OpenedRun:
     def update(self) -> None:
         """Read the index of the file, once. Raises InputError if it cannot be read."""
         if not self.spans:
-            self.spans, self.metadata = self._ask("update")
+            self._ask("update")
+            self.spans, self.metadata = self._ask("about")
 
     def marks(self) -> list[Mark]:
         """See ``PlaybackRun.marks``."""
@@ -105,7 +118,7 @@ class OpenedRun:
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None:
             self._process = subprocess.Popen(
-                (sys.executable, "-P", "-m", DECODER, str(self._path)),
+                (sys.executable, "-P", "-m", __spec__.name, str(self._path)),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
@@ -158,3 +171,32 @@ def _end(process: subprocess.Popen[bytes]) -> None:
             if each is not None:
                 each.close()
     process.wait()
+
+
+def answer(run: PlaybackRun, request: bytes) -> bytes:
+    """Return the answer to ``request``, with its length before it."""
+    method, arguments = json.loads(request)
+    try:
+        if method == "about":
+            found: tuple[bool, Any] = True, (run.spans, run.metadata)
+        else:
+            found = True, getattr(run, method)(*arguments)
+    except InputError as error:
+        found = False, str(error)
+    except MemoryError:
+        found = False, "The file needs too much memory."
+    content = pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
+    return LENGTH.pack(len(content)) + content
+
+
+def serve(path: Path, requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer ``requests`` about the file ``path`` until they end."""
+    run = PlaybackRun(lambda: [path])
+    for request in requests:
+        answers.write(answer(run, request))
+        answers.flush()
+
+
+if __name__ == "__main__":
+    limit_resources(MAX_MEMORY_BYTES, MAX_SECONDS)
+    serve(Path(sys.argv[1]), sys.stdin.buffer, sys.stdout.buffer)

@@ -3,19 +3,143 @@
 from __future__ import annotations
 
 import json
+import math
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError
+from katana450.extensions.programs.measures import title_of, unit_of
 from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.scoring.leaderboard import BEST, Leaderboard, check_measure
-from katana450.extensions.recording.scoring.scored import Places, Scored, scored
+from katana450.extensions.recording.scoring.scored import (
+    HIGHER_IS_BETTER,
+    MEASURES,
+    PLACING,
+    Places,
+    Scored,
+    scored,
+)
+
+BEST = "*"
+"""Mark of the best value of a measure."""
+
+DIGITS = 4
+"""Significant digits of a value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leaderboard:
+    """Scores in the order of one measure, the best first.
+
+    Attributes:
+        rows: the scores.
+        measures: names of the measures that apply to any of them.
+    """
+
+    rows: tuple[Scored, ...]
+    measures: tuple[str, ...]
+
+    @staticmethod
+    def of(scores: Sequence[Scored], by: str = "duration_s") -> Leaderboard:
+        """Return the scores sorted ``by`` a measure. Raises InputError for an unknown one.
+
+        Scores to which it does not apply come last.
+        """
+        check_measure(by)
+        sign = -1.0 if by in HIGHER_IS_BETTER else 1.0
+
+        def place(score: Scored) -> float:
+            value = score.values[by]
+            return math.inf if value is None else sign * value
+
+        measures = tuple(
+            name
+            for name in MEASURES
+            if any(each.values[name] is not None for each in scores)
+            or (name == PLACING and any(each.missing for each in scores))
+        )
+        return Leaderboard(tuple(sorted(scores, key=place)), measures)
+
+    def is_best(self, score: Scored, measure: str) -> bool:
+        """Return whether ``score`` has the best value of ``measure``, and another a worse one."""
+        known = [value for each in self.rows if (value := each.values[measure]) is not None]
+        value = score.values[measure]
+        # Values that differ by rounding are equal.
+        if value is None or len(set(map(shown, known))) < 2:
+            return False
+        return shown(value) == shown((max if measure in HIGHER_IS_BETTER else min)(known))
+
+    @property
+    def lines(self) -> list[str]:
+        """The table as text: a line for each measure, a column for each recording."""
+        table = [["", *(f"{place}. {each.name}" for place, each in enumerate(self.rows, 1))]]
+        if len(self.rows) == 1:
+            table = [["", self.rows[0].name]]
+        for measure in self.measures:
+            cells = [
+                shown(each.values[measure]) + (f" {BEST}" if self.is_best(each, measure) else "  ")
+                for each in self.rows
+            ]
+            table.append([f"{name_of(measure)} {unit_of(measure)}".rstrip(), *cells])
+        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+        return [
+            "  ".join((row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:]))).rstrip()
+            for row in table
+        ]
+
+    @property
+    def notes(self) -> list[str]:
+        """A sentence about each recording that lacks objects with a target."""
+        return [
+            f"{each.name} has no object {', '.join(each.missing)}, so its placing error is unknown."
+            for each in self.rows
+            if each.missing
+        ]
+
+    @property
+    def json(self) -> list[dict[str, Any]]:
+        """The scores as JSON values, with units in the names, in their order."""
+        return [
+            {
+                "name": each.name,
+                **each.values,
+                "missing_objects": list(each.missing),
+                "places_mm": {
+                    name: [round(1e3 * number, 3) for number in place.tolist()]
+                    for name, place in each.places.items()
+                },
+            }
+            for each in self.rows
+        ]
+
+
+def check_measure(name: str) -> None:
+    """Raise InputError unless ``name`` is that of a measure."""
+    if name not in MEASURES:
+        raise InputError(f"There is no measure {name!r}. Known: {', '.join(MEASURES)}.")
+
+
+def name_of(measure: str) -> str:
+    """Return the name of ``measure`` for people, without its unit."""
+    return "SPARC" if measure == "sparc" else title_of(measure)
+
+
+def shown(value: float | None) -> str:
+    """Return ``value`` with DIGITS significant digits; a dash for None."""
+    if value is None:
+        return "–"
+    if value != 0.0 and (abs(value) < 1e-3 or abs(value) >= 1e5):
+        return f"{value:.2e}".replace("e+0", "e").replace("e-0", "e-")
+    digits = DIGITS - 1 - (math.floor(math.log10(abs(value))) if value else 0)
+    text = f"{value:.{max(digits, 0)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def score_files(options: Namespace) -> int:
