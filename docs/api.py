@@ -14,7 +14,7 @@ import msgspec
 from katana450.arm.control.act import Act, Request, tag_of
 from katana450.arm.control.checked import field_schema
 from katana450.extension import extensions, load
-from katana450.extensions.api_description.messages import documentation
+from katana450.extensions.api_description import documentation
 from katana450.server.api import answers, requests
 
 PAGE = Path(__file__).with_name("api.md")

@@ -16,7 +16,7 @@ import jsonschema
 import pytest
 
 from katana450.arm.control.act import tag_of
-from katana450.extensions.api_description.openapi import openapi_json
+from katana450.extensions.api_description import openapi_json
 from katana450.server.api import answers, requests
 from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import RECORDING_APP, AppServer

@@ -6,8 +6,7 @@ import json
 
 from docs.api import PAGE, added_requests, page
 from katana450.arm.control.act import Request, classes_of, tag_of
-from katana450.extensions.api_description.messages import summary
-from katana450.extensions.api_description.openapi import openapi_json
+from katana450.extensions.api_description import openapi_json, summary
 from katana450.server.api import answers, requests
 
 ADDED = tuple(kind for kinds in added_requests().values() for kind in kinds)

@@ -25,7 +25,7 @@ from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
-from katana450.extensions.undo.undo_requests import UndoRequests
+from katana450.extensions.undo import UndoRequests
 from katana450.server.api import requests
 from katana450.server.service import serialize
 from katana450.server.service.hub import TICK

@@ -44,7 +44,7 @@ def test_lists_of_command_classes_are_those_that_the_recipe_names() -> None:
         for path in (PACKAGE / folder).rglob("*.py")
         if re.search(r"\(cmd\.\w+, cmd\.\w+", path.read_text(encoding="utf-8"))
     }
-    assert lists == {"history.py"}
+    assert lists == {"undo.py"}
     assert all(name in TEXT for name in lists)
 
 

@@ -37,7 +37,7 @@ from katana450.server.view.panel_tabs import PanelTabs
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.tint import Tint
 from katana450.server.view.view import ViewOptions
-from katana450.server.viser_bridge.labels import PERSONAL
+from katana450.server.viser_bridge.guard import PERSONAL
 from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.recording.recorded import state_message

@@ -25,7 +25,7 @@ EXTENSIONS = (
         ),
         handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
     ),
-    Extension("api_description", routes=f"{HERE}.api_description.routes:description_routes"),
+    Extension("api_description", routes=f"{HERE}.api_description:description_routes"),
     Extension(
         "event_log",
         (
@@ -218,7 +218,7 @@ EXTENSIONS = (
         handler=f"{HERE}.objects.object_requests:ObjectRequests",
         folder=f"{HERE}.objects.objects_panel:ObjectsFolder",
     ),
-    Extension("undo", handler=f"{HERE}.undo.undo_requests:UndoRequests"),
+    Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
     Extension("joint_view", joint_view=f"{HERE}.joint_view.machine_view:MachineView"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water.nodes:WaterLayer"),

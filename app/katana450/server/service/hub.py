@@ -40,9 +40,8 @@ from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.request_handler import RequestHandler
 from katana450.server.service.runner import Runner, guarded
-from katana450.server.service.stop_news import StopNews
 from katana450.server.service.stop_path import StopPath
-from katana450.server.service.stop_state import ClearBy, StopRecord
+from katana450.server.service.stop_state import ClearBy, StopNews, StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02

@@ -1,7 +1,8 @@
-"""Cause of a stop, whether the arm has confirmed it, and the rights to clear it."""
+"""Cause of a stop, whether the arm has confirmed it, the rights to clear it, and news of it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Self
@@ -88,3 +89,23 @@ class ClearRights:
         if self.stopped is not None and self.by_presser:
             return f"{self.stopped.cause.by} or an admin"
         return "an operator" if self.lease.driver is None else self.lease.driver.name
+
+
+class StopNews:
+    """Calls listeners when a stop begins, is confirmed for the first time, or is cleared.
+
+    A repeated press is no news, so that a flood of STOP causes no flood of messages.
+    """
+
+    def __init__(self) -> None:
+        self.listeners: set[Callable[[], None]] = set()
+        """Called without arguments, in the thread of ``note``."""
+        self._shown = (False, False)
+
+    def note(self, stopped: StopRecord | None) -> None:
+        """Call the listeners if ``stopped``, the present stop, is news."""
+        confirmed = stopped is not None and (stopped.confirmed or self._shown[1])
+        before, self._shown = self._shown, (stopped is not None, confirmed)
+        if self._shown != before:
+            for listener in tuple(self.listeners):
+                listener()

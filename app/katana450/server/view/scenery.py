@@ -16,7 +16,19 @@ from katana450.server.view.layer import LayerContext, ViewLayer
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
-from katana450.server.view.workcell import Workcell
+
+SHADE = 0.35
+"""Darkness (0 to 1) of shadows on the table."""
+
+
+class Workcell:
+    """The table, drawn from its GLB file."""
+
+    def __init__(self, server: viser.ViserServer, props: Props) -> None:
+        # If the table top cast shadows, it would shade its own face.
+        server.scene.add_glb(
+            "/table", props.table.mesh.read_bytes(), cast_shadow=False, receive_shadow=SHADE
+        )
 
 
 class Scenery:

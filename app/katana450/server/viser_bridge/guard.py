@@ -14,7 +14,8 @@ from typing import Any
 import viser
 from viser import _messages as wire
 
-from katana450.server.viser_bridge.labels import PERSONAL
+PERSONAL = ("View", "Theme")
+"""Controls that affect only the window in which they are clicked."""
 
 WORKSPACE = 1.5
 """Maximum coordinate [m] of a gizmo in the base frame, more than twice the arm's reach."""

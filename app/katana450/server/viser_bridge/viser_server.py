@@ -10,11 +10,13 @@ from typing import Any
 import viser
 
 from katana450.server.viser_bridge import frames
-from katana450.server.viser_bridge.brand import dress
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 KEY_HEADER = "X-Katana450-Key"
 """Header in which the gateway sends the key."""
+
+BRAND = (36, 119, 212)
+"""Brand colour of the panel: red, green and blue, each from 0 to 255."""
 
 
 def open_server(key: str) -> viser.ViserServer:
@@ -28,7 +30,7 @@ def open_server(key: str) -> viser.ViserServer:
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host="127.0.0.1", port=0, label="Katana450", verbose=False)
     _Lock(server, key)
-    _dress(server)
+    _set_look(server)
     return server
 
 
@@ -76,9 +78,11 @@ async def _ignore(_client_id: Any, _message: Any) -> None:
     return
 
 
-def _dress(server: viser.ViserServer) -> None:
+def _set_look(server: viser.ViserServer) -> None:
     """Set the look that a page takes over when it connects. Call it before the first connection."""
-    dress(server.gui)
+    server.gui.configure_theme(
+        control_width="medium", show_logo=False, show_share_button=False, brand_color=BRAND
+    )
     server.gui.set_panel_label("Katana450")
     server.gui.main_panel.dock_right()
     server.scene.set_up_direction("+z")

@@ -1,1 +1,0 @@
-"""Description of the API for programs, as OpenAPI."""

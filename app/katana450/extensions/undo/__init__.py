@@ -1,1 +1,0 @@
-"""Undo of the last changes of the driver."""
