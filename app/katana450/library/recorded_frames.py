@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import TickReader
 from katana450.extensions.recording.files.recorded_states import MOMENT
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.table import rows, state_at
+from katana450.extensions.recording.files.table import rows_from
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     PLANS,
@@ -45,9 +43,7 @@ class RecordedFrames:
             first, last = file.start + start, min(file.start + end, file.end)
             self._standing = _first_state(file)
             self._offset = file.utc_offset + MOMENT
-            begin = state_at(file, first)
-            found = [] if begin is None else [msgspec.structs.replace(begin, t=first)]
-            found += [row for row in rows(file, first, last) if not found or row.t > first]
+            found = list(rows_from(file, first, last))
         if not found or any(row.position is None for row in found):
             raise InputError(f"{path} has no states of an arm with a tool in that part.")
         frames: list[StateRow] = []

@@ -9,7 +9,6 @@ from pathlib import Path
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import JUDGED, EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_file import episodes_in
-from katana450.extensions.recording.files.checking import gaps_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 
 DEFAULT_OUTCOMES = tuple(each.value for each in JUDGED)
@@ -106,17 +105,6 @@ def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
         named = f"{file.path}" if number is None else f"Episode {number} of {file.path}"
         raise InputError(f"{named} has no task, which a dataset needs. Name it by --task.")
     return text
-
-
-def check_without_gaps(file: RecordingFile, cut: EpisodeCut) -> None:
-    """Raise InputError if the recording of ``cut`` lacks ticks."""
-    found = next(gaps_in(file, cut.start, cut.end), None)
-    if found is not None:
-        t, gap = found
-        raise InputError(
-            f"{cut} has a gap: {gap.ticks} ticks are missing until t = {t:.3f} s ({gap.missing}). "
-            "Leave this file out, or cut out a part without gaps by `katana450 record trim`."
-        )
 
 
 def check_same_robot(first: RecordingFile, other: RecordingFile) -> None:

@@ -19,7 +19,6 @@ from katana450.extensions.recording.datasets.episode_cuts import (
     DEFAULT_OUTCOMES,
     EpisodeCut,
     check_same_robot,
-    check_without_gaps,
     cuts_in,
     files_of,
 )
@@ -29,6 +28,7 @@ from katana450.extensions.recording.datasets.lerobot_writer import LerobotWriter
 from katana450.extensions.recording.datasets.new_folder import new_folder
 from katana450.extensions.recording.datasets.recorded_states import RecordedStates, columns_from
 from katana450.extensions.recording.datasets.sampling import check_fps, frame_times, sampled
+from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -156,7 +156,7 @@ def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeC
             with RecordingFile.open(path) as file:
                 check_same_robot(first, file)
                 for cut in cuts_in(file, options.task, options.outcomes, options.part):
-                    check_without_gaps(file, cut)
+                    check_whole(file, cut.start, cut.end)
                     if len(frame_times(cut.start, cut.end, options.fps)) < MIN_FRAMES:
                         raise InputError(
                             f"{cut} has fewer than {MIN_FRAMES} frames at {options.fps} a second. "

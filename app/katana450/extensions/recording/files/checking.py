@@ -131,6 +131,18 @@ def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[flo
             yield message.t, gap
 
 
+def check_whole(file: RecordingFile, first: float, last: float) -> None:
+    """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
+    found = next(gaps_in(file, first, last), None)
+    if found is not None:
+        t, gap = found
+        raise InputError(
+            f"{file.path} has a gap at {t - file.start:.2f} s: {gap.ticks} ticks are missing "
+            f"({gap.missing}). Leave the file out, or choose a part before or after it by --from "
+            "and --to."
+        )
+
+
 def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot:
     """Return the robot of ``file`` with a new session like the recorded one.
 

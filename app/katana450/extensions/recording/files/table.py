@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from msgspec import structs
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
@@ -64,6 +65,19 @@ def state_at(file: RecordingFile, t: float) -> StateRow | None:
     if state is not None:
         state.objects, state.removed = list(objects.values()), []
     return state
+
+
+def rows_from(file: RecordingFile, start: float, end: float) -> Iterator[StateRow]:
+    """Yield the states from ``start`` to ``end`` [s]; the first has all objects and that time.
+
+    Raises InputError.
+    """
+    before = state_at(file, start)
+    if before is not None:
+        yield structs.replace(before, t=start)
+    for row in rows(file, start, end):
+        if before is None or row.t > start:
+            yield row
 
 
 def columns(

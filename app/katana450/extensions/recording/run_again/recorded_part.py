@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from msgspec.structs import replace
 
 from katana450.arm.control.state import Status
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import gaps_in
+from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.table import rows, state_at
+from katana450.extensions.recording.files.table import rows_from
 from katana450.extensions.recording.messages import StateRow
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
 
@@ -88,34 +87,13 @@ def read_part(
             f"{end:g} s has nothing of it."
         )
     check_whole(file, first, last)
-    found = list(_states(file, first, last))
+    found = list(rows_from(file, first, last))
     if not found or found[0].position is None:
         raise InputError(f"{file.path} is not a recording of an arm with a tool.")
     part = _part(file, found, name)
     if bool(part.rests.all()):
         raise InputError(f"Nothing moves in this part of {file.path}.")
     return part
-
-
-def check_whole(file: RecordingFile, first: float, last: float) -> None:
-    """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
-    found = next(gaps_in(file, first, last), None)
-    if found is not None:
-        t, gap = found
-        raise InputError(
-            f"{file.path} has a gap at {t - file.start:.2f} s: {gap.ticks} ticks are missing "
-            f"({gap.missing}). Choose a part before or after it by --from and --to."
-        )
-
-
-def _states(file: RecordingFile, first: float, last: float) -> Iterator[StateRow]:
-    """Yield the states from ``first`` to ``last`` [s], the first with all its objects."""
-    before = state_at(file, first)
-    if before is not None:
-        yield replace(before, t=first)
-    for row in rows(file, first, last):
-        if before is None or row.t > first:
-            yield row
 
 
 def _part(file: RecordingFile, found: list[StateRow], name: str) -> RecordedPart:

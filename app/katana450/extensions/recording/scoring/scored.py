@@ -22,10 +22,10 @@ from katana450.extensions.programs.measures import MEASURES as REPORTED
 from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.motion_measures import motion_measures, water_measures
 from katana450.extensions.programs.trajectory_path import CubicSpline
+from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
-from katana450.extensions.recording.run_again.recorded_part import check_whole
 from katana450.extensions.recording.scoring.smoothness import (
     RATE,
     WINDOW,
