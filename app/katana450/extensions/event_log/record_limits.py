@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from katana450.extensions.event_log.records import Record
+from katana450.server.web.token_bucket import TokenBucket
 
 SUMMARY_INTERVAL = 10.0
 """[s] Time between two summaries of what was not written."""
@@ -57,20 +58,15 @@ GROUPS = {
 class _Account:
     """Records that one participant may cause now, and those that were not written."""
 
-    left: float
-    t: float
+    records: TokenBucket
     since: float = 0.0
     who: Any = None
     unwritten: Counter[str] = field(default_factory=Counter)
 
-    def take(self, limit: RecordLimit, t: float, factor: float = 1.0) -> bool:
-        """Take one record at ``t`` [s]; return False if none is left."""
-        refill = factor * limit.rate * max(t - self.t, 0.0)
-        self.left, self.t = min(factor * limit.burst, self.left + refill), max(t, self.t)
-        if self.left < 1.0:
-            return False
-        self.left -= 1.0
-        return True
+    @staticmethod
+    def of(limit: RecordLimit, t: float, factor: float = 1.0) -> _Account:
+        """Return an account for ``factor`` times the records of ``limit``, full at ``t`` [s]."""
+        return _Account(TokenBucket(factor * limit.rate, factor * limit.burst, t))
 
 
 class RecordLimits:
@@ -84,11 +80,11 @@ class RecordLimits:
         """Return whether ``record`` of ``source`` is written at ``t`` [s]; count it otherwise."""
         group = GROUPS.get(record["kind"], "command")
         limit = LIMITS[group]
-        total = self._totals.setdefault(group, _Account(TOTAL * limit.burst, t))
-        own = self._accounts.pop((source, group), None) or _Account(limit.burst, t)
+        total = self._totals.setdefault(group, _Account.of(limit, t, TOTAL))
+        own = self._accounts.pop((source, group), None) or _Account.of(limit, t)
         self._accounts[source, group] = own
         self._forget_some()
-        if own.take(limit, t) and total.take(limit, t, TOTAL):
+        if own.records.take(t) and total.records.take(t):
             return True
         if not own.unwritten:
             own.since, own.who = t, record.get("who")
