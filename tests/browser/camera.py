@@ -15,6 +15,8 @@ class Drawing(StrEnum):
     BEST = "best"
     """Only for pictures, with reflections, shadows, smooth edges and every pixel."""
     ALWAYS = "always"
+    NONE = "none"
+    """viser does not load, which takes most of the time: the window has our page alone."""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Generator, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -14,13 +14,14 @@ from playwright.sync_api import Browser
 from playwright.sync_api import Error as PlaywrightError
 
 from katana450.client import Client, connect
+from tests.browser.camera import Drawing
 from tests.browser.chromium import launched
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.person import Person
-from tests.browser.server import AppServer
-from tests.browser.session import MOVE, Truth, clear_stop, prepare
+from tests.browser.server import APP, RECORDING_APP, AppServer
+from tests.browser.session import MOVE, Truth, clear_stop, prepare, take
 from tests.browser.shared_server import SharedServer
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, SIZES
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, SIZES, WIDE
 
 THREAD_SECONDS = 5.0
 ARTEFACTS = Path(__file__).resolve().parents[2] / "test-artefacts"
@@ -100,9 +101,15 @@ def open_page(windows: Windows) -> Iterator[OpenPage]:
 
 
 @pytest.fixture(scope="package")
-def shared_server(browser: Browser) -> Iterator[SharedServer]:  # noqa: ARG001
+def scripts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which the shared server keeps scripts of its users."""
+    return tmp_path_factory.mktemp("scripts")
+
+
+@pytest.fixture(scope="package")
+def shared_server(browser: Browser, scripts: Path) -> Iterator[SharedServer]:  # noqa: ARG001
     """Return the server of the modules of this folder. It ends before the browser."""
-    with SharedServer() as shared_server:
+    with SharedServer((*APP, "--programs", str(scripts))) as shared_server:
         yield shared_server
 
 
@@ -112,15 +119,61 @@ def server(shared_server: SharedServer) -> AppServer:
     return shared_server.as_new()
 
 
+@pytest.fixture(scope="package")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the server that records, with `ring` and `episodes` in it."""
+    return tmp_path_factory.mktemp("recorded")
+
+
+@pytest.fixture(scope="package")
+def recording_server(browser: Browser, recorded: Path) -> Iterator[AppServer]:  # noqa: ARG001
+    """Run a server that records, as the app does for people."""
+    folders = ("--record", str(recorded / "ring"), "--episodes", str(recorded / "episodes"))
+    with AppServer((*RECORDING_APP, "--silence", "2.0", *folders)) as server:
+        yield server
+
+
+class SharedWindow:
+    """The window of the modules of this folder: open as long as its server runs."""
+
+    def __init__(self, windows: Windows) -> None:
+        self._windows = windows
+        self._opened: ViserPage | None = None
+        self._url = ""
+        self._stack = ExitStack()
+
+    def on(self, server: AppServer) -> ViserPage:
+        """Return the window as a person opens it: no sheet, the first tab, the first view."""
+        page = self._opened
+        if page is not None and self._url == server.url and page.connected and not page.errors:
+            page.reset()
+            return page
+        self.close()
+        window = self._windows.open(server.url, nodes=("/arm", MOVE))
+        self._opened, self._url = self._stack.enter_context(window), server.url
+        return self._opened
+
+    def close(self) -> None:
+        self._stack.close()
+        self._opened = None
+
+
+@pytest.fixture(scope="package")
+def shared_window(windows: Windows, shared_server: SharedServer) -> Iterator[SharedWindow]:  # noqa: ARG001
+    """Return the window of the shared server, which ends after it."""
+    with closing(SharedWindow(windows)) as window:
+        yield window
+
+
 @pytest.fixture
 def truth(server: AppServer) -> Truth:
     return Truth(server)
 
 
 @pytest.fixture(scope="module")
-def window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
-    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
-        yield page
+def window(server: AppServer, shared_window: SharedWindow) -> ViserPage:
+    """Return a window with viser, which other modules use too."""
+    return shared_window.on(server)
 
 
 @pytest.fixture
@@ -128,9 +181,26 @@ def page(window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
     """Return a window whose person drives, with the arm in the ready posture."""
     prepare(window, truth)
     yield window
-    if window.page.get_attribute("#jog-button", "aria-expanded") == "true":
-        window.page.click("#jog-button")
+    window.reset()
     assert window.errors == []
+
+
+@pytest.fixture(scope="module")
+def own_window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    """Open our page without viser in its frame, which would take most of the time."""
+    with windows.open(server.url, window=WIDE, drawing=Drawing.NONE) as page:
+        yield page
+
+
+@pytest.fixture
+def own_page(own_window: ViserPage, truth: Truth) -> Iterator[ViserPage]:
+    """Return our page alone, whose person drives, with the arm at rest."""
+    take(own_window)
+    if truth.status()["stopped"] is not None:
+        clear_stop(own_window, truth)
+    truth.wait(20.0, moving=False)
+    yield own_window
+    assert own_window.errors == []
 
 
 @pytest.fixture

@@ -82,9 +82,13 @@ class ViserPage:
         context.add_init_script(f"window.harness = {options};\n{script}\n{scripts}")
         page = context.new_page()
         errors: list[str] = []
-        page.on("console", lambda line: errors.append(line.text) if line.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         try:
+            if drawing is Drawing.NONE:
+                page.route("**/viser/**", lambda route: route.abort())
+                page.goto(url)
+                return cls(page, page.main_frame, errors)
+            page.on("console", lambda row: errors.append(row.text) if row.type == "error" else None)
             pixels = 1.0 if best else COARSE
             query = f"fixedDpr={pixels}" if own_camera else camera.query(pixels)
             page.goto(f"{url}/?{query}")
@@ -99,6 +103,20 @@ class ViserPage:
         """Close the window."""
         self.page.context.close()
 
+    def reset(self) -> None:
+        """Close all sheets and show the first tab, from the first camera and in the first size."""
+        self.page.set_viewport_size({"width": WINDOW[0], "height": WINDOW[1]})
+        self.page.emulate_media(color_scheme="light")
+        self.page.evaluate(
+            """() => {
+                for (const each of document.querySelectorAll("nav [aria-expanded=true]"))
+                    each.click();
+            }"""
+        )
+        self.frame.evaluate("() => document.activeElement?.blur()")
+        self.frame.get_by_role("tab").first.click()
+        self.look_from(Camera())
+
     # Waiting
 
     def wait_until(
@@ -109,6 +127,20 @@ class ViserPage:
         while not condition():
             assert time.monotonic() < deadline, f"waited {seconds:g} s for {what}"
             self.page.wait_for_timeout(POLL_MILLISECONDS)
+
+    def settled(self, value: Callable[[], Any], what: str) -> Any:
+        """Return a value, such as a camera, once it stays the same for a fifth of a second."""
+        values = [value()]
+
+        def rests() -> bool:
+            self.page.wait_for_timeout(2 * POLL_MILLISECONDS)
+            values.append(value())
+            return len(values) > 5 and all(
+                np.allclose(each, values[-1], atol=1e-4) for each in values[-6:]
+            )
+
+        self.wait_until(rests, f"{what} to rest", seconds=20.0)
+        return values[-1]
 
     def wait_ready(self, nodes: Sequence[str] = (), *, seconds: float = READY_SECONDS) -> None:
         """Wait until the page is connected and a frame with all nodes in their poses is drawn.
@@ -196,6 +228,10 @@ class ViserPage:
         poses = self.frame.evaluate("(name) => harness.poses(name)", node)
         T_three_world, T_three_node = _matrix(poses["root"]), _matrix(poses["node"])
         return np.linalg.solve(T_three_world, T_three_node)
+
+    def shows(self, node: str) -> bool:
+        """Return whether a node and all above it are visible."""
+        return bool(self.frame.evaluate("(name) => harness.shows(name)", node))
 
     def project(self, point: ArrayLike) -> Pixel:
         """Return the pixel of a point (3,) [m] of viser's world."""
@@ -381,7 +417,10 @@ class ViserPage:
 
     @contextmanager
     def _drawing(self) -> Iterator[None]:
-        """Draw every frame within the block."""
+        """Draw every frame within the block, if there is a scene."""
+        if not self.frame.evaluate("() => Boolean(window.__viserMutable)"):
+            yield
+            return
         before = self.frame.evaluate("() => harness.draw(true)")
         self.wait_drawn()
         try:

@@ -83,6 +83,13 @@
     return { node: object.matrixWorld.toArray(), root: root.matrixWorld.toArray() };
   };
 
+  // Return whether a node is there, and visible with all above it.
+  harness.shows = (name) => {
+    const seen = (object) => object.visible && (!object.parent || seen(object.parent));
+    const object = viewer().nodeRefFromName[name];
+    return Boolean(object) && seen(object);
+  };
+
   // Return the camera's column-major matrices, and the rectangle of its picture on the page [px].
   harness.view = () => {
     const { camera, canvas } = viewer();

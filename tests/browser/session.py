@@ -24,8 +24,6 @@ VIEW_LABELS = {
     "Side": "View: right",
     "Tool": "View that follows the tool until another one is chosen",
 }
-THIN = 15_000.0
-"""Rate of a slow connection [bytes/s], on which viser alone shows pictures half a minute old."""
 
 
 class Truth:
@@ -96,7 +94,14 @@ def go_home(page: ViserPage, truth: Truth) -> None:
     page.click_button("Home")
     page.wait_until(lambda: np.allclose(joints(page), READY, atol=1e-6), "the sliders at home")
     truth.wait(20.0, mood="ok")
-    page.page.wait_for_timeout(100)
+
+
+def resume(page: ViserPage) -> None:
+    """Press Resume when the page no longer takes a press for the second one of Pause."""
+    page.page.wait_for_function(
+        "(then) => performance.now() > then", arg=page.page.evaluate("performance.now() + 600")
+    )
+    page.press_in_bar("Resume")
 
 
 def set_speed(page: ViserPage, percent: float) -> None:

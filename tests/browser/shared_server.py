@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from katana450.client import Client, RefusedError, connect
+from katana450.client import Client, connect
 from katana450.errors import KatanaError
+from katana450.maths.kinematics.priority import Priority
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer
 
-LEASE_SECONDS = 4.0
-"""[s] Time in which a window or program that has left loses the lease."""
-
 
 class SharedServer:
-    """A server that is started again only if a module left more than a moved arm.
+    """A server that is reset for each module, and started again if that does not make it as new.
 
     A start takes 2 s of processor time.
     """
@@ -27,8 +24,9 @@ class SharedServer:
     def __init__(self, command: Sequence[str] = APP) -> None:
         self._command = command
         self._server = AppServer(command)
-        self._new: dict[str, Any] = {}
-        self._gripper = 0.0
+        self._start: answers.State
+        self._shown: dict[str, Any] = {}
+        self._objects: set[str] = set()
 
     def __enter__(self) -> Self:
         return self
@@ -43,48 +41,45 @@ class SharedServer:
 
     def as_new(self) -> AppServer:
         """Return the server with its arm in the ready posture, and the scene of a new server."""
-        if not self._server.running or not self._renewed():
+        if not self._server.running or not self._reset():
             self._server.stop()
             self._server = AppServer(self._command)
             self._server.start()
             with connect(self._server.url, "Test") as client:
-                self._new = _shown(client)
-                self._gripper = client.query(answers.State).gripper
+                self._start = client.query(answers.State)
+                self._shown, self._objects = _shown(client), _objects(client)
         return self._server
 
-    def _renewed(self) -> bool:
-        """Drive the arm home; return whether nothing differs from a new server."""
+    def _reset(self) -> bool:
+        """Clear the stop, reset what requests can change; return whether nothing differs then."""
         try:
             with connect(self._server.url, "Test") as client:
-                _acquire(client)
+                # From an open window, or a client that has just left.
+                client.ask(requests.Take())
                 client.clear_stop()
                 client.ask(requests.Speed(value=1.0))
-                client.go(requests.Gripper(angle=self._gripper))
+                if self._start.tool is not None:
+                    client.ask(requests.Tool(name=self._start.tool))
+                if self._start.priority is not None:
+                    client.ask(requests.SetPriority(priority=Priority(self._start.priority)))
+                for name in _objects(client) - self._objects:
+                    client.ask(requests.Remove(name=name))
+                client.go(requests.Gripper(angle=self._start.gripper))
                 client.go(requests.Home())
                 client.ask(requests.ReleaseLease())
                 shown = _shown(client)
         except (KatanaError, OSError):
             return False
-        return shown.keys() == self._new.keys() and all(
-            np.allclose(value, self._new[name], rtol=0.0, atol=1e-6)
+        return shown.keys() == self._shown.keys() and all(
+            np.allclose(value, self._shown[name], rtol=0.0, atol=1e-6)
             if isinstance(value, list | float)
-            else value == self._new[name]
+            else value == self._shown[name]
             for name, value in shown.items()
         )
 
 
-def _acquire(client: Client) -> None:
-    """Acquire the lease, which a client that has left may still hold."""
-    end = time.monotonic() + LEASE_SECONDS
-    while True:
-        try:
-            client.ask(requests.Acquire())
-        except RefusedError:
-            if time.monotonic() > end:
-                raise
-            time.sleep(0.05)
-        else:
-            return
+def _objects(client: Client) -> set[str]:
+    return {each.name for each in client.query(answers.Objects).objects}
 
 
 def _shown(client: Client) -> dict[str, Any]:
