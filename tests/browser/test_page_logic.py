@@ -1,0 +1,460 @@
+"""Scripts of the page, each in a document of its own: what they compute, keep and send."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.teach import TaughtPose, taught
+from katana450.extensions.recording.playback.spans import Span, at_place, place_of
+from tests.browser.bare_page import bare_page, load, module
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    with bare_page(browser) as page:
+        yield page
+
+
+# Pause and Speed
+
+
+def test_pause_goes_to_whatever_moves_and_one_press_counts_once(page: Page) -> None:
+    load(page, "pace.js")
+    page.evaluate(
+        """() => {
+            Object.assign(window, { said: [], told: [] });
+            const [say, toast] = [(each) => said.push(each), (words) => told.push(words)];
+            Pace.begin({ say, toast });
+        }"""
+    )
+
+    def press(**status: Any) -> Any:
+        """Show a status and press; return what was said since."""
+        shown: dict[str, Any] = {
+            "pace": "",
+            "stopped": None,
+            "paused": False,
+            "orders": [],
+            "speed": 1.0,
+        }
+        return page.evaluate(
+            """(status) => {
+                Pace.draw(status);
+                document.getElementById("pause").click();
+                return said.splice(0);
+            }""",
+            shown | status,
+        )
+
+    assert press() == [{"do": "pause"}]
+    assert press(orders=["end"]) == [{"do": "steer", "order": "pause"}]
+    # A press just after the button changed may have meant Pause.
+    assert press(orders=["end"], paused=True) == []
+    page.wait_for_timeout(200)
+    assert press(paused=True) == []
+    page.evaluate(
+        "() => { const now = performance.now; performance.now = () => now.call(performance) + 500 }"
+    )
+    assert press(orders=["end"], paused=True) == [{"do": "steer", "order": "resume"}]
+    assert press(pace="Anna drives: ask for the arm.") == []
+    assert page.evaluate("told") == ["Anna drives: ask for the arm."]
+    assert page.locator("#speed input").is_disabled()
+    press()
+    page.locator("#speed input").fill("30")
+    assert page.evaluate("said") == [{"do": "speed", "value": 0.3}]
+    # The status of before does not take the slider back.
+    press(speed=1.0)
+    assert page.locator("#speed input").input_value() == "30"
+
+
+# Jog
+
+DEVICES = """() => {
+    Object.assign(window, { said: [], stops: 0 });
+    window.pad = { connected: true, axes: [0, 0, 0, 0],
+        buttons: Array.from({ length: 17 }, () => ({ pressed: false })) };
+    navigator.getGamepads = () => [window.pad];
+    window.device = Object.assign(new EventTarget(), {
+        opened: true, productName: "Synthetic SpaceMouse",
+        report(reportId, data) {
+            device.dispatchEvent(Object.assign(new Event("inputreport"), { reportId, data }));
+        },
+        push(x) {
+            const data = new DataView(new ArrayBuffer(6));
+            data.setInt16(0, x, true);
+            device.report(1, data);
+        },
+    });
+    const hid = { getDevices: async () => [device] };
+    Object.defineProperty(navigator, "hid", { value: hid });
+}"""
+"""Script that gives the browser a gamepad and a SpaceMouse; x of the latter is to the right."""
+
+BEGIN = """() => {
+    const say = ({ rates }) => rates && said.push(rates);
+    Jog.begin({ say, stop: () => { stops += 1; Jog.quiet(); } });
+    Jog.show(true);
+}"""
+
+HELD = "() => { window.held = setInterval(() => device.push(-350), 16) }"
+
+
+@pytest.fixture
+def jog(page: Page) -> Page:
+    """Return a document with the Jog sheet open, which notes the rates that are sent."""
+    page.evaluate(DEVICES)
+    load(page, "jog.js")
+    page.evaluate(BEGIN)
+    return page
+
+
+def moves(page: Page, axis: int, sign: int) -> None:
+    """Wait until rates along ``axis`` (0 to 4) alone are sent, with the sign."""
+    page.wait_for_function(
+        """([axis, sign]) => {
+            const rates = said.at(-1) ?? [];
+            return sign * rates[axis] > 0 && rates.every((rate, i) => i === axis || !rate);
+        }""",
+        arg=[axis, sign],
+    )
+
+
+def rests(page: Page) -> None:
+    """Wait until rates of zero are sent, and check that they are the last ones."""
+    page.wait_for_function("() => said.at(-1)?.every((rate) => rate === 0)")
+    count = page.evaluate("said.length")
+    page.wait_for_timeout(120)
+    assert page.evaluate("said.length") == count
+
+
+def key(page: Page, kind: str, code: str, *, repeat: bool = False, **more: bool) -> None:
+    event = {"type": f"key{kind}", "code": code, "repeat": repeat, **more}
+    call = "(event) => event.type === 'keyup' ? Jog.release(event.code) : Jog.key(event)"
+    page.evaluate(call, event)
+
+
+def test_held_key_moves_along_one_axis_until_its_release(jog: Page) -> None:
+    for code, axis, sign in (("KeyW", 0, 1), ("KeyS", 0, -1), ("KeyD", 1, -1), ("KeyR", 2, 1)):
+        key(jog, "down", code)
+        moves(jog, axis, sign)
+        key(jog, "up", code)
+        rests(jog)
+    # A shortcut of the browser ends everything.
+    key(jog, "down", "KeyW")
+    moves(jog, 0, 1)
+    key(jog, "down", "ControlLeft", ctrlKey=True)
+    rests(jog)
+
+
+def test_key_held_at_a_stop_counts_again_after_its_release(jog: Page) -> None:
+    key(jog, "down", "KeyA")
+    moves(jog, 1, 1)
+    jog.evaluate("Jog.quiet()")
+    # The browser repeats a held key.
+    key(jog, "down", "KeyA", repeat=True)
+    rests(jog)
+    key(jog, "up", "KeyA")
+    key(jog, "down", "KeyA")
+    moves(jog, 1, 1)
+
+
+def test_yaw_that_the_arm_does_not_have_is_not_sent(jog: Page) -> None:
+    key(jog, "down", "KeyQ")
+    jog.wait_for_timeout(120)
+    assert jog.evaluate("said") == []
+
+
+def test_gamepad_counts_with_its_shoulder_button_and_stops_without(jog: Page) -> None:
+    jog.evaluate("() => { pad.axes[0] = -1 }")
+    jog.locator("#gamepad", has_text="hold LB or RB").wait_for(state="attached")
+    assert jog.evaluate("said") == []
+    jog.evaluate("() => { pad.buttons[4].pressed = true }")
+    moves(jog, 1, 1)
+    # It is unplugged while its stick is deflected.
+    jog.evaluate("() => { navigator.getGamepads = () => [] }")
+    rests(jog)
+    jog.evaluate("() => { navigator.getGamepads = () => [pad]; pad.buttons[1].pressed = true }")
+    jog.wait_for_function("() => stops === 1")
+    # What was held at the stop moves nothing.
+    rests(jog)
+    jog.evaluate("() => { for (const each of pad.buttons) each.pressed = false }")
+    jog.wait_for_timeout(100)
+    jog.evaluate("() => { pad.buttons[5].pressed = true }")
+    moves(jog, 1, 1)
+    jog.evaluate("() => { Jog.show(false); pad.buttons[1].pressed = true }")
+    jog.wait_for_function("() => stops === 2")
+    rests(jog)
+
+
+def test_spacemouse_moves_while_it_reports_and_not_over_a_stop(jog: Page) -> None:
+    jog.locator("#spacemouse", has_text="Synthetic SpaceMouse").wait_for(state="attached")
+    jog.evaluate(HELD)
+    moves(jog, 1, 1)
+    # The cable is unplugged, so no report announces the release.
+    jog.evaluate("() => clearInterval(held)")
+    rests(jog)
+    jog.evaluate(HELD)
+    moves(jog, 1, 1)
+    jog.evaluate("() => device.report(3, new DataView(Uint8Array.of(1, 0).buffer))")
+    assert jog.evaluate("stops") == 1
+    # The cap stays pushed when the stop is cleared.
+    rests(jog)
+    jog.evaluate("() => { clearInterval(held); device.push(0) }")
+    jog.evaluate(HELD)
+    moves(jog, 1, 1)
+    jog.evaluate("() => clearInterval(held)")
+
+
+ARM = {
+    "gripper": [-0.4, 0.3],
+    "freedoms": 5,
+    "joints": ["pan", "lift"],
+    "links": [{"label": "1 base turn"}, {"label": "2 shoulder"}],
+    "slides": [False, True],
+}
+
+
+def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
+    with bare_page(browser, arm=ARM) as page:
+        page.evaluate(DEVICES)
+        page.evaluate(
+            """async (path) => {
+                const { Steps } = await import(path);
+                const sheet = document.getElementById("jog");
+                sheet.hidden = false;
+                window.steps = await Steps.in(sheet, (request) => said.push(request));
+            }""",
+            "http://page.test/static/jog/steps.js",
+        )
+
+        def said() -> Any:
+            return page.evaluate("said.splice(0)")
+
+        def choose(name: str, value: str) -> None:
+            page.locator(f"#jog [name={name}][value='{value}'] + span").click()
+
+        press = """([code, repeat]) => steps.key(
+            { type: "keydown", code, repeat }, { KeyS: [0, -1] })"""
+        assert page.evaluate(press, ["KeyS", False]) is False, "without a step it is held"
+        choose("step", "1")
+        assert not page.locator("#pads").is_visible()
+        for repeat in (False, True, True):
+            assert page.evaluate(press, ["KeyS", repeat])
+        assert said() == [{"do": "step_tool", "by": [-0.001, 0, 0, 0, 0], "frame": "base"}]
+        choose("step", "10")
+        page.get_by_role("button", name="z minus 10 mm").click()
+        assert said()[0]["by"] == [0, 0, -0.01, 0, 0]
+        for stick in (0.4, 0.9, 1.0, 0.0, 0.9):
+            page.evaluate("(x) => steps.deflect([x, 0, 0, 0, 0, 0])", stick)
+        assert [each["by"][0] for each in said()] == [0.01, 0.01]
+        # Joints move by steps only.
+        choose("step", "0")
+        choose("frame", "joints")
+        page.get_by_role("button", name="1 base turn plus 1 °").click()
+        page.get_by_role("button", name="2 shoulder minus 1 mm").click()
+        turn, slide = said()
+        assert (turn["axis"], slide["axis"], slide["by"]) == (1, 2, -0.001)
+        assert turn["by"] == pytest.approx(0.0174533, abs=1e-6)
+        for buttons in ([True, False], [True, False], [False, True]):
+            page.evaluate("(buttons) => steps.grip(...buttons)", buttons)
+        assert [each["angle"] for each in said()] == [0.3, -0.4]
+
+
+# Touch
+
+FEEL = """({ Rumble }, states, haptic) => {
+    const played = [];
+    const pulse = (value, duration) => played.push({ value, duration });
+    const playEffect = (_, effect) => (played.push(effect), Promise.resolve());
+    const pad = haptic
+        ? { connected: true, hapticActuators: [{ pulse }] }
+        : { connected: true, vibrationActuator: { playEffect } };
+    navigator.getGamepads = () => [null, pad];
+    navigator.vibrate = (duration) => played.push({ duration });
+    const rumble = new Rumble();
+    states.forEach((state, i) => rumble.take(state, 1000 * i));
+    return played;
+}"""
+"""Returns what the devices play for states that follow each other after a second."""
+
+
+def state(*reasons: str, **values: Any) -> dict[str, Any]:
+    """Return the part of a state that is felt: an arm that moves freely, with changes."""
+    force = values.pop("force", 0.0)
+    touch = {"force_limit": 10.0, "pads": [{"force": force}, {"force": force}]}
+    margins = {"clearance": values.pop("clearance", 0.1), "limit": values.pop("limit", 1.0)}
+    findings = [{"reason": reason} for reason in reasons]
+    return {
+        **{"moving": True, "findings": findings, "margins": margins},
+        **{"touch": touch, "touching": [], **values},
+    }
+
+
+FELT = {
+    "free": (state(), None, None),
+    "rest": (state(moving=False, clearance=0.006, limit=0.01), None, None),
+    "near": (state(clearance=0.006), 0.0, (0.5, 1.0)),
+    "limit": (state(limit=0.01), 0.0, (0.5, 1.0)),
+    "blocked": (state("contact", moving=False), 0.0, (1.0, 1.0)),
+    "touch": (state(touching=["cup"]), 0.0, (0.6, 0.6)),
+    "grip": (state(force=5.0), 0.6, (0.2, 0.2)),
+    "sliding": (state("sliding", force=0.0), 1.0, (1.0, 1.0)),
+    "slipped": (state("slipped"), 1.0, (1.0, 1.0)),
+}
+"""Each event with the strength of the strong motor and the bounds of the weak one."""
+
+
+def test_each_event_is_felt_on_its_motor_and_on_the_phone(page: Page) -> None:
+    for name, (event, strong, weak) in FELT.items():
+        played = module(page, "touch/rumble.js", FEEL, [state(), event], False)
+        if weak is None:
+            assert played == [], name
+            continue
+        gamepad, phone = played
+        assert gamepad["strongMagnitude"] == pytest.approx(strong), name
+        assert weak[0] <= gamepad["weakMagnitude"] <= weak[1], name
+        strength = max(gamepad["strongMagnitude"], gamepad["weakMagnitude"])
+        assert phone["duration"] == pytest.approx(gamepad["duration"] * strength, abs=1.0), name
+        # The one motor of a gamepad in Firefox has the stronger of both.
+        (haptic, _) = module(page, "touch/rumble.js", FEEL, [state(), event], True)
+        assert haptic == {"value": strength, "duration": gamepad["duration"]}, name
+
+
+# Teach
+
+
+def pose(**fields: Any) -> dict[str, Any]:
+    plain = {"gripper": None, "grips": False, "wait": 0, "speed": 100, "blend": False}
+    return {"joints": [10.0, -68.25, 85.0, 8.125, -0.5], **plain, **fields}
+
+
+TAUGHT = {
+    "plain": (1, [pose(), pose(joints=[0.0] * 5)]),
+    "loop": (7, [pose(speed=30, wait=0.5), pose(gripper=-12.5, grips=True, wait=1)]),
+    "speeds": (3, [pose(speed=55), pose(speed=55, grips=True, gripper=3), pose()]),
+    "blend": (2, [pose(blend=True), pose(blend=True), pose(), pose(blend=True)]),
+    'a "name": # \\': (1, [pose(blend=True, speed=50), pose(speed=20)]),
+}
+
+
+def test_text_of_poses_is_read_back_as_the_same_poses(page: Page) -> None:
+    """The page writes scripts and the server reads them: nothing is lost on the way."""
+    for name, (times, poses) in TAUGHT.items():
+        content = {"name": name, "times": times, "poses": poses}
+        text = module(page, "teach/poses.js", "({ scriptOf }, all) => scriptOf(all).text", content)
+        found = taught(parse(text))
+        assert found is not None, text
+        assert (found.name, found.times) == (name, times)
+        wanted = []
+        for number, each in enumerate(poses):
+            after = poses[number + 1] if number + 1 < len(poses) else None
+            # A pose is passed only on the way to another one at the same speed.
+            blend = each["blend"] and after is not None and after["speed"] == each["speed"]
+            speed, joints = each["speed"] / 100, tuple(each["joints"])
+            wanted.append(TaughtPose(joints, speed, blend, each["gripper"], each["wait"]))
+        assert list(found.poses) == wanted, text
+
+
+KEPT = """({ Content }, text, joints) => {
+    const arm = { name: "arm", joints: new Array(joints).fill("") };
+    const content = new Content({ getItem: (key) => key === "katana450.teach" ? text : null }, arm);
+    return [content.broken, content.now.name];
+}"""
+
+
+MINE = '{"format": 1, "name": "Mine", "times": 1, "poses": [], "text": null}'
+
+CONTENTS = (
+    (MINE, 5, False, "Mine"),
+    # A list of five joints, as earlier versions kept it for every arm.
+    (MINE, 6, False, "My script"),
+    ('{"format": 1, "name": "x", "times": 1, "poses": [{}]}', 5, True, "My script"),
+    ("{", 5, True, "My script"),
+    ("null", 5, True, "My script"),
+    ('{"format": 1}', 5, True, "My script"),
+)
+"""What the browser keeps, the joints of the arm, whether it is broken, and the name of the list."""
+
+
+def test_broken_content_of_the_browser_is_refused(page: Page) -> None:
+    for text, joints, broken, name in CONTENTS:
+        shown = module(page, "teach/content.js", KEPT, text, joints)
+        assert shown == [broken, name], (text, joints)
+
+
+CHANGED = """({ Content }) => {
+    const content = new Content(null, { name: "arm", joints: new Array(5).fill("") }, () => {});
+    const names = [];
+    const act = (name, ...values) => (content[name](...values), names.push(content.now.name));
+    act("change", { name: "one" });
+    act("change", { name: "two" });
+    act("undo");
+    act("redo");
+    act("undo");
+    act("change", { name: "three" });
+    // A change takes the place of what could be done again.
+    act("redo");
+    for (let i = 0; i < 3; i++) act("undo");
+    return [names, content.undoable, content.redoable];
+}"""
+"""Changes the name of a list; returns the name after each change, and what is still possible."""
+
+
+def test_changes_of_taught_poses_are_undone_and_done_again(page: Page) -> None:
+    names, undoable, redoable = module(page, "teach/content.js", CHANGED)
+    wanted = ["one", "two", "one", "two", "one", "three", "three", "one", "My script", "My script"]
+    assert names == wanted
+    assert (undoable, redoable) == (False, True)
+
+
+# Instruments and timeline
+
+CATALOGUE = [
+    {"id": "speed", "sizes": ["small", "large"], "shown": True},
+    {"id": "clearance", "sizes": ["small"], "shown": True},
+    {"id": "pads", "sizes": ["small"], "shown": False},
+]
+
+SPEED = {"id": "speed", "size": "small", "shown": True}
+
+BROKEN = (
+    "{",
+    "null",
+    json.dumps({"version": 99, "places": []}),
+    json.dumps({"version": 1, "places": {"id": 3}}),
+    json.dumps({"version": 1, "places": [None, 7, {"id": "<b>", "size": "small", "shown": True}]}),
+    json.dumps({"version": 1, "places": [{"id": "speed", "size": "vast", "shown": "yes"}, SPEED]}),
+)
+
+
+def test_layout_of_instruments_is_repaired_and_arranged(page: Page) -> None:
+    path = "instruments/layout.js"
+    first = module(page, path, "({ initial }, all) => initial(all)", CATALOGUE)
+    read = "({ read }, all, text) => read({ getItem: () => text }, all)"
+    for text in BROKEN:
+        assert module(page, path, read, CATALOGUE, text) == first, text
+
+    def names(call: str) -> list[str]:
+        changed = module(page, path, f"(own, first) => own.{call}", first)
+        return [each["id"] for each in changed if each["shown"]]
+
+    assert names("moved(first, 'clearance', 'speed')") == ["clearance", "speed"]
+    assert names("nudged(first, 'speed', 1)") == ["clearance", "speed"]
+    assert names("nudged(first, 'speed', -1)") == ["speed", "clearance"]
+    assert names("changed(first, 'speed', { shown: false })") == ["clearance"]
+
+
+def test_axis_of_the_timeline_is_that_of_the_server(page: Page) -> None:
+    spans = [Span(10.0, 12.0), Span(20.0, 25.0), Span(40.0, 41.5)]
+    places = [-1.0, 0.0, 1.5, 2.0, 2.5, 7.0, 7.5, 9.0]
+    times = [9.0, 10.0, 11.5, 15.0, 20.0, 23.0, 30.0, 41.5, 50.0]
+    for function, ours, values in (("atPlace", at_place, places), ("placeOf", place_of, times)):
+        call = f"(axis, spans, values) => values.map((each) => axis.{function}(spans, each))"
+        shown = module(page, "timeline/axis.js", call, spans, values)
+        assert shown == pytest.approx([ours(spans, value) for value in values]), function
