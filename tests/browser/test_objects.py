@@ -1,96 +1,330 @@
-"""Objects from files: the page uploads a file, and the object is placed, moved and removed."""
+"""Objects on the page: dropped, chosen, clicked, moved, changed, removed, and undone."""
 
 from __future__ import annotations
 
+import base64
+import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 import trimesh
 
+from katana450.client import Client
+from katana450.extensions.export.vrml_text import HEADER
+from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, bar, clear_stop
+from tests.exchange.compressed_gltf import DATA, SQUARE
 
-MOVE = "/target/move"
-SHAPE = "/objects/3/shape"
-"""The third object, after cup and basin."""
+DROP = """async ([files, [clientX, clientY] = []]) => {
+    const data = new DataTransfer();
+    for (const [name, text] of files) {
+        const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+        data.items.add(new File([bytes], name));
+    }
+    const where = document.querySelector("canvas") ?? document.body;
+    for (const kind of ["dragenter", "dragover", "drop"])
+        where.dispatchEvent(
+            new DragEvent(kind, { dataTransfer: data, bubbles: true, clientX, clientY }));
+}"""
 
-HANDLE = "/handles/ring"
+GLOWING = """(name) => {
+    let found = false;
+    katanaScene.node(name).traverse(({ material }) => {
+        found ||= material?.emissiveIntensity < 1 && material.emissive.getHex() > 0;
+    });
+    return found;
+}"""
+"""Script that returns whether some shape of a node is highlighted."""
 
 
-def sheet_text(page: ViserPage) -> str:
-    return page.page.locator("#read").inner_text()
+def objects(reader: Client) -> dict[str, Any]:
+    """Return the objects by their names."""
+    return {each.name: each for each in reader.query(answers.Objects).objects}
 
 
-def place_of(page: ViserPage) -> np.ndarray:
-    return np.asarray(page.node_pose("/objects/3")[:3, 3])
+def place_of(reader: Client, name: str) -> Any:
+    """Return the position (3,) [m] of an object."""
+    return np.array(objects(reader)[name].T)[:3, 3]
 
 
-def test_an_object_is_brought_moved_changed_and_removed(
-    open_page: OpenPage, tmp_path: Path, artefacts: Path
+def pixel_of(page: ViserPage, reader: Client, name: str) -> tuple[float, float]:
+    """Return the pixel of the window in the middle of an object."""
+    height = objects(reader)[name].size[-1]
+    return page.project(np.add(place_of(reader, name), (0.0, 0.0, 0.5 * height)))
+
+
+def drop(page: ViserPage, *pixel: tuple[float, float], **files: bytes) -> None:
+    """Drop files on the scene, by their names with _ for the dot, at a pixel of the window."""
+    content = [
+        [".".join(name.rsplit("_", 1)), base64.b64encode(data).decode()]
+        for name, data in files.items()
+    ]
+    box = page.page.locator("#scene").bounding_box()
+    assert box is not None
+    place = [[x - box["x"], y - box["y"]] for x, y in pixel]
+    page.frame.evaluate(DROP, [content, *place])
+
+
+def shown(page: ViserPage) -> str:
+    """Return what the sheet says about the last file."""
+    return page.page.inner_text("#read")
+
+
+def cube(side: float, kind: str = "stl") -> bytes:
+    content = trimesh.creation.box((side, side, side)).export(file_type=kind)
+    return content.encode() if isinstance(content, str) else bytes(content)
+
+
+def clear_refusals(page: ViserPage) -> None:
+    """Drop what the browser reports about refused files; anything else is an error."""
+    assert all("422" in each for each in page.errors)
+    page.errors.clear()
+
+
+def undo(page: ViserPage, reader: Client, before: set[str]) -> None:
+    """Undo changes until the objects are those of before."""
+    for _ in range(len(objects(reader).keys() ^ before)):
+        page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: objects(reader).keys() == before, "the objects of before")
+
+
+def test_files_are_dropped_on_the_table_and_undone(page: ViserPage, reader: Client) -> None:
+    before = set(objects(reader))
+    place = (0.45, 0.15, 0.0)
+    drop(page, page.project(place), left_stl=cube(30.0))
+    page.wait_until(lambda: "left" in objects(reader), "the object")
+    np.testing.assert_allclose(place_of(reader, "left")[:2], place[:2], rtol=0, atol=0.002)
+    page.wait_until(lambda: "triangles" in shown(page), "the answer")
+    page.page.locator("#stage.dropping").wait_for(state="hidden")
+    # Files that belong together are one object.
+    document = SQUARE | {"nodes": [{"mesh": 0, "scale": [0.1, 0.1, 0.1]}]}
+    drop(page, square_gltf=json.dumps(document).encode(), **{"a b_bin": DATA}, note_txt=b"x")
+    page.wait_until(lambda: "square" in objects(reader), "the object")
+    assert "2 triangles, 100 × 0 × 100 mm" in shown(page)
+    part = f"{HEADER}\nShape {{ geometry Box {{ size 0.04 0.04 0.04 }} }}".encode()
+    drop(page, robot_wrl=f'{HEADER}\nInline {{ url "p/part.wrl" }}'.encode(), part_wrl=part)
+    page.wait_until(lambda: "robot" in objects(reader), "the other object")
+    assert "12 triangles" in shown(page)
+    undo(page, reader, before)
+
+
+def test_clicked_object_is_removed_by_delete_and_returns(
+    page: ViserPage, reader: Client, artefacts: Path
 ) -> None:
-    ring = tmp_path / "ring.stl"
+    before = objects(reader).keys()
+    # Without a selection the key removes nothing.
+    page.page.keyboard.press("Delete")
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    assert page.page.inner_text("#selection b") == "cup"
+    page.keep(artefacts / "selection.png")
+    assert objects(reader).keys() == before
+    page.page.keyboard.press("Delete")
+    page.wait_until(lambda: objects(reader).keys() == before - {"cup"}, "the cup to go")
+    assert not page.page.locator("#selection").is_visible()
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: objects(reader).keys() == before, "the cup to return")
+    # A click beside all objects, and a drag of the camera, select nothing.
+    page.page.mouse.click(*pixel_of(page, reader, "basin"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    page.page.mouse.click(60, 200)
+    page.page.wait_for_selector("#selection", state="hidden")
+
+
+def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> None:
+    start = np.array(truth.status()["goal"])
+    page.drag_arrow(MOVE, "y", 0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["goal"])
+    assert np.abs(moved - start).max() > 0.05
+    page.page.click("#help-button")
+    newest = page.page.locator("#undoable li").first
+    page.wait_until(lambda: newest.text_content() == "arm (drag)", "the list")
+    page.page.click("#help button.main")
+    page.page.mouse.click(60, 200)
+    # The focus is in viser's document.
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: np.allclose(truth.status()["q"], start, atol=1e-6), "the way back")
+    page.drag_arrow(MOVE, "y", -0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["q"])
+    page.page.keyboard.press("Space")
+    truth.wait(mood="stopped")
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: "stopped" in bar(page, "toast"), "the refusal")
+    clear_stop(page, truth)
+    page.page.keyboard.press("Control+z")
+    page.wait_until(lambda: "nothing to undo" in bar(page, "toast"), "the refusal")
+    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
+
+
+def test_chosen_file_is_refused_or_placed_changed_and_removed(
+    page: ViserPage, reader: Client, tmp_path: Path, artefacts: Path
+) -> None:
+    before = set(objects(reader))
+    ring, broken = tmp_path / "ring.stl", tmp_path / "broken.stl"
     ring.write_bytes(trimesh.creation.torus(40.0, 12.0, 48, 24).export(file_type="stl"))
-    broken = tmp_path / "broken.stl"
     broken.write_bytes(b"solid nothing")
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        page.press_in_bar("Objects")
-        page.page.set_input_files("#object-file", broken)
-        page.wait_until(
-            lambda: "broken.stl" in sheet_text(page) and "…" not in sheet_text(page), "a refusal"
-        )
-        assert page.page.locator("#read.bad").count() == 1
+    page.press_in_bar("Objects")
+    page.page.set_input_files("#object-file", broken)
+    page.page.locator("#read.bad", has_text="broken.stl").wait_for()
+    clear_refusals(page)
+    page.page.set_input_files("#object-file", ring)
+    page.wait_until(lambda: "2304 triangles, 104 × 104 × 24 mm" in shown(page), "the answer")
+    assert "assumed to be mm" in shown(page)
+    np.testing.assert_allclose(place_of(reader, "ring"), (0.36, 0.0, 0.0), atol=1e-6)
 
-        page.page.set_input_files("#object-file", ring)
-        page.wait_until(
-            lambda: "2304 triangles, 104 × 104 × 24 mm" in sheet_text(page), "the answer"
-        )
-        assert "assumed to be mm" in sheet_text(page)
-        page.wait_ready((SHAPE,))
-        np.testing.assert_allclose(place_of(page), (0.36, 0.0, 0.0), atol=1e-6)
+    # Its handle in the scene, by the box of the panel.
+    handle = "/handles/ring"
+    page.open_tab("Scene")
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    page.wait_ready((handle,))
+    assert page.chosen("Object") == "ring"
+    page.drag_arrow(handle, "y", 0.12)
+    page.wait_until(lambda: place_of(reader, "ring")[1] > 0.115, "the object to follow its handle")
+    moved = place_of(reader, "ring")
+    np.testing.assert_allclose(moved, (0.36, 0.12, 0.0), atol=0.01)
+    # Another unit than the guessed one changes the size of the same object.
+    page.page.select_option("#unit", "cm")
+    page.wait_until(lambda: "1040 × 1040 × 240 mm" in shown(page), "the other unit")
+    np.testing.assert_allclose(place_of(reader, "ring"), moved, atol=1e-9)
+    page.type_number("Scale", 0.15)
+    page.wait_until(lambda: objects(reader)["ring"].scale == 0.15, "the scale")
+    page.page.select_option("#unit", "")
+    clear_refusals(page)
+    page.keep(artefacts / "app-objects.png")
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    page.frame.get_by_role("button", name="Remove", exact=True).scroll_into_view_if_needed()
+    page.click_button("Remove")
+    page.wait_until(lambda: objects(reader).keys() == before, "it to go")
+    page.wait_until(lambda: page.chosen("Object") in before, "another object to be chosen")
 
-        page.open_tab("Scene")
-        page.frame.get_by_text("Handles on objects", exact=True).click()
-        page.wait_ready((HANDLE,))
-        assert page.chosen("Object") == "ring"
-        page.drag_arrow(HANDLE, "y", 0.12)
-        page.wait_until(lambda: place_of(page)[1] > 0.115, "the object to follow its handle")
-        moved = place_of(page)
-        np.testing.assert_allclose(moved, (0.36, 0.12, 0.0), atol=0.01)
 
-        # Another unit than the guessed one changes the size of the same object.
-        page.page.select_option("#unit", "cm")
-        page.wait_until(lambda: "1040 × 1040 × 240 mm" in sheet_text(page), "the other unit")
-        page.wait_until(
-            lambda: len(page.messages("MeshMessage", node=SHAPE)) == 2, "it in the scene"
-        )
-        np.testing.assert_allclose(place_of(page), moved, atol=1e-9)
+@pytest.mark.long
+def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
+    page: ViserPage, reader: Client, server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    arrows = "/handles/cup"
+    other = open_page(server.url, nodes=("/arm",))
 
-        page.type_number("Scale", 0.15)
-        page.wait_until(
-            lambda: any(
-                each.body["updates"].get("scale") == 0.15
-                for each in page.messages("SceneNodeUpdateMessage", node=SHAPE)
-            ),
-            "the scale",
-        )
-        page.frame.get_by_role("button", name="Remove", exact=True).scroll_into_view_if_needed()
-        page.screenshot(artefacts / "app-objects.png")
-        page.click_button("Hand")
-        page.wait_until(
-            lambda: (
-                page.messages("SetSceneNodeVisibilityMessage", node=HANDLE, last=1)[0].body[
-                    "visible"
-                ]
-                is False
-            ),
-            "the handle to go with the hand",
-        )
-        page.click_button("Remove")
-        page.wait_until(
-            lambda: page.messages("RemoveSceneNodeMessage", node="/objects/3", last=1), "it to go"
-        )
-        page.wait_until(lambda: page.chosen("Object") == "cup", "another object to be chosen")
-        refused = [each for each in page.errors if "422" not in each]
-        assert refused == []
+    start = place_of(reader, "cup")
+    assert not page.shows(arrows)
+    # Under the mouse it is highlighted, with the pointer of what can be clicked.
+    cursor = "katanaScene.viewer().canvas.style.cursor"
+    x, y = pixel_of(page, reader, "cup")
+    page.page.mouse.move(x - 3.0, y)
+    page.page.mouse.move(x, y)
+    page.wait_until(lambda: page.frame.evaluate(GLOWING, "/cup"), "the highlight")
+    assert page.frame.evaluate(cursor) == "pointer"
+    page.page.mouse.move(60.0, 200.0)
+    page.wait_until(lambda: not page.frame.evaluate(GLOWING, "/cup"), "no highlight")
+    assert page.frame.evaluate(cursor) == ""
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.wait_until(lambda: page.shows(arrows), "the arrows")
+    page.keep(artefacts / "selection-arrows.png")
+    page.drag_arrow(arrows, "y", -0.06)
+    page.wait_until(lambda: place_of(reader, "cup")[1] < start[1] - 0.05, "the cup to follow")
+    assert page.page.inner_text("#selection b") == "cup"
+    assert not other.shows(arrows)
+    page.page.keyboard.press("Control+z")
+    page.wait_until(
+        lambda: np.allclose(place_of(reader, "cup"), start, atol=1e-9), "the cup to return"
+    )
+    page.page.get_by_role("button", name="Deselect").click()
+    page.wait_until(lambda: not page.shows(arrows), "no arrows")
+    # The box of the panel shows those of all objects, and keeps them when none is selected.
+    page.open_tab("Scene")
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    other.wait_until(lambda: other.shows(arrows), "the arrows of all")
+    page.page.mouse.click(*pixel_of(page, reader, "cup"))
+    page.page.wait_for_selector("#selection:not([hidden])")
+    page.page.get_by_role("button", name="Deselect").click()
+    page.page.wait_for_timeout(200)
+    assert page.shows(arrows)
+    page.frame.get_by_text("Handles on objects", exact=True).click()
+    page.wait_until(lambda: not page.shows(arrows), "no arrows")
+
+
+@pytest.mark.long
+def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth) -> None:
+    """An undo that waits on its way while the arm is stopped and cleared is refused."""
+    start = np.array(truth.status()["goal"])
+    page.drag_arrow(MOVE, "y", 0.1)
+    truth.wait(10.0, moving=False)
+    moved = np.array(truth.status()["q"])
+    # The page shows an old status, and holds the drag for undoable, as while its connection hangs.
+    # The key is pressed at once, before the next status arrives.
+    page.page.evaluate(
+        """(old) => {
+            window.dispatchEvent(new CustomEvent("status", {detail: old}));
+            document.body.dispatchEvent(new KeyboardEvent(
+                "keydown", {code: "KeyZ", key: "z", ctrlKey: true, bubbles: true}));
+        }""",
+        {"undo": ["arm (drag)"], "revocations": truth.status()["revocations"] - 1},
+    )
+    page.wait_until(lambda: "Do it again" in bar(page, "toast"), "the refusal")
+    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
+    assert not np.allclose(moved, start, atol=1e-2)
+
+
+@pytest.mark.long
+def test_one_of_several_files_is_chosen(page: ViserPage, reader: Client) -> None:
+    drop(page, left_obj=cube(20.0, "obj"), right_obj=cube(30.0, "obj"))
+    choice = page.page.locator("#which button", has_text="right.obj")
+    choice.wait_for()
+    assert "choose one of left.obj, right.obj" in shown(page)
+    choice.click()
+    page.wait_until(lambda: "right" in objects(reader), "the object")
+    assert not page.page.locator("#which").is_visible()
+    clear_refusals(page)
+
+
+@pytest.mark.long
+def test_a_chosen_folder_is_one_object(page: ViserPage, reader: Client, tmp_path: Path) -> None:
+    folder = tmp_path / "model"
+    (folder / "parts").mkdir(parents=True)
+    document = SQUARE | {"nodes": [{"mesh": 0, "scale": [0.1, 0.1, 0.1]}]}
+    (folder / "panel.gltf").write_text(json.dumps(document))
+    (folder / "parts" / "a b.bin").write_bytes(DATA)
+    (folder / "picture.png").write_bytes(b"no shape")
+    page.press_in_bar("Objects")
+    page.page.set_input_files("#object-folder", folder)
+    page.wait_until(lambda: "panel" in objects(reader), "the object")
+    page.press_in_bar("Objects")
+
+
+@pytest.mark.long
+def test_a_large_object_is_placed_with_a_scale(
+    page: ViserPage, reader: Client, artefacts: Path
+) -> None:
+    drop(page, house_glb=cube(5.0, "glb"))
+    form = page.page.locator("#fit")
+    form.wait_for()
+    assert "5000 mm long, over 2000 mm: place it with the scale 0.2" in shown(page)
+    assert page.page.input_value("#fit-scale") == "0.2"
+    assert page.page.inner_text("#fit-size") == "1000 × 1000 × 1000 mm"
+    assert "house" not in objects(reader)
+    page.page.fill("#fit-scale", "0.9")
+    assert page.page.inner_text("#fit-size") == "4500 × 4500 × 4500 mm"
+    assert page.page.locator("#fit-place").is_disabled()
+    page.page.fill("#fit-scale", "0.03")
+    assert page.page.inner_text("#fit-size") == "150 × 150 × 150 mm"
+    page.screenshot(artefacts / "app-scale.png")
+    page.page.click("#fit-place")
+    page.wait_until(
+        lambda: "house" in objects(reader) and objects(reader)["house"].scale == 0.03, "the object"
+    )
+    assert not form.is_visible()
+    # A unit that fits replaces the scale.
+    page.page.select_option("#unit", "cm")
+    page.wait_until(
+        lambda: "house" in objects(reader) and objects(reader)["house"].scale == 1.0,
+        "the size of the other unit",
+    )
+    page.page.select_option("#unit", "")
+    clear_refusals(page)
