@@ -1,0 +1,149 @@
+"""Branches and the velocity ellipsoid on the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from katana450.arm.control.messages import axis_names, limit_text
+from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.arm.robot.robot import Robot
+from katana450.client import Client
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.velocity import limit_distances, singular_values
+from katana450.server.api import answers
+from katana450.settings import Settings
+from tests.browser.page import ViserPage
+from tests.browser.session import AXES, Truth, bar
+
+READY = np.array(Settings().ready)
+GHOST = """(path) => {
+    const ghost = katanaScene.viewer().scene.getObjectByName("branch");
+    if (!ghost) return null;
+    const link = katanaScene.node(path);
+    let shape = null;
+    link.traverse((each) => (shape ??= each.isMesh ? each : null));
+    let copy = null;
+    ghost.traverse((each) => (copy ??= each.geometry === shape.geometry ? each : null));
+    for (const each of [link, shape, copy]) each.updateWorldMatrix(true, false);
+    // The place of the shape in its link is the same in the arm and in its ghost.
+    const inLink = link.matrixWorld.clone().invert().multiply(shape.matrixWorld);
+    const world = katanaScene.node("").matrixWorld.clone().invert();
+    return world.multiply(copy.matrixWorld).multiply(inLink.invert()).toArray();
+}"""
+"""Returns the pose of a link (column-major) of the ghost under the pointer; null without one."""
+
+
+@pytest.fixture
+def page(page: ViserPage) -> Iterator[ViserPage]:
+    """Return a window with the open folder of the branches."""
+    page.page.set_viewport_size({"width": 1440, "height": 1000})
+    page.page.wait_for_selector("#cube", state="attached")
+    folder = page.frame.get_by_text("Branches", exact=True)
+    folder.click()
+    row(page, "front-down").scroll_into_view_if_needed()
+    yield page
+    page.open_tab("Drive")
+    folder.click()
+
+
+def row(page: ViserPage, branch: str) -> Any:
+    return page.frame.locator(f"tr[data-branch={branch}]")
+
+
+def wait_names(page: ViserPage, *wanted: str) -> None:
+    """Wait until ghosts with these names are shown."""
+    names = page.page.locator("#branch-labels p")
+    page.wait_until(lambda: names.all_inner_texts() == list(wanted), f"the names {wanted}")
+
+
+@pytest.mark.long
+def test_row_under_the_mouse_shows_its_branch(
+    page: ViserPage, reader: Client, robot: Robot, artefacts: Path
+) -> None:
+    choices = reader.query(answers.Branches).choices
+    path = reader.query(answers.Arm).links[-1].path
+    gripper = reader.query(answers.State).gripper
+    options = {f"{each.shoulder}-{each.elbow}": each for each in choices}
+    sent = len(page.sent("GuiUpdateMessage"))
+    for branch, words in (("front-down", "elbow down"), ("back-up", "shoulder back")):
+        row(page, branch).hover()
+        wait_names(page, f"{words}, {options[branch].time:.1f} s")
+        matrix = page.frame.evaluate(GHOST, f"/arm/{'/'.join(path)}")
+        frames = robot.frames(robot.joint_values(np.array(options[branch].q), gripper))
+        assert np.allclose(np.reshape(matrix, (4, 4)).T, frames[path[-1]], atol=1e-4)
+        page.keep(artefacts / f"branch-{branch}.png")
+    # It asks the arm for nothing, and the arm's own branch has no ghost.
+    assert len(page.sent("GuiUpdateMessage")) == sent
+    row(page, "front-up").hover()
+    wait_names(page)
+    assert page.frame.evaluate(GHOST, f"/arm/{'/'.join(path)}") is None
+    assert bar(page, "headline") == "On target"
+
+
+@pytest.mark.long
+def test_branches_are_shown_and_one_is_taken(
+    page: ViserPage, arm: MountedArm, artefacts: Path
+) -> None:
+    chain = arm.chain
+
+    def now(key: str) -> str:
+        return page.text_of(f".k450 [data-now={key}]")
+
+    # At rest the read-out shows the distances to singularity and limit.
+    distances = limit_distances(chain, READY)
+    axis = int(distances.argmin())
+    assert now("limit") == limit_text(axis, axis_names(chain.names)[axis], distances[axis])
+    assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
+
+    page.open_tab("Scene")
+    page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
+    page.wait_until(
+        lambda: any(
+            message.body["visible"]
+            for message in page.messages("SetSceneNodeVisibilityMessage", node="/velocity")
+        ),
+        "the ellipsoid",
+    )
+    assert np.allclose(
+        page.node_pose("/velocity")[:3, 3],
+        (arm.T_base_shoulder @ forward(chain, READY))[:3, 3],
+        atol=1e-5,
+    )
+    page.open_tab("Drive")
+    # The view of the branches moved nothing.
+    assert [page.slider_value(label) for label in AXES] == [
+        round(math.degrees(angle), 6) for angle in READY
+    ]
+    assert "nothing" in page.text_of("[data-branch=front-up]")
+
+    page.frame.get_by_role("button", name="front-down", exact=True).scroll_into_view_if_needed()
+    page.keep(artefacts / "app-branches.png")
+    page.click_button("front-down")
+    page.wait_until(lambda: page.slider_value("3 elbow") < 0.0, "the other elbow", seconds=30.0)
+
+
+@pytest.mark.long
+def test_click_on_a_ghost_takes_its_branch(page: ViserPage, truth: Truth, artefacts: Path) -> None:
+    page.choose("Ghosts", "front-down")
+    elbow = "/branch/front-down/base_link/arm_base_link/pan_link/upper_arm_link/forearm_link"
+    page.wait_ready((elbow,))
+    page.keep(artefacts / "app-ghosts.png")
+    before = page.slider_value("3 elbow")
+
+    def clicked() -> bool:
+        # An overloaded browser can lose a click, so click again.
+        page.page.mouse.click(*page.project(page.node_pose(elbow)[:3, 3]))
+        page.page.wait_for_timeout(200)
+        return truth.status()["moving"] or page.slider_value("3 elbow") * before < 0.0
+
+    page.wait_until(clicked, "the effect of the click", seconds=40.0)
+    page.wait_until(
+        lambda: page.slider_value("3 elbow") * before < 0.0, "the other elbow", seconds=30.0
+    )
+    page.wait_until(lambda: "Moving" not in bar(page, "headline"), "the arm to arrive")
