@@ -1,4 +1,4 @@
-"""Programs during planning, on the page of a person who steers them."""
+"""Programs on the page of a person who previews, pauses, stops and continues them."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ from pathlib import Path
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.programs.server.idle_planner import DELAY
 from katana450.server.api import answers
-from tests.browser.conftest import Windows
+from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
-from tests.browser.server import RECORDING_APP, AppServer
-from tests.browser.session import bar
+from tests.browser.server import AppServer
+from tests.browser.session import MOVE, Truth, bar, clear_stop, resume, take
+from tests.browser.sizes import PHONE, PORTRAIT
+from tests.gateway.test_programs import wait as wait_progress
 
 pytestmark = pytest.mark.long
+
+STEP_3 = ".steps li:nth-child(3) button"
 
 PLANNED = 60.0
 """Timeout [s] of every plan here, on a busy machine."""
 
 
-@pytest.fixture(scope="module")
-def page(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
-    with windows.open(server.url, nodes=("/arm", "/target/move")) as page:
-        page.open_tab("Programs")
-        yield page
-        assert page.errors == []
+@pytest.fixture
+def page(page: ViserPage) -> ViserPage:
+    page.open_tab("Programs")
+    return page
 
 
 @pytest.fixture
@@ -46,10 +47,6 @@ def orders(page: ViserPage) -> list[str]:
     return page.page.locator("#orders button").all_inner_texts()
 
 
-def press(page: ViserPage, label: str) -> None:
-    page.page.locator("#orders").get_by_role("button", name=label, exact=True).click()
-
-
 def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
     """Wait until the bar's headline matches ``shown``."""
     page.wait_until(lambda: re.fullmatch(shown, headline(page)) is not None, shown, seconds=seconds)
@@ -63,19 +60,6 @@ def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.Sta
     return state
 
 
-def test_a_cancelled_preview_leaves_the_planner_free(page: ViserPage, artefacts: Path) -> None:
-    page.choose("Script", "Pour")
-    page.click_button("Preview")
-    until(page, r"Planning Pour \d+ %")
-    assert orders(page) == ["Cancel"]
-    assert "does not start by itself" in page.page.inner_text("#why")
-    page.keep(artefacts / "planning.png")
-    press(page, "Cancel")
-    until(page, "On target", 2.0)
-    page.wait_until(lambda: "cancelled" in page.text_of(".k450.program"), "the panel to say so")
-    assert orders(page) == []
-
-
 def test_previewed_plan_shows_one_duration_and_runs_immediately(
     page: ViserPage, arm: Client, artefacts: Path
 ) -> None:
@@ -83,8 +67,8 @@ def test_previewed_plan_shows_one_duration_and_runs_immediately(
     page.click_button("Preview")
     state = wait(arm, lambda state: state.program is not None and state.program.status == "ready")
     assert state.program is not None
-    page.wait_until(lambda: "of motion" in page.text_of(".k450.program"), "its length")
-    duration = re.search(r"([\d.]+) s of motion", page.text_of(".k450.program"))
+    page.wait_until(lambda: ", about" in page.text_of(".k450.program"), "its length")
+    duration = re.search(r"about ([\d.]+) s", page.text_of(".k450.program"))
     assert duration is not None
     thumb = page._labelled("Look at").get_by_role("slider")
     end = float(thumb.get_attribute("aria-valuemax") or 0)
@@ -126,7 +110,7 @@ def test_pause_during_planning_lasts_until_resume(
     until(page, r"Paused by you, \S+( [AP]M)?")
     page.wait_until(lambda: "Square: " in page.page.inner_text("#why"), "the program to begin")
     before = arm.query(answers.State)
-    page.page.wait_for_timeout(1500)
+    page.page.wait_for_timeout(200)
     after = arm.query(answers.State)
     assert after.q == before.q
     page.press_in_bar("Resume")
@@ -136,9 +120,7 @@ def test_pause_during_planning_lasts_until_resume(
     # The same controls change the pace of the program.
     page.press_in_bar("Pause")
     until(page, r"Paused by you, .*", 5.0)
-    # A press just after the button changed may have meant Pause, and is ignored.
-    page.page.wait_for_timeout(600)
-    page.press_in_bar("Resume")
+    resume(page)
     until(page, r"Square: .*", 5.0)
     page.page.get_by_role("slider", name="Speed in percent").fill("30")
     wait(arm, lambda state: state.speed == 0.3)
@@ -150,18 +132,40 @@ def test_pause_during_planning_lasts_until_resume(
     until(page, "On target", 5.0)
 
 
-def test_demonstration_was_planned_while_nobody_used_the_server(windows: Windows) -> None:
-    with (
-        AppServer(RECORDING_APP) as server,
-        windows.open(server.url, nodes=("/arm", "/target/move")) as page,
-        connect(server.url, "Test") as arm,
-    ):
-        page.open_tab("Programs")
-        page.choose("Script", "Pour")
-        page.page.wait_for_timeout(1000.0 * (DELAY + 30.0))
-        begun = time.monotonic()
-        page.click_button("Run")
-        wait(arm, lambda state: state.program is not None and state.program.status == "running")
-        assert time.monotonic() - begun < 1.0
+def test_steps_of_a_program_are_controlled_in_the_list(
+    server: AppServer, open_page: OpenPage, truth: Truth, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm", MOVE), window=PORTRAIT, own_camera=True, **PHONE)
+    take(page)
+    page.frame.locator("#k450-sheet").tap()
+    page.frame.get_by_role("tab", name="Programs").click()
+    page.frame.get_by_role("button", name="Preview").click()
+    page.frame.locator(STEP_3).first.wait_for(timeout=60_000)
+    # The tab has the width of the panel.
+    panel = page.frame.locator(".steps").bounding_box()
+    tabs = page.frame.locator("[role=tablist]").bounding_box()
+    assert panel is not None
+    assert tabs is not None
+    assert panel["width"] >= 0.8 * tabs["width"]
+
+    with connect(server.url, "Reader") as reader:
+        pause = page.frame.locator(f"{STEP_3}[name=pause]")
+        pause.click()
+        wait_progress(reader, lambda each: each.breakpoints == (3,))
+        page.wait_until(lambda: pause.get_attribute("aria-pressed") == "true", "the breakpoint")
+        # The list is drawn again, and the button keeps the focus.
+        page.wait_until(lambda: pause.evaluate("each => each.matches(':focus')"), "the focus")
+        page.keep(artefacts / "run_control.png")
+        page.frame.locator(".steps li:nth-child(2) button[name=run]").click()
+        wait_progress(reader, lambda each: each.status == "running" and each.step == 2)
         page.press_in_bar("STOP")
-        assert page.errors == []
+        wait_progress(reader, lambda each: each.status == "stopped")
+        truth.wait(moving=False)
+        clear_stop(page, truth)
+        page.page.get_by_role("button", name="Continue ").click()
+        wait_progress(reader, lambda each: each.status == "paused" and each.step == 3)
+        pause.click()
+        wait_progress(reader, lambda each: each.breakpoints == ())
+        resume(page)
+        wait_progress(reader, lambda each: each.status == "done")
+    assert page.errors == []
