@@ -6,15 +6,18 @@ import os
 import signal
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from playwright.sync_api import Route
+from playwright.sync_api import Route, Worker
 
 from katana450.client import connect
 from katana450.server.api import answers
-from tests.browser.conftest import OpenPage
+from tests.browser.camera import Drawing
+from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
 from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, set_speed, take
@@ -22,153 +25,112 @@ from tests.browser.test_app import Robot
 from tests.gateway.slow_link import DelayedLink, SlowLink
 
 
-def test_page_reports_a_killed_server_and_reconnects(open_page: OpenPage, artefacts: Path) -> None:
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        robot = Robot(page)
-        started = camera(page)
-        page.page.mouse.move(300, 500)
-        page.page.mouse.down()
-        page.page.mouse.move(420, 560, steps=5)
-        page.page.mouse.up()
-        page.page.mouse.wheel(0, 300)
-        page.page.wait_for_timeout(800)
-        looked = camera(page)
-        assert not np.allclose(looked, started, atol=0.02)
-        server.kill()
-        killed = time.monotonic()
-        page.page.wait_for_selector("#banner.lost")
-        noticed = time.monotonic() - killed
-        page.keep(artefacts / "gateway-lost.png")
-        assert "Offline" in bar(page, "link")
-        assert bar(page, "headline") == "No connection"
-        page.page.keyboard.press("Control+z")
-        assert bar(page, "toast") == "No connection to the arm."
-        assert noticed < 1.0
-        robot.since = time.time()
-        server.restart()
-        back = time.monotonic()
-        page.page.wait_for_selector("#banner", state="hidden")
-        page.wait_until(lambda: page.connected, "viser to come back")
-        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
-        print(f"noticed after {noticed:.2f} s, back after {time.monotonic() - back:.2f} s")
-        page.wait_ready(("/arm", MOVE))
-        robot.settle()
-        # viser starts with its first view; then the camera is restored.
-        page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
-        page.page.wait_for_timeout(1500)
-        assert np.allclose(camera(page), looked, atol=2e-3)
-        page.drag_arrow(MOVE, "z", 0.03)
-        robot.settle()
+def worker_of(page: ViserPage) -> Worker:
+    """Return the worker that holds the connection of the page."""
+    (worker,) = (each for each in page.page.workers if each.url.endswith("link.js"))
+    return worker
 
 
-@pytest.mark.long
-def test_lost_page_offers_nothing_that_needs_the_arm(open_page: OpenPage) -> None:
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        server.kill()
-        page.page.wait_for_selector("#banner.lost")
-        assert bar(page, "holder") == "Driver unknown"
-        take_button = page.page.locator("#acts button[aria-disabled=true]")
-        assert take_button.all_inner_texts() == ["Take"]
-        page.page.evaluate("document.querySelector('#toast').textContent = ''")
-        take_button.focus()
-        page.page.keyboard.press("Enter")
-        page.wait_until(lambda: bar(page, "toast") == "No connection to the arm.", "the reason")
-        banner = page.page.locator("#banner").bounding_box()
-        panel = page.frame.evaluate(
-            "document.querySelector('[role=tablist]').getBoundingClientRect().x"
-        )
-        assert banner
-        assert banner["width"] > 600
-        assert banner["x"] + banner["width"] <= panel + 1
-        server.restart()
-        page.page.wait_for_selector("#banner", state="hidden")
-        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
-        # The focus stays, so that the next Enter means no other button.
-        assert page.page.evaluate("document.activeElement.textContent") == "Take"
-        assert page.page.locator("#acts button:not([aria-disabled])").all_inner_texts() == ["Take"]
-        assert bar(page, "holder") == "Nobody drives"
+def wait_answered(page: ViserPage) -> None:
+    """Wait until the server has answered a heartbeat that was sent after this call."""
+    worker = worker_of(page)
+    last = worker.evaluate("count")
+    answered = "(n) => count > n && ![...heartbeats.keys()].some((each) => each <= n + 1)"
+    page.wait_until(lambda: worker.evaluate(answered, last), "an answer")
 
 
-LATE_RESET = """() => {
-  const { camera } = __viserMutable;
-  const kept = camera.position.clone();
-  let away = false;
-  window.wasReset = false;
-  const timer = setInterval(() => {
-    const distance = camera.position.distanceTo(kept);
-    away ||= distance > 0.05;
-    if (!away || distance > 1e-3) return;
-    clearInterval(timer);
-    // By then viser has reported the restored camera.
-    setTimeout(() => {
-      __viserMutable.resetCameraPose(false);
-      window.wasReset = true;
-    }, 300);
-  }, 10);
-}"""
-"""Script that repeats viser's reset of the camera after the camera was restored."""
+def test_page_reports_a_killed_server_and_reconnects(
+    page: ViserPage, server: AppServer, artefacts: Path
+) -> None:
+    robot = Robot(page)
+    started = camera(page)
+    page.page.mouse.move(300, 500)
+    page.page.mouse.down()
+    page.page.mouse.move(420, 560, steps=5)
+    page.page.mouse.up()
+    page.page.mouse.wheel(0, 300)
+    looked = page.settled(lambda: camera(page), "the camera")
+    assert not np.allclose(looked, started, atol=0.02)
+    server.kill()
+    killed = time.monotonic()
+    page.page.wait_for_selector("#banner.lost")
+    noticed = time.monotonic() - killed
+    page.keep(artefacts / "gateway-lost.png")
+    assert "Offline" in bar(page, "link")
+    assert bar(page, "headline") == "No connection"
+    page.page.keyboard.press("Control+z")
+    assert bar(page, "toast") == "No connection to the arm."
+    assert noticed < 1.0
+    robot.since = time.time()
+    server.restart()
+    page.page.wait_for_selector("#banner", state="hidden")
+    page.wait_until(lambda: page.connected, "viser to come back")
+    page.wait_until(lambda: bar(page, "headline") != "No connection", "the state")
+    page.wait_ready(("/arm", MOVE))
+    robot.settle()
+    # viser starts with its first view; then the camera is restored, and stays.
+    page.wait_until(lambda: np.allclose(camera(page), looked, atol=2e-3), "the old view")
+    assert np.allclose(page.settled(lambda: camera(page), "the camera"), looked, atol=2e-3)
+    page.drag_arrow(MOVE, "z", 0.03)
+    robot.settle()
+    # The console reports the lost connections.
+    page.errors.clear()
 
 
-@pytest.mark.long
-def test_camera_is_kept_when_viser_resets_it_late(open_page: OpenPage) -> None:
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        page.page.mouse.move(300, 500)
-        page.page.mouse.down()
-        page.page.mouse.move(420, 560, steps=5)
-        page.page.mouse.up()
-        page.page.wait_for_timeout(800)
-        looked = camera(page)
-        page.frame.evaluate(LATE_RESET)
-        server.restart()
-        page.wait_until(lambda: page.frame.evaluate("wasReset"), "the reset", seconds=60.0)
-        page.page.wait_for_timeout(2000)
-        assert np.allclose(camera(page), looked, atol=2e-3)
-        # A person who then turns the camera keeps that view.
-        page.page.mouse.down()
-        page.page.mouse.move(300, 500, steps=5)
-        page.page.mouse.up()
-        page.page.wait_for_timeout(2000)
-        assert not np.allclose(camera(page), looked, atol=0.02)
+class Attentive(NamedTuple):
+    """A page over a slow line to a server that waits for heartbeats no longer than by default."""
+
+    page: ViserPage
+    truth: Truth
+    line: SlowLink
 
 
-@pytest.mark.long
-def test_page_reconnects_to_a_server_that_answers_slowly(open_page: OpenPage) -> None:
-    with AppServer() as server, SlowLink(server.port, 1e9) as line:
-        page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
-        server.kill()
-        page.wait_lost()
-        # An answer takes longer than the second after which viser tries again.
-        line.delay = 0.7
-        server.restart()
-        page.wait_until(lambda: page.connected, "viser to come back", seconds=20.0)
-        line.delay = 0.0
-        page.wait_ready(("/arm", MOVE))
-
-
-def test_silent_connection_is_reported_and_the_arm_stops(open_page: OpenPage) -> None:
-    with AppServer(ATTENTIVE_APP) as server, SlowLink(server.port, 1e9) as line:
-        truth = Truth(server)
-        page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
-        page.type_number("1 base turn", -150.0)
-        truth.wait(mood="moving")
-        scene = page.page.locator("#scene")
-        place = scene.bounding_box()
-        line.cut = True
-        took = truth.wait(1.0, mood="stopped")
-        # A starved machine may say instead that it is too busy.
-        assert "while the arm moved" in truth.status()["stopped"]
-        page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
-        # The banner describes a silent connection, and nothing shifts the scene.
-        assert bar(page, "banner") == "The arm does not answer. The picture is old."
-        assert scene.bounding_box() == place
-        truth.wait(5.0, holder=None)
-        line.cut = False
-        page.page.wait_for_selector("#banner", state="hidden", timeout=10_000)
-        clear_stop(page, truth)
+@pytest.fixture(scope="module")
+def attentive(windows: Windows) -> Iterator[Attentive]:
+    with (
+        AppServer(ATTENTIVE_APP) as server,
+        SlowLink(server.port, 1e9) as line,
+        windows.open(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE)) as page,
+    ):
+        yield Attentive(page, Truth(server), line)
         assert page.errors == []
+
+
+def test_first_drag_after_a_rest_does_not_stop_on_a_slow_connection(attentive: Attentive) -> None:
+    page, truth, line = attentive
+    worker = worker_of(page)
+    # Heartbeats are seldom now.
+    page.wait_until(lambda: worker.evaluate("free && performance.now() - used > USE"), "rest")
+    # The page learns that it drives long after the heartbeat timeout.
+    line.delay, line.late_answers = 0.6, True
+    before = truth.status()["q"]
+    page.drag_arrow(MOVE, "z", 0.03)
+    page.wait_until(lambda: truth.status()["q"] != before, "motion")
+    page.wait_until(lambda: not truth.status()["moving"], "rest")
+    assert truth.status()["stopped"] is None
+    line.delay, line.late_answers = 0.0, False
+    wait_answered(page)
+
+
+def test_silent_connection_is_reported_and_the_arm_stops(attentive: Attentive) -> None:
+    page, truth, line = attentive
+    page.type_number("1 base turn", -150.0)
+    truth.wait(mood="moving")
+    scene = page.page.locator("#scene")
+    place = scene.bounding_box()
+    line.cut = True
+    took = truth.wait(1.0, mood="stopped")
+    # A starved machine may say instead that it is too busy.
+    assert "while the arm moved" in truth.status()["stopped"]
+    page.page.wait_for_selector("#banner:not([hidden])", timeout=2500)
+    # The banner describes a silent connection, and nothing shifts the scene.
+    silence = "The arm does not answer. The picture is old."
+    page.wait_until(lambda: bar(page, "banner") == silence, silence)
+    assert scene.bounding_box() == place
+    truth.wait(5.0, holder=None)
+    line.cut = False
+    page.page.wait_for_selector("#banner", state="hidden", timeout=10_000)
+    clear_stop(page, truth)
     print(f"stopped {1e3 * took:.0f} ms after the line was cut")
 
 
@@ -225,31 +187,31 @@ def test_reload_during_a_drag_stops_the_arm_with_a_reason(open_page: OpenPage) -
         page.page.locator("#why", has_text=why).wait_for()
         assert bar(page, "headline") == "Stopped"
         assert "Nothing moves until" in bar(page, "why")
-        page.page.wait_for_timeout(1500)
+        page.page.wait_for_timeout(200)
         assert truth.status()["q"] == rest
         # Clear stop starts no motion either.
         page.page.locator("#clear-stop").click()
         truth.wait(stopped=None)
-        page.page.wait_for_timeout(1500)
+        page.page.wait_for_timeout(200)
         assert truth.status()["q"] == rest
         assert page.errors == []
 
 
 @pytest.mark.long
-def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(open_page: OpenPage) -> None:
-    with AppServer(APP) as server:
-        truth = Truth(server)
-        first, other = (open_page(server.url, nodes=("/arm", MOVE)) for _ in range(2))
-        take(first)
-        name = truth.status()["holder"]
-        first.page.reload(wait_until="commit")
-        first.page.locator("#holder", has_text="You drive").wait_for()
-        truth.wait(holder=name)
-        first.page.close(run_before_unload=True)
-        # The arm would be free after three seconds of silence even without a word of the page.
-        took = truth.wait(2.0, holder=None)
-        other.page.get_by_role("button", name="Take", exact=True).click()
-        other.page.locator("#holder", has_text="You drive").wait_for()
+def test_closed_window_frees_the_arm_and_a_reloaded_one_keeps_it(
+    server: AppServer, truth: Truth, open_page: OpenPage
+) -> None:
+    first, other = (open_page(server.url, drawing=Drawing.NONE) for _ in range(2))
+    take(first)
+    name = truth.status()["holder"]
+    first.page.reload(wait_until="commit")
+    first.page.locator("#holder", has_text="You drive").wait_for()
+    truth.wait(holder=name)
+    first.page.close(run_before_unload=True)
+    # The arm would be free after three seconds of silence even without a word of the page.
+    took = truth.wait(2.0, holder=None)
+    other.page.get_by_role("button", name="Take", exact=True).click()
+    other.page.locator("#holder", has_text="You drive").wait_for()
     print(f"free after {took:.2f} s")
 
 
@@ -274,16 +236,17 @@ def test_page_outlasts_each_process_and_shows_the_truth(open_page: OpenPage, pro
         page.wait_until(lambda: page.connected, "viser to come back")
         clear_stop(page, truth)
         rest = truth.status()["q"]
-        page.page.wait_for_timeout(500)
+        page.page.wait_for_timeout(200)
         assert truth.status()["q"] == rest
     print(f"{process}: noticed after {noticed:.2f} s, back after {back:.2f} s")
 
 
 def test_page_whose_line_has_become_slow_moves_nothing_after_letting_go(
-    open_page: OpenPage,
+    server: AppServer, open_page: OpenPage
 ) -> None:
-    with AppServer(APP) as server, DelayedLink(server.port) as line, connect(server.url) as watcher:
+    with DelayedLink(server.port) as line, connect(server.url) as watcher:
         page = open_page(f"http://127.0.0.1:{line.port}", nodes=("/arm", MOVE))
+        take(page)
 
         def height() -> float:
             return float(np.array(watcher.query(answers.State).T)[2, 3])
@@ -299,7 +262,7 @@ def test_page_whose_line_has_become_slow_moves_nothing_after_letting_go(
             line.delay = 0.6
             grip.to(0.08)
             page.wait_until(lambda: "s late" in bar(page, "toast"), "the reason")
-        page.page.wait_for_timeout(1000)
+        wait_answered(page)
         assert abs(rested() - start) < 0.03
         page.page.evaluate("document.querySelector('#toast').textContent = ''")
         page.page.click("#jog-button")
@@ -309,7 +272,7 @@ def test_page_whose_line_has_become_slow_moves_nothing_after_letting_go(
         page.page.keyboard.up("KeyR")
         assert abs(rested() - low) < 0.005
         line.delay = 0.0
-        page.page.wait_for_timeout(1000)
+        wait_answered(page)
         page.page.keyboard.down("KeyR")
         page.wait_until(lambda: height() - low > 0.01, "the arm to move")
         page.page.keyboard.up("KeyR")
