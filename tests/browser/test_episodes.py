@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser
 
 import katana450
-from katana450.arm.control.lease import Role
 from katana450.extensions.recording.episodes.episode import EpisodeOutcome
-from katana450.server.web.access_links import AccessFile
+from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.browser.session import bar
-from tests.browser.sizes import PHONE, PORTRAIT, SCHEMES, WIDE
+from tests.browser.sizes import PHONE, PORTRAIT, WIDE
 from tests.browser.test_accessibility import AXE, VIOLATIONS
 from tests.gateway.client import ask, enter
-
-LEAST_FINGER = 44.0
-"""Minimum width and height of a control on a phone [px]."""
 
 POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    return tmp_path / "episodes"
-
-
-@pytest.fixture
-def server(tmp_path: Path, folder: Path) -> Iterator[AppServer]:
-    options = ("--silence", "2.0", "--record", str(tmp_path / "ring"), "--episodes", str(folder))
+def server(tmp_path: Path) -> Iterator[AppServer]:
+    folders = ("--record", str(tmp_path / "ring"), "--episodes", str(tmp_path / "episodes"))
+    options = ("--silence", "2.0", *folders)
     with AppServer((*RECORDING_APP, *options)) as running:
         yield running
 
@@ -78,9 +68,10 @@ def toast(page: ViserPage, words: str) -> None:
 
 
 def test_whole_flow_by_keyboard_alone(
-    open_page: OpenPage, server: AppServer, folder: Path, artefacts: Path
+    open_page: OpenPage, recording_server: AppServer, recorded: Path, artefacts: Path
 ) -> None:
-    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    server = recording_server
+    page = open_page(server.url, window=WIDE, drawing=Drawing.NONE)
     ready(page)
     keys = page.page.keyboard
     page.page.focus("#episodes-button")
@@ -118,7 +109,7 @@ def test_whole_flow_by_keyboard_alone(
     page.wait_until(lambda: outcomes(server) == ["success"], "the episode again")
     # STOP is the same as ever.
     assert bar(page, "mode").startswith("On target")
-    (path,) = folder.glob("*.mcap")
+    (path,) = (recorded / "episodes").glob("*.mcap")
     assert path.name == "episode-0002.mcap"
     (episode,) = katana450.open(path).episodes
     assert episode.task == "Pour the water"
@@ -127,11 +118,8 @@ def test_whole_flow_by_keyboard_alone(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_whole_flow_on_a_phone(
-    open_page: OpenPage, server: AppServer, scheme: str, artefacts: Path
-) -> None:
-    page = open_page(server.url, nodes=("/arm",), window=PORTRAIT, **PHONE, color_scheme=scheme)
+def test_whole_flow_on_a_phone(open_page: OpenPage, server: AppServer, artefacts: Path) -> None:
+    page = open_page(server.url, drawing=Drawing.NONE, window=PORTRAIT, **PHONE)
     ready(page)
     sheet = page.page.locator("#episodes")
     page.page.tap("#episodes-button")
@@ -140,13 +128,13 @@ def test_whole_flow_on_a_phone(
     tap(page, "Start an episode")
     toast(page, "Recording episode 1")
     move(server, *POSTURES)
-    page.keep(artefacts / f"episodes-phone-running-{scheme}.png")
+    page.keep(artefacts / "episodes-phone-running.png")
     assert_fits(page)
     assert_accessible(page)
     tap(page, "Success")
     page.wait_until(lambda: outcomes(server) == ["success"], "the success")
     sheet.locator("summary").first.tap()
-    page.keep(artefacts / f"episodes-phone-list-{scheme}.png")
+    page.keep(artefacts / "episodes-phone-list.png")
     assert_fits(page)
     tap(page, "Undo")
     page.wait_until(lambda: outcomes(server) == ["unjudged"], "the undo")
@@ -163,7 +151,7 @@ def test_whole_flow_on_a_phone(
     tap(page, "Discard")
     page.wait_until(lambda: len(listed(server)["discarded"]) == 1, "the discarded one")
     page.wait_until(lambda: sheet.locator(".gone").count() == 1, "it in the list")
-    page.keep(artefacts / f"episodes-phone-discarded-{scheme}.png")
+    page.keep(artefacts / "episodes-phone-discarded.png")
     sheet.get_by_role("button", name="Restore episode 1").tap()
     page.wait_until(lambda: outcomes(server) == ["failure"], "the episode again")
     assert page.errors == []
@@ -202,13 +190,10 @@ def assert_fits(page: ViserPage) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scheme", SCHEMES)
 def test_windows_agree_and_a_reload_keeps_rec(
-    open_page: OpenPage, server: AppServer, scheme: str, artefacts: Path
+    open_page: OpenPage, server: AppServer, artefacts: Path
 ) -> None:
-    first, second = (
-        open_page(server.url, nodes=("/arm",), window=WIDE, color_scheme=scheme) for _ in range(2)
-    )
+    first, second = (open_page(server.url, drawing=Drawing.NONE, window=WIDE) for _ in range(2))
     for page in (first, second):
         ready(page)
     first.page.keyboard.press("t")
@@ -226,7 +211,7 @@ def test_windows_agree_and_a_reload_keeps_rec(
     second.wait_until(lambda: outcomes(server) == ["success"], "the success")
     first.wait_until(lambda: rec(first) == "REC", "the end")
     second.page.locator("#episodes summary").first.click()
-    second.keep(artefacts / f"episodes-desk-{scheme}.png")
+    second.keep(artefacts / "episodes-desk.png")
     assert_accessible(second)
     assert second.page.locator("#episodes i.success").inner_text() == "Success"
     # While Jog is open, its keys move the arm, and those of episodes are others.
@@ -235,78 +220,3 @@ def test_windows_agree_and_a_reload_keeps_rec(
     first.page.click("#episodes-button")
     first.wait_until(lambda: first.page.locator("#episodes .gone").count() == 1, "the discarded")
     assert first.errors == second.errors == []
-
-
-@pytest.mark.long
-def test_viewer_sees_and_changes_nothing(browser: Browser, tmp_path: Path, folder: Path) -> None:
-    file = AccessFile.create(tmp_path / "access.json")
-    viewer, operator = (
-        file.give(role.value, role, time.time() + 600.0) for role in (Role.VIEWER, Role.OPERATOR)
-    )
-    command = (*RECORDING_APP, "--access", str(file.path), "--episodes", str(folder))
-    with AppServer((*command, "--record", str(tmp_path / "ring"))) as server:
-        window = browser.new_page()
-        window.goto(f"{server.url}/#{viewer}")
-        page = ViserPage(window, window.main_frame, [])
-        ready(page)
-        url = f"{server.url}/api/v1/episodes"
-        start = json.dumps({"do": "start", "task": "pour"}).encode()
-        for token, status in ((viewer, 403), (operator, 200)):
-            answer = ask(url, data=start, Authorization=f"Bearer {token}")
-            assert answer[0] == status, answer[2]
-        assert ask(url)[0] == 401
-        toast(page, "Recording episode 1, by operator")
-        page.page.click("#episodes-button")
-        assert page.page.locator("#episodes button:visible").count() == 0
-        page.page.keyboard.press("t")
-        page.page.wait_for_timeout(1000)
-        assert rec(page).startswith("REC 0:")
-        window.close()
-
-
-@pytest.mark.long
-def test_list_is_edited_by_keyboard_alone(open_page: OpenPage, server: AppServer) -> None:
-    page = open_page(server.url, nodes=("/arm",), window=WIDE)
-    ready(page)
-    keys = page.page.keyboard
-    keys.press("t")
-    toast(page, "Recording episode 1")
-    move(server, *POSTURES)
-    keys.press("y")
-    page.wait_until(lambda: outcomes(server) == ["success"], "the success")
-    page.page.focus("#episodes-button")
-    keys.press("Enter")
-    tab_to(page, "#episodes summary")
-    keys.press("Enter")
-    tab_to(page, "#episodes ol select")
-    keys.press("f")
-    page.wait_until(lambda: outcomes(server) == ["failure"], "the failure")
-    tab_to(page, "#episodes ol input[maxlength='500']")
-    keys.type("half a cup")
-    tab_to(page, "#episodes ol label:last-of-type input")
-    keys.press("Control+A")
-    keys.type("1.0")
-    # Leaving the field changes the list, and the focus stays where it came to.
-    tab_to(page, "#episodes ol button")
-    page.page.evaluate("window.before = document.activeElement")
-    page.wait_until(lambda: listed(server)["episodes"][0]["end"] == 1.0, "the end")
-    assert listed(server)["episodes"][0]["note"] == "half a cup"
-    page.wait_until(lambda: page.page.evaluate("!before.isConnected"), "the new list")
-    assert page.page.evaluate("document.activeElement.matches('#episodes ol button')")
-    keys.press("Enter")
-    page.wait_until(lambda: len(listed(server)["discarded"]) == 1, "the discarded one")
-    page.wait_until(lambda: page.page.locator("#episodes .gone").count() == 1, "it in the list")
-    # The focus is on the button that takes it back.
-    assert page.page.evaluate("document.activeElement.matches('#episodes .gone button')")
-    keys.press("Enter")
-    page.wait_until(lambda: outcomes(server) == ["failure"], "the episode again")
-    assert page.errors == []
-
-
-def tab_to(page: ViserPage, what: str) -> None:
-    """Press Tab until ``what`` has the focus."""
-    for _ in range(60):
-        if page.page.evaluate("(what) => document.activeElement.matches(what)", what):
-            return
-        page.page.keyboard.press("Tab")
-    raise AssertionError(f"the key Tab does not reach {what}")

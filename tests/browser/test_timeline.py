@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,10 @@ from katana450.extensions.recording.playback.run import PlaybackRun
 from katana450.extensions.recording.playback.spans import at_place
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
+from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
-from tests.browser.server import RECORDING_APP, AppServer
+from tests.browser.server import AppServer
 from tests.browser.session import Truth, prepare
 from tests.browser.sight import overlap
 from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
@@ -28,6 +29,9 @@ GHOST = "/playback/0/arm"
 LINK = "/arm/base_link/arm_base_link/pan_link"
 TURNS = (0.5, -0.4)
 """[rad] Angles of axis 1 to which the arm turns, one after the other."""
+
+JOB = 60_000
+"""[ms] Timeout of a short job on a busy machine."""
 
 NOW = "Moment that is shown"
 
@@ -52,23 +56,22 @@ EXEMPT = {("header", "portrait"), ("header", "landscape"), ("nav", "landscape")}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("ring")
+def folder(recorded: Path) -> Path:
+    return recorded / "ring"
 
 
 @pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[AppServer]:
+def server(recording_server: AppServer) -> AppServer:
     """Return a server whose arm has turned twice, and was stopped by Ada in between."""
-    with AppServer((*RECORDING_APP, "--record", str(folder))) as server:
-        with connect(server.url, "Ada") as arm:
-            for angle in TURNS:
-                arm.ask(requests.Joints(q=np.array([angle, -1.0, 1.4, 0.3, 0.0])))
-                rest(arm)
-                if angle is TURNS[0]:
-                    arm.stop()
-                    time.sleep(1.2)
-                    arm.clear_stop()
-        yield server
+    with connect(recording_server.url, "Ada") as arm:
+        for angle in TURNS:
+            arm.ask(requests.Joints(q=np.array([angle, -1.0, 1.4, 0.3, 0.0])))
+            rest(arm)
+            if angle is TURNS[0]:
+                arm.stop()
+                arm.clear_stop()
+        arm.ask(requests.ReleaseLease())
+    return recording_server
 
 
 def rest(arm: Any) -> None:
@@ -78,6 +81,19 @@ def rest(arm: Any) -> None:
     while arm.query(answers.State).moving:
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+@pytest.mark.long
+def test_menu_saves_the_last_minutes(
+    server: AppServer, open_page: OpenPage, tmp_path: Path
+) -> None:
+    page = open_page(server.url, drawing=Drawing.NONE)
+    page.page.click("#more-button")
+    with page.page.expect_download() as downloading:
+        page.press_in_bar("Save the last 10 minutes")
+    assert downloading.value.suggested_filename.endswith(".mcap")
+    downloading.value.save_as(tmp_path / "run.mcap")
+    assert katana450.open(tmp_path / "run.mcap").verify().identical
 
 
 def opened(page: ViserPage) -> None:
@@ -93,20 +109,6 @@ def shown_turn(page: ViserPage, root: str = GHOST) -> float:
     zero = page.node_pose(f"{root}/base_link/arm_base_link")
     R: FloatArray = np.linalg.inv(zero[:3, :3]) @ T[:3, :3]
     return float(np.arctan2(R[1, 0], R[0, 0]))
-
-
-def visible(page: ViserPage, node: str) -> bool:
-    """Return whether ``page`` draws ``node``."""
-    return bool(
-        page.frame.evaluate(
-            """(name) => {
-                const seen = (each) => each.visible && (!each.parent || seen(each.parent));
-                const node = katanaScene.node(name);
-                return Boolean(node) && seen(node);
-            }""",
-            node,
-        )
-    )
 
 
 def place(page: ViserPage, value: float) -> None:
@@ -132,12 +134,12 @@ def test_past_is_shown_in_one_window_until_stop(
     assert begin is not None
 
     place(page, 0.0)
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
-    page.wait_until(lambda: not visible(page, LINK), "the present arm to be hidden")
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
+    page.wait_until(lambda: not page.shows(LINK), "the present arm to be hidden")
     page.wait_until(
         lambda: abs(shown_turn(page) - begin.row.joints[0]) < 1e-6, "the first recorded posture"
     )
-    assert not visible(page, "/target/move"), "the gizmo of the present can be dragged"
+    assert not page.shows("/target/move"), "the gizmo of the present can be dragged"
     page.page.get_by_text("arm is elsewhere").wait_for()
     assert "Live" not in (slider.get_attribute("aria-valuetext") or "Live")
     page.keep(artefacts / "timeline.png")
@@ -162,7 +164,7 @@ def test_past_is_shown_in_one_window_until_stop(
 
     # Esc stops the arm, and shows it.
     page.page.keyboard.press("Escape")
-    page.wait_until(lambda: visible(page, LINK) and not visible(page, GHOST), "the present")
+    page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")
     assert truth.status()["stopped"] is not None
     assert slider.get_attribute("aria-valuetext") == "Live"
     assert page.errors == []
@@ -177,18 +179,18 @@ def test_other_windows_stay_live_and_acting_returns_to_live(
     opened(page)
     since = time.time()
     place(page, 1.0)
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
     page.page.get_by_label("Play", exact=True).click()
     page.wait_until(lambda: slider_place(page) > 2.0, "the run to continue")
     page.page.get_by_label("Pause", exact=True).last.click()
     stays = slider_place(page)
-    page.page.wait_for_timeout(300)
+    page.page.wait_for_timeout(200)
     assert slider_place(page) == stays
-    assert visible(other, LINK)
+    assert other.shows(LINK)
     assert not other.messages("FrameMessage", node=GHOST, since=since)
     # A control of the panel moves the arm, so the window shows it.
     page.type_number("1 base turn", 10.0)
-    page.wait_until(lambda: visible(page, LINK) and not visible(page, GHOST), "the present")
+    page.wait_until(lambda: page.shows(LINK) and not page.shows(GHOST), "the present")
     Truth(server).wait(moving=False)
     assert Truth(server).status()["q"][0] == pytest.approx(np.radians(10.0), abs=1e-3)
 
@@ -222,8 +224,10 @@ def test_selection_is_saved_opened_and_compared(
 
     # The file is opened, and its first state is shown.
     page.page.locator("#timeline input[type=file]").set_input_files(path)
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
-    page.wait_until(lambda: abs(shown_turn(page) - saved.q[0][0]) < 1e-3, "its first posture")
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
+    first = part.at(part.spans[0].start)
+    assert first is not None
+    page.wait_until(lambda: abs(shown_turn(page) - first.row.joints[0]) < 1e-3, "its first posture")
     lists = page.page.get_by_label("Recording", exact=True)
     assert lists.locator("option:checked").inner_text() == "part.mcap"
 
@@ -243,7 +247,7 @@ def test_selection_is_saved_opened_and_compared(
     lists.select_option("ring")
     page.page.get_by_label("Second run").select_option(label="part.mcap")
     page.page.locator("#timeline .plot polyline").first.wait_for()
-    page.wait_until(lambda: visible(page, "/playback/1/arm"), "the second arm")
+    page.wait_until(lambda: page.shows("/playback/1/arm"), "the second arm")
     place(page, 1.0)
     second = part.at(at_place(part.spans, 1.0))
     assert second is not None
@@ -257,7 +261,7 @@ def test_selection_is_saved_opened_and_compared(
     page.page.get_by_role("button", name="Back to live").click()
     page.page.evaluate(DROP, [path.name, list(path.read_bytes())])
     page.page.locator("#toast", has_text="part.mcap is open").wait_for()
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
 
     # What is not a recording is refused with the reason.
     broken = tmp_path / "broken.mcap"
@@ -267,19 +271,20 @@ def test_selection_is_saved_opened_and_compared(
 
 
 @pytest.mark.long
-def test_link_opens_the_page_at_its_moment(
-    server: AppServer, folder: Path, open_page: OpenPage
-) -> None:
-    run = PlaybackRun(lambda: recordings_in(folder))
-    run.update()
-    t = run.spans[0].start + 1.5
-    moment = run.at(t)
-    assert moment is not None
-    page = open_page(f"{server.url}/?moment=ring@{t:.3f}&x=", nodes=("/arm",))
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
-    page.wait_until(lambda: abs(shown_turn(page) - moment.row.joints[0]) < 5e-3, "its posture")
-    page.page.get_by_role("button", name="Back to live").click()
-    page.wait_until(lambda: visible(page, LINK), "the present")
+def test_copied_link_opens_the_same_moment(server: AppServer, open_page: OpenPage) -> None:
+    allowed = ["clipboard-read", "clipboard-write"]
+    page = open_page(server.url, nodes=("/arm",), permissions=allowed)
+    opened(page)
+    place(page, 1.0)
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
+    turn = shown_turn(page)
+    page.page.get_by_role("button", name="Copy link to this moment").click()
+    page.page.locator("#toast", has_text="The link is copied").wait_for()
+    link = page.page.evaluate("navigator.clipboard.readText()")
+    assert link.startswith(f"{server.url}/?moment=ring@")
+    other = open_page(f"{link}&x=", nodes=("/arm",))
+    other.wait_until(lambda: other.shows(GHOST), "the recorded arm")
+    other.wait_until(lambda: abs(shown_turn(other) - turn) < 5e-3, "the same posture")
 
 
 @pytest.mark.long
@@ -294,7 +299,7 @@ def test_timeline_covers_nothing(
     opened(page)
     scene = page.page.locator("#scene").bounding_box()
     place(page, 1.0)
-    page.wait_until(lambda: visible(page, GHOST), "the recorded arm")
+    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
     # The note about the past shifts nothing.
     assert page.page.locator("#scene").bounding_box() == scene
     page.keep(artefacts / f"timeline-{size}-{scheme}.png")
@@ -327,7 +332,7 @@ def test_selected_motion_runs_again_as_a_program(
     page = open_page(server.url, nodes=("/arm",))
     opened(page)
     with connect(server.url, "Ada") as arm:
-        moved = np.array(arm.query(answers.State).q)
+        moved, began = np.array(arm.query(answers.State).q), time.time()
         page.page.get_by_role("button", name="Run again the selected motion").click()
         page.page.get_by_text("The motion has run again.").wait_for(timeout=90_000)
         state = arm.query(answers.State)
@@ -335,8 +340,48 @@ def test_selected_motion_runs_again_as_a_program(
     assert state.program.status == "done"
     np.testing.assert_allclose(state.q, moved, atol=1e-4)
     run = PlaybackRun(lambda: recordings_in(folder))
-    run.update()
-    times = np.linspace(run.spans[-1].start, run.spans[-1].end, 200).tolist()
-    turns = [found.row.joints[0] for t in times if (found := run.at(t)) is not None]
+
+    def largest_turn() -> float:
+        """Return the largest angle of axis 1 [rad] that was recorded since the click."""
+        run.update()
+        times = np.linspace(began, max(began, run.spans[-1].end), 200).tolist()
+        return max(moment.row.joints[0] for t in times if (moment := run.at(t)) is not None)
+
     # It went back to the start, and through both turns.
-    assert max(turns) > TURNS[0] - 0.01
+    page.wait_until(lambda: largest_turn() > TURNS[0] - 0.01, "the recorded turn")
+
+
+@pytest.mark.long
+def test_selection_is_verified_exported_and_cancelled(
+    server: AppServer, open_page: OpenPage, tmp_path: Path, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    opened(page)
+    row = page.page.locator("#timeline .work")
+    assert not row.is_visible()
+    verify = page.page.get_by_role("button", name=re.compile("^Verify the selection"))
+    verify.click()
+    row.get_by_role("button", name="Cancel").wait_for()
+    page.keep(artefacts / "timeline-verifying.png")
+    row.get_by_text("identical to the bit over").wait_for(timeout=JOB)
+    page.keep(artefacts / "timeline-verified.png")
+    row.get_by_role("button", name="Close").click()
+    assert not row.is_visible()
+
+    exports = page.page.get_by_label("Export the selection")
+    with page.page.expect_download(timeout=JOB) as downloading:
+        exports.select_option(label="CSV table")
+    downloading.value.save_as(tmp_path / "run.csv")
+    lines = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0].startswith("t,theta1")
+    assert len(lines) > 100
+    row.get_by_text(f"Exported katana450.csv: {len(lines) - 1} rows.").wait_for()
+    assert exports.input_value() == ""
+
+    exports.select_option(label="HTML page")
+    row.get_by_role("button", name="Cancel").click()
+    assert not row.is_visible()
+    # The server is free for the next one.
+    verify.click()
+    row.get_by_text("identical to the bit over").wait_for(timeout=JOB)
+    assert page.errors == []
