@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.teach import TaughtPose, taught
-from tests.browser.conftest import OpenPage
+from katana450.extensions.programs.teach import taught
 from tests.browser.page import ViserPage
-from tests.browser.server import APP, AppServer
-from tests.browser.session import Truth, bar, clear_stop, mood
-from tests.browser.teach_sheet import PLAYED, open_sheet, press, reload, rows, says, teach, turns
+from tests.browser.session import Truth, bar, clear_stop, mood, prepare
+from tests.browser.teach_sheet import PLAYED, open_sheet, press, reload, says, teach, turns
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("scripts")
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[AppServer]:
-    with AppServer((*APP, "--programs", str(folder))) as server:
-        yield server
+def listed(page: ViserPage, script: str) -> bool:
+    """Return whether the list of the panel, which follows the folder, has a script."""
+    lists = page.messages("GuiUpdateMessage") + page.messages("GuiDropdownMessage")
+    options = [each.body.get("updates", each.body.get("props", {})) for each in lists]
+    return any(script in each.get("options", ()) for each in options)
 
 
 @pytest.fixture
@@ -38,34 +29,38 @@ def sheet(new_page: ViserPage) -> ViserPage:
     return new_page
 
 
-def test_chosen_script_of_the_panel_is_edited_as_text(new_page: ViserPage, artefacts: Path) -> None:
-    page = new_page.page
+def test_chosen_script_of_the_panel_is_edited_as_text(
+    window: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    prepare(window, truth)
+    page = window.page
     # It has only poses, and is shown as text nevertheless.
     saved = page.evaluate(
         "async (body) => (await fetch('api/v1/scripts/Taught', { method: 'POST', body })).status",
         "steps:\n  - joints: [0, -68, 85, 8, 0]\n",
     )
     assert saved == 204
-    new_page.frame.get_by_role("tab", name="Programs").click()
-    page.wait_for_timeout(1000)
-    new_page.choose("Script", "Taught")
-    new_page.wait_until(
-        lambda: new_page.frame.locator("[data-script=Taught]").count() == 1, "the button"
+    window.frame.get_by_role("tab", name="Programs").click()
+    # The list follows the folder.
+    window.wait_until(lambda: listed(window, "Taught"), "the script in the list")
+    window.choose("Script", "Taught")
+    window.wait_until(
+        lambda: window.frame.locator("[data-script=Taught]").count() == 1, "the button"
     )
-    new_page.frame.get_by_role("button", name="Edit as text").click()
+    window.frame.get_by_role("button", name="Edit as text").click()
     area = page.locator("#teach-text")
     area.wait_for()
-    new_page.wait_until(lambda: "steps:" in area.input_value(), "the text")
-    chosen = new_page.frame.get_by_label("Script", exact=True).input_value()
+    window.wait_until(lambda: "steps:" in area.input_value(), "the text")
+    chosen = window.frame.get_by_label("Script", exact=True).input_value()
     assert area.input_value() == page.evaluate(
         "async (name) => (await fetch(`api/v1/scripts/${name}`)).text()", chosen
     )
     assert page.locator("#teach-problems li").count() == 0
-    new_page.keep(artefacts / "panel-edit-as-text.png")
+    window.keep(artefacts / "panel-edit-as-text.png")
     # What was in Teach before returns.
     page.get_by_role("button", name="Undo in Teach").click()
     area.wait_for(state="hidden")
-    assert new_page.errors == []
+    assert window.errors == []
 
 
 @pytest.mark.long
@@ -184,32 +179,8 @@ def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "content",
-    [
-        '{"format": 1, "name": "x", "times": 1, "poses": [{}]}',
-        *(pytest.param(each, marks=pytest.mark.long) for each in ("{", "null", '{"format": 1}')),
-    ],
-)
-def test_broken_content_of_the_browser_is_refused(
-    server: AppServer, open_page: OpenPage, content: str
-) -> None:
-    page = open_page(
-        server.url,
-        nodes=("/arm",),
-        script=f"localStorage.setItem('katana450.teach', {json.dumps(content)});",
-    )
-    open_sheet(page)
-    assert "cannot be read" in says(page)
-    assert rows(page).count() == 0
-    press(page, "Add pose")
-    page.wait_until(lambda: rows(page).count() == 1, "a pose")
-    assert page.errors == []
-
-
-@pytest.mark.long
 def test_script_is_saved_in_the_folder_and_listed(
-    sheet: ViserPage, truth: Truth, folder: Path
+    sheet: ViserPage, truth: Truth, scripts: Path
 ) -> None:
     press(sheet, "Save")
     sheet.wait_until(lambda: "no pose yet" in says(sheet), "the refusal")
@@ -220,7 +191,7 @@ def test_script_is_saved_in_the_folder_and_listed(
     name.press("Enter")
     press(sheet, "Save")
     sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
-    assert taught(parse((folder / "Two words.yaml").read_text(encoding="utf-8"))) is not None
+    assert taught(parse((scripts / "Two words.yaml").read_text(encoding="utf-8"))) is not None
     press(sheet, "Save")
     sheet.wait_until(lambda: "exists already" in says(sheet), "the refusal")
     # The browser notes the refusal on its console.
@@ -232,45 +203,3 @@ def test_script_is_saved_in_the_folder_and_listed(
     sheet.page.locator("#teach").get_by_label("Open a script").select_option("Square")
     sheet.wait_until(lambda: "shown as text" in says(sheet), "the text")
     assert "repeat:" in sheet.page.locator("#teach-text").input_value()
-
-
-@pytest.mark.long
-def test_text_of_poses_is_read_back_as_the_same_poses(sheet: ViserPage) -> None:
-    """The page writes scripts and the server reads them: nothing is lost on the way."""
-    q = [10.0, -68.25, 85.0, 8.125, -0.5]
-
-    def pose(**fields: Any) -> dict[str, Any]:
-        plain = {"gripper": None, "grips": False, "wait": 0, "speed": 100, "blend": False}
-        return {"joints": q, **plain, **fields}
-
-    cases = {
-        "plain": (1, [pose(), pose(joints=[0.0] * 5)]),
-        "loop": (7, [pose(speed=30, wait=0.5), pose(gripper=-12.5, grips=True, wait=1)]),
-        "speeds": (3, [pose(speed=55), pose(speed=55, grips=True, gripper=3), pose()]),
-        "blend": (2, [pose(blend=True), pose(blend=True), pose(), pose(blend=True)]),
-        'a "name": # \\': (1, [pose(blend=True, speed=50), pose(speed=20)]),
-    }
-    for name, (times, poses) in cases.items():
-        text = sheet.page.evaluate(
-            """async (content) => {
-                const { scriptOf } = await import("/static/teach/poses.js");
-                return scriptOf(content).text;
-            }""",
-            {"name": name, "times": times, "poses": poses},
-        )
-        found = taught(parse(text))
-        assert found is not None, text
-        assert (found.name, found.times) == (name, times)
-        wanted = []
-        for number, each in enumerate(poses):
-            after = poses[number + 1] if number + 1 < len(poses) else None
-            # A pose is passed only on the way to another one at the same speed.
-            blend = each["blend"] and after is not None and after["speed"] == each["speed"]
-            speed = each["speed"] / 100
-            wanted.append(TaughtPose(tuple(q), speed, blend, each["gripper"], each["wait"]))
-        shown = [
-            TaughtPose(tuple(q), each.speed, each.blend, each.gripper, each.wait)
-            for each in found.poses
-        ]
-        assert shown == wanted, text
-        assert [list(each.joints) for each in found.poses] == [each["joints"] for each in poses]
