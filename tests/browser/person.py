@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from playwright.sync_api import Locator
 
 from tests.browser.finger import fingers, middle
 from tests.browser.page import Pixel, ViserPage
 from tests.browser.session import MOVE, Truth, bar, clear_stop
-
-DOUBLE = 700
-"""Time [ms] after which a second press of Pause is one of its own."""
 
 Keep = Callable[[str], None]
 
@@ -56,16 +52,15 @@ class Person:
             if sheet.get_attribute("aria-label") == "Controls, full height":
                 break
             sheet.tap()
-            self.page.page.wait_for_timeout(400)
+            self.rest(sheet)
         if self.touches and sheet.is_visible():
             self.assert_above(self.page.page.get_by_role("group", name="Camera"), sheet)
         self.press(self.page.frame.get_by_role("tab", name=tab, exact=True))
 
     def pause(self, status: Callable[[], Any]) -> None:
-        """Pause by the bar; a second press that follows at once would be the same one."""
+        """Pause by the bar."""
         self.press(self.page.page.locator("#pause"))
         self.page.wait_until(lambda: status() == "paused", "the pause")
-        self.page.page.wait_for_timeout(DOUBLE)
 
     def assert_above(self, group: Locator, sheet: Locator) -> None:
         """Check that the buttons of ``group`` lie above the ``sheet``, not over its controls."""
@@ -79,7 +74,11 @@ class Person:
         sheet = self.page.frame.locator("#k450-sheet")
         if self.touches and sheet.is_visible():
             sheet.tap()
-            self.page.page.wait_for_timeout(400)
+            self.rest(sheet)
+
+    def rest(self, sheet: Locator) -> None:
+        """Wait until the sheet has moved."""
+        self.page.settled(lambda: list((sheet.bounding_box() or {}).values()), "the sheet")
 
     def stop(self) -> None:
         """Stop by the key or the button, and clear the stop."""
@@ -102,12 +101,5 @@ class Person:
 
 def still(page: ViserPage, where: Callable[[], Pixel]) -> Pixel:
     """Return a pixel when it moves no more: the camera follows the size of the picture."""
-    pixels = [where()]
-
-    def rests() -> bool:
-        page.page.wait_for_timeout(500)
-        pixels.append(where())
-        return bool(np.allclose(pixels[-1], pixels[-2], atol=0.5))
-
-    page.wait_until(rests, "the camera to rest")
-    return pixels[-1]
+    pixel: Pixel = page.settled(where, "the camera")
+    return pixel

@@ -65,7 +65,7 @@ def whole(page: ViserPage) -> bool:
 def wait_whole(page: ViserPage, what: str) -> None:
     page.wait_until(lambda: whole(page), f"arm and gizmo in the picture {what}", seconds=15.0)
     # The state must last.
-    page.page.wait_for_timeout(300)
+    page.page.wait_for_timeout(200)
     assert whole(page), what
 
 

@@ -17,7 +17,7 @@ from katana450.client import Client
 from katana450.server.api import answers
 from tests.browser.person import Person, still
 from tests.browser.server import AppServer
-from tests.browser.session import AXES, MOVE, bar, clear_stop
+from tests.browser.session import AXES, MOVE, bar, clear_stop, resume
 from tests.browser.shared_server import SharedServer
 from tests.browser.sizes import SIZES, in_sizes_and_schemes
 
@@ -74,7 +74,7 @@ def motion(person: Person) -> None:
     person.pause(lambda: truth.status()["status"])
     page.wait_until(lambda: bar(page, "headline").startswith("Paused by you"), "the pause")
     person.keep("paused")
-    person.press(page.page.locator("#pause"))
+    resume(page)
     truth.wait(moving=True)
     person.stop()
     page.page.locator("#speed input").fill("100")
@@ -129,7 +129,7 @@ def program(person: Person) -> None:
     page.wait_until(lambda: "Step" in bar(page, "mode") or "step" in bar(page, "mode"), "the step")
     person.keep("program")
     person.pause(status)
-    person.press(page.page.locator("#pause"))
+    resume(page)
     page.wait_until(lambda: status() == "running", "the program to continue")
     person.stop()
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import FloatRect, Locator
 
-from tests.browser.conftest import OpenPage
+from tests.browser.conftest import Windows
 from tests.browser.finger import fingers, middle
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, clear_stop, take
 from tests.browser.sight import overlap, wait_whole
-from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT
+from tests.browser.sizes import PHONE, PORTRAIT
 
 MOVE = "/target/move"
 
@@ -25,13 +25,30 @@ ABOVE = 120.0
 """Height above the full sheet for the buttons that lie over the scene [px]."""
 
 
+PRESSABLE_SIZE = 40.0
+"""Minimum width and height of a button of the page [px]."""
+
+PRESSABLE = """() => Object.fromEntries(
+    [...document.querySelectorAll("header button, #stage button")]
+        .map((each) => [each.id || each.textContent, each.getBoundingClientRect()])
+        .filter(([, { width }]) => width)
+        .map(([name, { x, y, width, height }]) => [name, [x, y, width, height]]))"""
+"""Script that returns position and size of all buttons of our page [px]."""
+
+
+@pytest.fixture(scope="module")
+def phone_window(server: AppServer, windows: Windows) -> Iterator[ViserPage]:
+    options = {"window": PORTRAIT, "own_camera": True, **PHONE}
+    with windows.open(server.url, nodes=("/arm", MOVE), **options) as page:
+        yield page
+
+
 @pytest.fixture
-def phone(server: AppServer, open_page: OpenPage) -> Iterator[ViserPage]:
+def phone(phone_window: ViserPage) -> Iterator[ViserPage]:
     """Return a phone in portrait, whose person drives."""
-    page = open_page(server.url, nodes=("/arm", MOVE), window=PORTRAIT, own_camera=True, **PHONE)
-    take(page)
-    yield page
-    assert page.errors == []
+    take(phone_window)
+    yield phone_window
+    assert phone_window.errors == []
 
 
 def handle(page: ViserPage) -> Locator:
@@ -44,7 +61,7 @@ def state(page: ViserPage) -> str | None:
 
 def wait_state(page: ViserPage, height: str) -> None:
     page.wait_until(lambda: state(page) == f"Controls, {height}", height)
-    page.page.wait_for_timeout(300)
+    page.settled(lambda: box(handle(page))["y"], "the sheet")
 
 
 def box(element: Locator) -> FloatRect:
@@ -109,7 +126,7 @@ def test_finger_moves_the_panel_between_three_heights(
     drag(phone, 0.2 * frame["height"], seconds=0.06)
     phone.wait_until(lambda: state(phone) != "Controls, full height", "a lower height")
     # The handle still moves.
-    phone.page.wait_for_timeout(300)
+    phone.settled(lambda: box(handle(phone))["y"], "the sheet")
     drag(phone, 0.7 * frame["height"])
     wait_state(phone, "folded")
     assert top() == pytest.approx(folded, abs=1.0)
@@ -126,81 +143,6 @@ def test_finger_moves_the_panel_between_three_heights(
     clear_stop(phone, truth)
     handle(phone).tap()
     wait_state(phone, "folded")
-
-
-@pytest.mark.long
-def test_keys_and_screen_readers_change_the_height(phone: ViserPage, server: AppServer) -> None:
-    truth = Truth(server)
-    button = phone.frame.get_by_role("button", name="Controls, folded", exact=True)
-    button.wait_for()
-    assert button.get_attribute("aria-expanded") == "false"
-    handle(phone).focus()
-    keyboard = phone.page.keyboard
-    for key, height in (
-        ("ArrowUp", "half height"),
-        ("ArrowUp", "full height"),
-        ("ArrowUp", "full height"),
-        ("ArrowDown", "half height"),
-        ("Enter", "full height"),
-        ("Enter", "folded"),
-        ("ArrowDown", "folded"),
-        ("ArrowUp", "half height"),
-    ):
-        keyboard.press(key)
-        wait_state(phone, height)
-    assert handle(phone).get_attribute("aria-expanded") == "true"
-    keyboard.press("Space")
-    truth.wait(mood="stopped")
-    assert state(phone) == "Controls, half height"
-    clear_stop(phone, truth)
-
-
-@pytest.mark.long
-def test_swipe_and_arrow_keys_change_the_tab(phone: ViserPage, artefacts: Path) -> None:
-    def chosen() -> str:
-        return phone.frame.locator("[role=tab][aria-selected=true]").inner_text()
-
-    def swipe(start: Locator, by: float, drop: float = 0.0) -> None:
-        with fingers(phone.page) as hand:
-            x, y = middle(start)
-            hand.put((x, y))
-            hand.move((x + by, y + drop), seconds=0.15)
-            hand.lift()
-        phone.page.wait_for_timeout(200)
-
-    # Tabs that cannot be seen do not change.
-    swipe(handle(phone), -120.0)
-    wait_state(phone, "folded")
-    handle(phone).tap()
-    wait_state(phone, "half height")
-    assert chosen() == "Drive"
-    tabs = phone.frame.get_by_role("tablist")
-    for start, by, drop, tab in (
-        (handle(phone), -120.0, 20.0, "Programs"),
-        (tabs, -120.0, 10.0, "Scene"),
-        # There is no tab beyond the last.
-        (handle(phone), -120.0, 0.0, "Scene"),
-        (tabs, 120.0, 0.0, "Programs"),
-        # A short movement is a mistake, and one that is mostly downwards means the height.
-        (handle(phone), 20.0, 0.0, "Programs"),
-        (tabs, 30.0, -80.0, "Programs"),
-    ):
-        swipe(start, by, drop)
-        assert chosen() == tab, (by, drop)
-        assert state(phone) == "Controls, half height"
-        phone.keep(artefacts / f"sheet-{tab.lower()}.png")
-    swipe(handle(phone), 30.0, -200.0)
-    wait_state(phone, "full height")
-    assert chosen() == "Programs"
-    handle(phone).focus()
-    for key, tab in (("ArrowLeft", "Drive"), ("ArrowLeft", "Drive"), ("ArrowRight", "Programs")):
-        phone.page.keyboard.press(key)
-        phone.wait_until(lambda tab=tab: chosen() == tab, tab)  # type: ignore[misc]
-    assert state(phone) == "Controls, full height"
-    # The tabs have keys of their own.
-    phone.frame.get_by_role("tab", name="Programs").focus()
-    phone.page.keyboard.press("ArrowRight")
-    phone.wait_until(lambda: chosen() == "Scene", "the next tab")
 
 
 @pytest.mark.long
@@ -253,6 +195,11 @@ def test_second_finger_presses_stop_while_the_first_is_in_the_scene(
         hand.lift(1)
         hand.lift()
     clear_stop(phone, truth)
+    # The finger in the scene may have selected something.
+    phone.page.evaluate(
+        """() => document.querySelectorAll("#stage [aria-label=Deselect]")
+            .forEach((each) => each.click())"""
+    )
 
 
 def test_help_of_a_touch_screen_tells_gestures_instead_of_keys(phone: ViserPage) -> None:
@@ -264,31 +211,35 @@ def test_help_of_a_touch_screen_tells_gestures_instead_of_keys(phone: ViserPage)
     assert "Hold a pad or a button" in words
     assert "two fingers shift and zoom" in words
     assert "wheel" not in words
+    phone.page.tap("#help button")
 
 
-@pytest.mark.long
-def test_jog_fits_beside_the_scene_in_landscape(
-    server: AppServer, open_page: OpenPage, artefacts: Path
+def test_buttons_are_finger_sized_and_covered_by_no_message(
+    phone: ViserPage, artefacts: Path
 ) -> None:
-    page = open_page(server.url, nodes=("/arm", MOVE), window=LANDSCAPE, own_camera=True, **PHONE)
-    take(page)
-    wait_whole(page, "beside the panel")
-    page.page.tap("#jog-button")
-    jog = page.page.locator("#jog")
-    page.page.locator("#gripper button").first.wait_for()
-    assert jog.evaluate("(each) => each.scrollHeight <= each.clientHeight")
-    assert box(jog)["x"] > LANDSCAPE[0] / 2
-    wait_whole(page, "beside Jog")
-    assert_stop_can_be_pressed(page)
-    for button in page.page.locator("#jog button, #jog .pad, nav button").all():
-        if button.is_visible():
-            assert min(box(button)["width"], box(button)["height"]) >= FINGER - 0.5
-            # No word is cut.
-            assert button.evaluate("(each) => each.scrollWidth <= each.clientWidth")
-    page.keep(artefacts / "sheet-landscape.png")
-    # The panel takes the place of Jog, and is docked again.
-    handle(page).tap()
-    page.wait_until(lambda: page.frame.get_by_role("tab").count() == 3, "the docked panel")
-    assert not jog.is_visible()
-    wait_whole(page, "beside the panel again")
-    assert page.errors == []
+    page = phone
+    page.press_in_bar("STOP")
+    page.page.wait_for_selector("#clear-stop:not([hidden])")
+    for opener in ("jog-button", "objects-button"):
+        page.page.tap(f"#{opener}")
+        page.page.evaluate(
+            "katana.toast('Axis 2: 300 is not between -124.3 and 7.8. It was not sent.')"
+        )
+        page.page.wait_for_selector("#toast.shown")
+        found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
+        assert {"stop", "clear-stop", opener} <= found.keys()
+        assert min(min(box[2:]) for box in found.values()) >= PRESSABLE_SIZE, found
+        toast, reason = (page.page.locator(each).bounding_box() for each in ("#toast", "#why"))
+        assert toast is not None
+        assert reason is not None
+        for name, (x, y, width, height) in found.items():
+            assert not overlap(toast, x, y, width, height), name
+            assert not overlap(reason, x, y, width, height), name
+        assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        page.keep(artefacts / f"finger-{opener}.png")
+    # The help covers Clear stop.
+    page.page.tap("#help-button")
+    page.page.tap("#help button")
+    assert not page.page.get_by_role("dialog").is_visible()
+    page.press_in_bar("Clear stop")
+    page.page.tap("#objects-button")
