@@ -68,6 +68,13 @@ def test_page_takes_camera_and_resolution_from_its_address(page: ViserPage) -> N
         )
 
 
+def test_box_is_drawn_where_it_is_projected(page: ViserPage) -> None:
+    red, _, blue = np.moveaxis(page.picture().astype(int), -1, 0)
+    x, y = (round(value) for value in page.project((0.0, 0.0, 0.0)))
+    assert red[y, x] > blue[y, x] + 50  # orange
+    assert abs(red[y - 200, x] - blue[y - 200, x]) < 10  # the background is grey
+
+
 def test_page_offers_its_scene(page: ViserPage) -> None:
     with part("viewer"):
         assert ask(page, "Viser.viewer().canvas.matches('canvas')")
@@ -165,7 +172,7 @@ def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: A
         page.wait_until(lambda: abs(height(page) - 0.9) < 1e-6, "what was shown to the page")
         ask(page, "tapped.withheld = 'GuiUpdateMessage'")
         page.type_number("Height", 1.5)
-        page.page.wait_for_timeout(300)
+        page.page.wait_for_timeout(200)
         ask(page, "tapped.withheld = null")
         assert height(page) == pytest.approx(0.9)
     with part("replayed"):
@@ -202,27 +209,18 @@ def test_page_tells_and_takes_views(page: ViserPage) -> None:
 
 
 def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
-    seen = """(() => {
-        const seen = (each) => each.visible && (!each.parent || seen(each.parent));
-        const node = Viser.node("/hidden");
-        return Boolean(node) && seen(node);
-    })()"""
     with part("reveal"):
-        assert ask(page, seen) is False
+        assert not page.shows("/hidden")
         for argument, wanted in ((", true", True), ("", False)):
             ask(page, f"Viser.reveal('/hidden'{argument})")
-            page.wait_until(lambda wanted=wanted: ask(page, seen) is wanted, f"{wanted}")  # type: ignore[misc]
+            page.wait_until(lambda wanted=wanted: page.shows("/hidden") is wanted, f"{wanted}")  # type: ignore[misc]
 
 
 def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
-    visible = """(() => {
-        const node = Viser.node("/box");
-        return Boolean(node?.visible);
-    })()"""
     with part("veil"):
         for hides, shown in (("(name) => name === '/box'", False), ("null", True)):
             ask(page, f"Viser.veil({hides})")
-            page.wait_until(lambda wanted=shown: ask(page, visible) is wanted, "the node")  # type: ignore[misc]
+            page.wait_until(lambda wanted=shown: page.shows("/box") is wanted, "the node")  # type: ignore[misc]
             with part("isVeiled"):
                 assert ask(page, "Viser.isVeiled()") is not shown
     with part("handles"):
@@ -280,7 +278,7 @@ def test_number_boxes_are_found_and_filled(page: ViserPage) -> None:
     with part("fill"):
         before = len(page.sent("GuiUpdateMessage"))
         ask(page, f"Viser.fill({boxes}[0], '1.9')")
-        page.page.wait_for_timeout(300)
+        page.page.wait_for_timeout(200)
         assert len(page.sent("GuiUpdateMessage")) == before
     with part("type"):
         ask(page, f"Viser.type({boxes}[0], '1.2')")
