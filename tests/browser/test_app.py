@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +13,11 @@ from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.view import GHOST_COLOURS
-from katana450.settings import Settings
-from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
-from tests.browser.server import AppServer
-from tests.browser.session import AXES
+from tests.browser.session import AXES, Truth, bar, go_home, mood
 
-READY = np.array(Settings().ready)
 MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
 
-ON_ITS_WAY = 600.0  # ms; more than a loaded machine takes from the mouse to a slider
 # A dragged handle is within a pixel of its target: 1 mm at this distance.
 PIXEL = 2e-3
 
@@ -83,8 +76,7 @@ class Robot:
                 return False
             # The last action of the mouse may still be in transit to the arm.
             before = self.q
-            self.page.page.wait_for_timeout(ON_ITS_WAY)
-            return np.array_equal(before, self.q) and arrived()
+            return np.array_equal(before, self.page.settled(lambda: self.q, "it")) and arrived()
 
         self.page.wait_until(rests, "the arm to arrive at the angles of the sliders", seconds=30.0)
         self.page.wait_drawn()
@@ -96,32 +88,10 @@ class Robot:
         return self.page.page.inner_text("#mode")
 
 
-@pytest.fixture(scope="module")
-def window(server: AppServer, windows: Windows) -> Iterator[Robot]:
-    with windows.open(server.url, nodes=("/arm", MOVE)) as page:
-        yield Robot(page)
-
-
 @pytest.fixture
-def robot(window: Robot) -> Iterator[Robot]:
+def robot(page: ViserPage) -> Robot:
     """Return a window of the running app, with the arm in the ready posture."""
-    go_home(window)
-    yield window
-    assert window.page.errors == []
-
-
-def go_home(robot: Robot) -> None:
-    def there() -> bool:
-        # On an overloaded machine the arm stops, as it should.
-        if robot.page.page.get_attribute("body", "data-mood") == "stopped":
-            robot.page.press_in_bar("Clear stop")
-            robot.page.page.wait_for_timeout(500)
-            robot.page.click_button("Home")
-        return np.allclose(robot.q, READY, atol=1e-6)
-
-    robot.page.click_button("Home")
-    robot.page.wait_until(there, "the sliders at home", seconds=30.0)
-    robot.settle()
+    return Robot(page)
 
 
 def pitch_of(T: FloatArray) -> float:
@@ -150,45 +120,8 @@ def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: 
     robot.page.keep(artefacts / "app-pitch.png")
 
 
-@pytest.mark.long
-def test_the_roll_ring_turns_the_tool_about_itself(robot: Robot) -> None:
-    start = robot.drawn()
-    before = robot.q
-    robot.page.drag_ring(ROLL, "x", -0.5)
-    robot.settle()
-    assert robot.drawn()[:3, 3] == pytest.approx(start[:3, 3], abs=1e-6)
-    assert robot.drawn()[:3, 0] == pytest.approx(start[:3, 0], abs=1e-6)
-    turned = robot.q - before
-    assert turned[:4] == pytest.approx(np.zeros(4), abs=1e-6)
-    assert turned[4] == pytest.approx(-0.5, abs=0.01)
-
-
-@pytest.mark.long
-def test_the_gripper_slider_moves_both_fingers(robot: Robot) -> None:
-    robot.page.drag_slider("Gripper", 0.0)
-    closed = [finger_turn(robot, name) for name in ("finger_right_link", "finger_left_link")]
-    robot.page.drag_slider("Gripper", 100.0)
-    opened = [finger_turn(robot, name) for name in ("finger_right_link", "finger_left_link")]
-    assert closed[0] == pytest.approx(-closed[1], abs=1e-6)
-    assert opened[0] == pytest.approx(-opened[1], abs=1e-6)
-    assert abs(opened[0] - closed[0]) == pytest.approx(0.74, abs=0.03)
-
-
-def finger_turn(robot: Robot, link: str) -> float:
-    """Return the finger's angle about z [rad] as sent last, after it has come to rest."""
-    seen: list[float] = []
-
-    def resting() -> bool:
-        R = robot.page.last_pose(robot.path[link])[:3, :3]
-        seen.append(math.atan2(R[1, 0], R[0, 0]))
-        return len(seen) > 10 and seen[-1] == seen[-10]
-
-    robot.page.wait_until(resting, f"{link} to come to rest")
-    return seen[-1]
-
-
 def test_target_out_of_reach_is_shown_by_ghost_colour_and_sentence(
-    robot: Robot, artefacts: Path
+    robot: Robot, truth: Truth, artefacts: Path
 ) -> None:
     page = robot.page
     with page.grip_arrow(MOVE, "x") as grip:
@@ -213,9 +146,9 @@ def test_target_out_of_reach_is_shown_by_ghost_colour_and_sentence(
     assert GHOST_COLOURS[Status.LIMITED] in colours
     assert ghost_is_shown(robot)
     # At the goal the reason and the ghost disappear.
-    go_home(robot)
+    go_home(page, truth)
     page.wait_until(lambda: not ghost_is_shown(robot), "the ghost to go")
-    assert "On target" in robot.text()
+    page.wait_until(lambda: "On target" in robot.text(), "the reason to go")
 
 
 def ghost_is_shown(robot: Robot) -> bool:
@@ -224,8 +157,9 @@ def ghost_is_shown(robot: Robot) -> bool:
 
 
 def test_arm_stops_before_the_table_with_reason_and_warning_colour(
-    robot: Robot, artefacts: Path
+    robot: Robot, truth: Truth, artefacts: Path
 ) -> None:
+    page = robot.page
     robot.page.drag_slider("2 shoulder", 5.0)
     robot.page.wait_until(lambda: "mm apart" in robot.text(), "the reason", seconds=20.0)
     reason = robot.text()
@@ -250,7 +184,7 @@ def test_arm_stops_before_the_table_with_reason_and_warning_colour(
     coat = seen[0]
     robot.page.wait_drawn()
     robot.page.keep(artefacts / "app-contact.png")
-    go_home(robot)
+    go_home(page, truth)
     robot.page.wait_until(lambda: "On target" in robot.text(), "the reason to go")
     (last,) = robot.page.messages("SetSceneNodeVisibilityMessage", node=coat, last=1)
     assert not last.body["visible"]
@@ -272,51 +206,25 @@ def test_typed_pose_reports_the_impossible_yaw(robot: Robot) -> None:
 
 
 @pytest.mark.long
-def test_browsers_show_the_same_arm_and_drive_it_in_turn(
-    robot: Robot, server: AppServer, open_page: OpenPage
+def test_detour_is_offered_in_the_sentence_and_taken_by_enter_or_go(
+    page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
-    other = Robot(open_page(server.url, nodes=("/arm", MOVE)))
-    robot.page.drag_slider("1 base turn", -50.0)
-    robot.settle()
-    other.settle()
-    assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
-    # A person without the lease moves nothing, and the handle returns.
-    other.page.drag_arrow(MOVE, "z", 0.05)
-    other.page.wait_until(
-        lambda: np.allclose(other.gizmo(), robot.gizmo(), atol=1e-5), "the handle to come back"
-    )
-    other.settle()
-    robot.page.press_in_bar("Release")
-    other.page.drag_arrow(MOVE, "z", 0.05)
-    other.settle()
-    robot.settle()
-    other.page.press_in_bar("Release")
-    assert np.allclose(other.drawn(), robot.drawn(), atol=1e-9)
-    assert other.page.errors == []
-
-
-def come_back(robot: Robot, server: AppServer) -> None:
-    """Restart the server, wait for the page, and check that the old motion has ended."""
-    robot.page.wait_lost()
-    robot.since = time.time()
-    server.restart()
-    robot.page.wait_until(lambda: robot.page.connected, "the page to come back", seconds=20.0)
-    robot.page.wait_ready(("/arm", MOVE))
-    robot.page.wait_until(lambda: np.allclose(robot.q, READY, atol=1e-6), "the sliders at home")
-    robot.settle()
-
-
-@pytest.mark.long
-def test_app_killed_during_a_drag_restarts_at_rest(open_page: OpenPage) -> None:
-    with AppServer() as server:
-        robot = Robot(open_page(server.url, nodes=("/arm", MOVE)))
-        robot.page.drag_slider("1 base turn", 70.0)
-        robot.settle()
-        with robot.page.grip_arrow(MOVE, "z") as grip:
-            grip.sweep(0.05, 4)
-            server.kill()
-            robot.page.wait_lost()
-        come_back(robot, server)
-        assert robot.page.frame.get_by_role("slider").count() == len(AXES) + 1
-        robot.page.drag_arrow(MOVE, "z", 0.05)
-        robot.settle()
+    go = page.page.locator("#go")
+    for taken_by in ("Enter", "Go"):
+        # Lift the tool by 20 cm and pull it back over the shoulder, where limits hold it.
+        page.drag_arrow(MOVE, "z", 0.2)
+        page.wait_until(lambda: mood(page.page) == "limited", "the limit")
+        page.settled(lambda: page.node_pose(MOVE), "the handle")
+        page.drag_arrow(MOVE, "x", -0.45)
+        page.wait_until(go.is_visible, "the offer", seconds=20.0)
+        assert "s detour" in bar(page, "why")
+        assert "press Enter or Go" in bar(page, "why")
+        page.keep(artefacts / f"detour-{taken_by}.png")
+        if taken_by == "Enter":
+            page.page.keyboard.press("Enter")
+        else:
+            go.click()
+        page.wait_until(go.is_hidden, "the detour")
+        page.wait_until(lambda: mood(page.page) in ("ok", "limited"), "the arrival", seconds=20.0)
+        assert "would have to leap" not in bar(page, "why")
+        go_home(page, truth)
