@@ -85,19 +85,6 @@ def table(page: ViserPage, name: str) -> dict[str, Any]:
     return dict(zip(heading, np.array(rows, float).T, strict=True))
 
 
-def places(page: ViserPage) -> list[tuple[str, str]]:
-    """Return the shown cards in their order, with their sizes."""
-    found: list[list[str]] = page.page.evaluate(
-        """() => [...document.querySelectorAll("#instruments .card:not([hidden])")]
-          .map((card) => [card.dataset.id, card.dataset.size])"""
-    )
-    return [(name, size) for name, size in found]
-
-
-def arrange(page: ViserPage) -> None:
-    page.page.locator("#instruments .toolbar").get_by_role("button", name="Arrange").click()
-
-
 def reload(page: ViserPage) -> None:
     """Reload the page. The instruments open again as before."""
     page.page.reload()

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.browser.conftest import OpenPage
+from tests.browser.camera import Drawing
+from tests.browser.conftest import Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import Truth, bar, clear_stop, mood, take
+from tests.browser.session import Truth, bar, clear_stop, mood
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="freezes a process")
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[AppServer]:
-    with AppServer() as server:
-        yield server
 
 
 def offers_clear_stop(page: ViserPage) -> bool:
@@ -31,10 +25,9 @@ def wait_headline(page: ViserPage, words: str) -> None:
 
 
 def test_stop_is_confirmed_on_its_own_port_while_the_web_server_is_frozen(
-    server: AppServer, open_page: OpenPage, artefacts: Path
+    page: ViserPage, server: AppServer, truth: Truth, artefacts: Path
 ) -> None:
-    driver, truth = open_page(server.url, nodes=("/arm",)), Truth(server)
-    take(driver)
+    driver = page
     with server.frozen(server.front):
         driver.page.keyboard.press("Space")
         wait_headline(driver, "Stopped")
@@ -47,15 +40,12 @@ def test_stop_is_confirmed_on_its_own_port_while_the_web_server_is_frozen(
     assert truth.status()["stopped"] == f"{me} pressed STOP."
     driver.wait_until(lambda: ": You pressed STOP." in bar(driver, "why"), "time and presser")
     clear_stop(driver, truth)
-    driver.press_in_bar("Release")
-    assert driver.errors == []
 
 
 def test_clear_stop_is_disabled_with_the_reason_until_it_is_possible(
-    server: AppServer, open_page: OpenPage, artefacts: Path
+    page: ViserPage, truth: Truth, artefacts: Path
 ) -> None:
-    driver, truth = open_page(server.url, nodes=("/arm",)), Truth(server)
-    take(driver)
+    driver = page
     button = driver.page.locator("#clear-stop")
     # Each press begins the time again.
     for _ in range(3):
@@ -68,15 +58,18 @@ def test_clear_stop_is_disabled_with_the_reason_until_it_is_possible(
     driver.wait_until(button.is_enabled, "the end of the time")
     assert button.get_attribute("title") == ""
     clear_stop(driver, truth)
-    driver.press_in_bar("Release")
-    assert driver.errors == []
 
 
 def test_page_tells_a_requested_stop_from_a_confirmed_one(
-    server: AppServer, open_page: OpenPage, artefacts: Path
+    page: ViserPage, server: AppServer, windows: Windows, artefacts: Path
 ) -> None:
-    driver, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
-    take(driver)
+    with windows.open(server.url, drawing=Drawing.NONE) as other:
+        assert_stop_is_told(page, other, server, artefacts)
+
+
+def assert_stop_is_told(
+    driver: ViserPage, other: ViserPage, server: AppServer, artefacts: Path
+) -> None:
     me = bar(driver, "name").partition(",")[0]
     with server.frozen(server.arm):
         wait_headline(other, "No answer from the arm")
@@ -106,5 +99,4 @@ def test_page_tells_a_requested_stop_from_a_confirmed_one(
     other.wait_until(lambda: offers_clear_stop(other), "the offer")
     other.press_in_bar("Clear stop")
     other.wait_until(lambda: not offers_clear_stop(other), "the stop to be cleared")
-    assert driver.errors == []
     assert other.errors == []
