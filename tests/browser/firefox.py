@@ -52,9 +52,7 @@ class Firefox:
     Pixels are relative to the window's top left corner.
     """
 
-    def __init__(self, *, webgl: bool = True) -> None:
-        """Prepare the window. ``webgl``: whether it can draw the scene."""
-        self._preferences = PREFERENCES | {"webgl.disabled": not webgl}
+    def __init__(self) -> None:
         self._stack = ExitStack()
         self._socket: Connection
         self._number = 0
@@ -64,9 +62,7 @@ class Firefox:
 
     def __enter__(self) -> Self:
         profile = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
-        lines = (
-            f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in self._preferences.items()
-        )
+        lines = (f"user_pref({json.dumps(k)}, {json.dumps(v)});" for k, v in PREFERENCES.items())
         (profile / "user.js").write_text("\n".join(lines), encoding="utf-8")
         words = (*SCREEN, "firefox-esr", "--no-remote", "--profile", str(profile))
         process = subprocess.Popen(

@@ -61,12 +61,13 @@ def gripped(firefox: Firefox) -> tuple[float, float]:
     firefox.wait_until("__viserMutable.nodeRefFromName['/target/move']", in_frame=True)
     script = SCENE.read_text(encoding="utf-8").rstrip("\n;")
     firefox.evaluate(f"(window.harness = {{}}, {script}, true)", in_frame=True)
-    found: list[float] = []
+    places: list[list[float]] = []
     grip = "harness.grip('/target/move', 'arrow', 'z').then(({ pixel }) => pixel)"
     # The camera moves until arm and gizmo are in the picture.
-    while found != (found := firefox.evaluate(grip, in_frame=True)):
-        time.sleep(1.0)
-    x, y = found
+    while len(places) < 5 or any(place != places[-1] for place in places[-5:]):
+        places.append(firefox.evaluate(grip, in_frame=True))
+        time.sleep(0.2)
+    x, y = places[-1]
     left, top = firefox.evaluate(
         "(({ left, top }) => [left, top])(document.querySelector('#scene').getBoundingClientRect())"
     )
@@ -90,18 +91,9 @@ def test_stop_key_stops_the_arm_and_the_button_clears(firefox: Firefox, arm: Cli
     # It can be pressed 1 s after the stop.
     firefox.wait_until("!document.querySelector('#clear-stop').disabled")
     # The bar may still rearrange itself.
-    time.sleep(0.5)
+    time.sleep(0.2)
     firefox.click("#clear-stop")
     until(lambda: arm.query(answers.State).stopped is None)
-
-
-def test_jog_moves_while_a_key_is_held(firefox: Firefox, arm: Client) -> None:
-    firefox.click("#jog-button")
-    firefox.wait_until("!document.querySelector('#jog').hidden")
-    before = height(arm)
-    firefox.press("f", 0.6)
-    until(lambda: height(arm) < before - 0.005)
-    until(lambda: not arm.query(answers.State).moving)
 
 
 def test_page_reports_no_error(firefox: Firefox) -> None:
@@ -109,13 +101,3 @@ def test_page_reports_no_error(firefox: Firefox) -> None:
     # Firefox reports this rejection although `forgoCode` of static/viser.js handles it.
     handled = "EvalError: Running text as code is not allowed."
     assert [each for each in firefox.errors if each != handled] == []
-
-
-def test_browser_without_webgl_says_so(server: AppServer, artefacts: Path) -> None:
-    with Firefox(webgl=False) as firefox:
-        firefox.open(server.url)
-        firefox.wait_until("document.querySelector('#poster').textContent.includes('WebGL')")
-        firefox.wait_until("document.body.dataset.mood !== 'starting'")
-        time.sleep(1.0)
-        assert not firefox.evaluate(DRAWN)
-        firefox.screenshot(artefacts / "firefox_without_webgl.png")

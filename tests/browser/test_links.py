@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +12,14 @@ from katana450.client import connect
 from katana450.server.api import answers
 from tests.browser.camera import Camera
 from tests.browser.conftest import OpenPage
+from tests.browser.finger import fingers
 from tests.browser.page import Pixel, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import AXES, MOVE, READY, Truth, bar, camera, clear_stop, prepare, take
+from tests.browser.session import AXES, MOVE, READY, Truth, bar, camera, clear_stop, take
+from tests.browser.sizes import PHONE, PORTRAIT
 from tests.browser.spots import Spot, seen_at, spot
 
 SIDE = Camera((0.25, -1.6, 0.45), (0.25, 0.0, 0.4))
-AHEAD = Camera((1.3, -0.25, 0.4), (0.3, 0.0, 0.3))
-BEHIND = Camera((-1.3, 0.0, 0.45), (0.0, 0.0, 0.35))
 TURN = -0.5
 """Angle [rad] by which the mouse goes round the axis, anticlockwise on the screen."""
 
@@ -36,13 +35,11 @@ EMISSIVE = """(name) => {
 
 
 @pytest.fixture
-def page(server: AppServer, open_page: OpenPage, truth: Truth) -> Iterator[ViserPage]:
-    """Return a new window with the camera at the side, whose person drives."""
-    page = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
+def page(page: ViserPage) -> ViserPage:
+    """Return the window with the camera at the side."""
     page.page.wait_for_selector("#cube", state="attached")
-    prepare(page, truth)
-    yield page
-    assert page.errors == []
+    page.look_from(SIDE)
+    return page
 
 
 @pytest.fixture
@@ -126,39 +123,6 @@ def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
 
 
 @pytest.mark.long
-def test_joint_seen_edge_on_turns_by_the_movement_across(
-    page: ViserPage, links: list[str], truth: Truth
-) -> None:
-    page.look_from(BEHIND)
-    page.page.wait_for_timeout(500)
-    # The base turns about the vertical. Its near side follows the mouse: to the right is -y.
-    drag(page, spot(page, links, 0).pixel, (60.0, 0.0))
-    page.page.mouse.up()
-    assert rest(truth)[0] > 0.3
-    assert np.allclose(q(truth)[1:], READY[1:], atol=1e-6)
-
-
-@pytest.mark.long
-def test_drag_beside_the_arm_turns_the_camera_and_the_handle_stays_a_handle(
-    page: ViserPage, truth: Truth
-) -> None:
-    seen = camera(page)
-    drag(page, (150.0, 350.0), (80.0, 20.0))
-    page.page.mouse.up()
-    page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
-    assert np.allclose(rest(truth), READY, atol=1e-6)
-    # From ahead, the arrow upwards is in front of the arm.
-    page.look_from(AHEAD)
-    page.page.wait_for_timeout(500)
-    start = np.array(truth.status()["T"])[:3, 3]
-    page.drag_arrow(MOVE, "z", 0.05)
-    rest(truth)
-    moved = np.array(truth.status()["T"])[:3, 3] - start
-    assert np.allclose(moved, (0.0, 0.0, 0.05), atol=0.005)
-    assert label(page) == ""
-
-
-@pytest.mark.long
 def test_clicked_link_gets_a_bar_with_steps(
     page: ViserPage, links: list[str], truth: Truth, artefacts: Path
 ) -> None:
@@ -206,12 +170,12 @@ def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     truth.wait(mood="stopped")
     stopped = rest(truth)
     # What is held at a stop moves nothing, also after it is cleared.
-    page.page.wait_for_timeout(1100)
+    page.page.wait_for_selector("#clear-stop:not([hidden]):enabled")
     # The mouse still holds the link.
     page.page.locator("#clear-stop").evaluate("(each) => each.click()")
     truth.wait(stopped=None)
     page.page.mouse.move(start[0], start[1] + 60.0, steps=5)
-    page.page.wait_for_timeout(300)
+    page.page.wait_for_timeout(200)
     page.page.mouse.up()
     assert np.allclose(rest(truth), stopped, atol=1e-6)
     page.page.keyboard.press("Space")
@@ -241,7 +205,7 @@ def test_lost_pointer_ends_the_drag_and_the_arm_holds(
     )
     held = rest(truth)
     page.page.mouse.move(start[0] - 100.0, start[1], steps=5)
-    page.page.wait_for_timeout(300)
+    page.page.wait_for_timeout(200)
     assert np.allclose(rest(truth), held, atol=1e-6)
     # It came to rest on the way.
     assert np.allclose(truth.status()["goal"], held, atol=1e-3)
@@ -249,70 +213,30 @@ def test_lost_pointer_ends_the_drag_and_the_arm_holds(
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("page")
-def test_who_does_not_drive_turns_the_camera_and_gets_reasons(
-    server: AppServer, open_page: OpenPage, links: list[str], truth: Truth
-) -> None:
-    other = open_page(server.url, nodes=("/arm", MOVE), camera=SIDE)
-    other.wait_until(lambda: "drives" in bar(other, "holder"), "the driver's name")
-    other.page.wait_for_selector("#cube", state="attached")
-    where, seen = spot(other, links, 2).pixel, camera(other)
-    hover(other, where)
-    other.page.wait_for_timeout(300)
-    assert label(other) == ""
-    assert other.frame.evaluate(EMISSIVE, "/arm") == 0
-    drag(other, where, (60.0, 20.0))
-    other.page.mouse.up()
-    other.wait_until(lambda: not np.allclose(camera(other), seen, atol=1e-2), "another view")
-    # The selected link says what a drag would do, so its drag is refused with the reason.
-    where = spot(other, links, 2).pixel
-    other.page.mouse.click(*where)
-    other.page.get_by_role("button", name="3 elbow plus 1°").click()
-    other.wait_until(lambda: "ask for it" in bar(other, "toast"), "the refusal")
-    other.page.wait_for_selector("#toast:not(.shown)", state="attached")
-    drag(other, where, (0.0, -50.0))
-    other.page.wait_for_selector("#toast.shown", state="attached")
-    other.page.mouse.up()
-    assert np.allclose(rest(truth), READY, atol=1e-6)
-    assert other.errors == []
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("size", [(390, 844), (844, 390)])
 def test_finger_takes_hold_of_the_selected_link_only(
     server: AppServer,
     open_page: OpenPage,
     links: list[str],
     truth: Truth,
-    size: tuple[int, int],
     artefacts: Path,
 ) -> None:
-    page = open_page(
-        server.url, nodes=("/arm", MOVE), window=size, camera=SIDE, has_touch=True, is_mobile=True
-    )
+    page = open_page(server.url, nodes=("/arm", MOVE), window=PORTRAIT, camera=SIDE, **PHONE)
     page.page.wait_for_selector("#cube", state="attached")
     take(page)
     start = rest(truth)
-    touch = page.page.context.new_cdp_session(page.page)
 
-    def swipe(from_: Pixel, by: Pixel) -> None:
-        def send(kind: str, *points: Pixel) -> None:
-            sent = [{"x": x, "y": y} for x, y in points]
-            touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": sent})
-            page.page.wait_for_timeout(60)
-
-        send("touchStart", from_)
-        page.page.wait_for_timeout(150)
-        for step in range(1, 11):
-            send("touchMove", (from_[0] + by[0] * step / 10, from_[1] + by[1] * step / 10))
-        send("touchEnd")
+    def swipe(start: Pixel, by: Pixel) -> None:
+        with fingers(page.page) as hand:
+            hand.put(start)
+            hand.move((start[0] + by[0], start[1] + by[1]), seconds=0.6, steps=10)
+            hand.lift()
 
     seen = camera(page)
     swipe(spot(page, links, 2).pixel, (30.0, 20.0))
     page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
     assert np.allclose(rest(truth), start, atol=1e-6)
     page.look_from(SIDE)
-    page.page.wait_for_timeout(500)
+    page.settled(lambda: camera(page), "the camera")
     page.page.touchscreen.tap(*spot(page, links, 2).pixel)
     chosen = page.page.get_by_role("group", name="Selected joint")
     chosen.wait_for()
@@ -320,7 +244,7 @@ def test_finger_takes_hold_of_the_selected_link_only(
         box = button.bounding_box()
         assert box is not None
         assert min(box["width"], box["height"]) >= 44.0
-    page.keep(artefacts / f"link-selected-{size[0]}.png")
+    page.keep(artefacts / "link-selected-phone.png")
     swipe(spot(page, links, 2).pixel, (0.0, -30.0))
     turned = rest(truth) - start
     assert abs(turned[2]) > 0.1

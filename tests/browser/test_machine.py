@@ -86,14 +86,3 @@ def test_dragged_link_turns_or_slides_its_joint(
         assert abs(away @ along) / np.linalg.norm(along) < FOLLOWS
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: np.allclose(q(truth), before, atol=1e-6), "the way back")
-
-
-def test_clicked_link_gets_a_bar_with_steps_in_its_unit(
-    page: ViserPage, links: list[str], truth: Truth
-) -> None:
-    before = q(truth)
-    page.page.mouse.click(*spot(page, links, 0).pixel)
-    chosen = page.page.get_by_role("group", name="Selected joint")
-    page.page.get_by_role("button", name="1 rail plus 1 mm").click()
-    page.wait_until(lambda: np.isclose(q(truth)[0], before[0] + 1e-3, atol=1e-9), "a millimetre")
-    page.wait_until(lambda: chosen.locator("output").inner_text() == "1.0 mm", "the read-out")

@@ -1,4 +1,4 @@
-"""The small menu of the page: the person's name, a picture of the scene, a link to the view."""
+"""The small menu of the page: name, picture, recording, link to the view, and code for a phone."""
 
 from __future__ import annotations
 
@@ -8,10 +8,23 @@ from urllib.parse import parse_qs, urlsplit
 import imageio.v3 as imageio
 import numpy as np
 import pytest
+import zxingcpp
 
+from katana450.extensions.phone.address import own_address
+from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage
-from tests.browser.server import AppServer
+from tests.browser.page import ViserPage
+from tests.browser.server import APP, AppServer
 from tests.browser.session import Truth, bar
+from tests.browser.sight import contrast
+from tests.browser.sizes import PHONE, PORTRAIT
+
+
+def test_server_that_records_nothing_says_so(own_page: ViserPage) -> None:
+    own_page.page.click("#more-button")
+    own_page.press_in_bar("Save the last 10 minutes")
+    own_page.wait_until(lambda: "records nothing" in bar(own_page, "toast"), "the reason")
+    own_page.page.click("#more-button")
 
 
 @pytest.mark.long
@@ -61,17 +74,40 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
 
 
 @pytest.mark.long
-def test_chosen_name_returns_with_a_restarted_server(open_page: OpenPage) -> None:
-    with AppServer() as server:
-        page = open_page(server.url, nodes=("/arm",))
-        page.page.click("#more-button")
-        page.page.get_by_label("Your name").fill("Anna")
-        page.page.keyboard.press("Enter")
-        page.wait_until(lambda: bar(page, "name").startswith("Anna"), "the name")
-        server.kill()
-        page.wait_lost()
-        page.wait_until(lambda: bar(page, "headline") == "No connection", "the loss")
-        server.restart()
-        page.wait_until(lambda: bar(page, "headline") != "No connection", "the state", seconds=30.0)
-        page.press_in_bar("Take")
-        page.wait_until(lambda: Truth(server).status()["holder"] == "Anna", "the name")
+@pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
+def test_code_on_the_screen_holds_the_address(open_page: OpenPage, artefacts: Path) -> None:
+    with AppServer((*APP, "--host", "0.0.0.0", "--insecure")) as server:
+        page = open_page(server.url, drawing=Drawing.NONE, window=PORTRAIT, **PHONE)
+        assert_code_holds_the_address(page, server, artefacts)
+
+
+def assert_code_holds_the_address(page: ViserPage, server: AppServer, artefacts: Path) -> None:
+    page.page.click("#more-button")
+    button = page.page.locator("#phone-button")
+    button.click()
+    url = f"http://{own_address()}:{server.port}"
+    address = page.page.get_by_label("Address for a phone")
+    address.wait_for()
+    assert address.input_value() == url
+    assert button.get_attribute("aria-expanded") == "true"
+    code = page.page.get_by_role("img", name=f"QR code of {url}")
+    code.scroll_into_view_if_needed()
+    page.wait_until(lambda: code.evaluate("(each) => each.naturalWidth") > 0, "the code")
+    picture = np.asarray(imageio.imread(page.page.screenshot(), extension=".png"))[..., :3]
+    (read,) = zxingcpp.read_barcodes(np.ascontiguousarray(picture))
+    assert read.text == url
+    page.keep(artefacts / "phone.png")
+    note = page.page.locator("#phone p")
+    assert "Everybody who opens this address can drive the arm." in note.inner_text()
+    colours: list[str] = note.evaluate(
+        "(each) => [getComputedStyle(each).color, "
+        "getComputedStyle(document.getElementById('phone')).backgroundColor]"
+    )
+    assert contrast(*colours) >= 4.5
+    # Nothing is cut, and STOP stays in reach.
+    assert page.page.locator("#phone").evaluate("(each) => each.scrollWidth <= each.clientWidth")
+    page.page.click("#stop", trial=True)
+    page.page.click("#phone form button")
+    code.wait_for(state="hidden")
+    assert button.get_attribute("aria-expanded") == "false"
+    assert page.errors == []

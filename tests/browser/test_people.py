@@ -66,10 +66,7 @@ def test_admin_lists_and_disconnects(site: Site, browser: Browser, artefacts: Pa
         assert page.locator("#people-list li b").all_inner_texts() == ["Ada (you)", "Vera", "Oda"]
         for size in ((1280, 800), (390, 844), (844, 390)):
             page.set_viewport_size({"width": size[0], "height": size[1]})
-            for scheme in ("light", "dark"):
-                page.emulate_media(color_scheme=scheme)
-                page.wait_for_timeout(300)
-                page.screenshot(path=artefacts / f"people-{size[0]}-{scheme}.png")
+            page.screenshot(path=artefacts / f"people-{size[0]}.png")
             stop = page.locator("#stop").bounding_box()
             box = page.locator("#people").bounding_box()
             assert stop is not None
@@ -167,33 +164,9 @@ def test_link_is_revoked_by_the_second_click(site: Site, browser: Browser) -> No
         page.select_option("#kick-for", "60")
         page.get_by_role("button", name="Disconnect Rita").wait_for()
         page.select_option("#kick-for", "revoke")
-        page.wait_for_timeout(500)
+        page.wait_for_timeout(200)
         assert any(grant.name == "Rita" for grant in site.file.grants.values())
         page.get_by_role("button", name="Disconnect Rita").click()
         sure.click()
         page.locator("#people-list li", has_text="Rita").wait_for(state="detached")
         assert all(grant.name != "Rita" for grant in site.file.grants.values())
-
-
-@pytest.mark.long
-def test_closed_list_of_people_is_not_queried(site: Site, browser: Browser) -> None:
-    with visiting(browser, f"{site.server.url}/#{site.link('Ada', Role.ADMIN)}") as page:
-        page.evaluate(COUNT_QUERIES)
-        for _ in range(2):
-            page.click("#help-button")
-            page.click("#people-button")
-            page.locator("#people-list li").wait_for()
-        page.keyboard.press("Escape")
-        before = page.evaluate("window.queries")
-        page.wait_for_timeout(2_500)
-        assert page.evaluate("window.queries") == before
-
-
-COUNT_QUERIES = """() => {
-  window.queries = 0;
-  const post = Worker.prototype.postMessage;
-  Worker.prototype.postMessage = function (message, ...more) {
-    if (message.say?.do === "list_people") window.queries += 1;
-    return post.call(this, message, ...more);
-  };
-}"""

@@ -76,24 +76,6 @@ SEE = """async () => {
     frames: tf.transforms.map(each => each.child_frame_id)};
 }"""
 
-DRAW = """async meshes => {
-  const {OBJLoader} = await import("three/addons/loaders/OBJLoader.js");
-  const {MTLLoader} = await import("three/addons/loaders/MTLLoader.js");
-  const colours = new Set();
-  let triangles = 0;
-  for (const url of meshes) {
-    const at = url.lastIndexOf("/") + 1;
-    const materials = await new MTLLoader().setPath(url.slice(0, at)).loadAsync("materials.mtl");
-    const object = await new OBJLoader().setMaterials(materials).loadAsync(url);
-    object.traverse(each => {
-      if (!each.isMesh) return;
-      triangles += each.geometry.attributes.position.count / 3;
-      colours.add(each.material.color.getHexString());
-    });
-  }
-  return {triangles, colours: colours.size};
-}"""
-
 RUN = """async () => {
   const found = send(2, [0.4, -1.1, 1.4, 0.2, 0.3]);
   return {...await found.result, feedback: found.feedback, q: joints()};
@@ -209,24 +191,3 @@ def test_roslib_drives_the_arm(browser: Browser, site: str) -> None:
         assert found["response"] == {"success": True, "message": "requested"}
         assert "STOP" in found["failed"]
         assert "pressed STOP" in found["stopped"]
-
-
-@needs_package(THREE)
-def test_three_loads_the_meshes_of_the_description(browser: Browser, site: str) -> None:
-    with AppServer((*APP, "--ros-page", site)) as server, opened(browser, site) as page:
-        page.evaluate(CONNECT, server.url.replace("http", "ws") + "/rosbridge")
-        meshes = page.evaluate(SEE)["meshes"]
-        drawn = page.evaluate(DRAW, meshes)
-        assert drawn["triangles"] > 10_000
-        assert drawn["colours"] >= 8
-
-
-def test_page_of_another_site_is_refused(browser: Browser, site: str) -> None:
-    with AppServer(APP) as server, opened(browser, site) as page:
-        connect = """url => new Promise(ok => {
-          const socket = new WebSocket(url);
-          socket.onopen = () => ok("open");
-          socket.onerror = () => ok("refused");
-        })"""
-        url = server.url.replace("http", "ws") + "/rosbridge"
-        assert page.evaluate(connect, url) == "refused"

@@ -15,10 +15,6 @@ from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, camera, turn
 
-SIZES = [
-    (1440, 900),
-    *(pytest.param(each, marks=pytest.mark.long) for each in ((390, 844), (844, 390))),
-]
 FACES = {"front": Preset.FRONT, "back": Preset.BACK, "left": Preset.LEFT, "right": Preset.SIDE}
 OUT = {"front": (1, 0, 0), "back": (-1, 0, 0), "left": (0, 1, 0), "right": (0, -1, 0)}
 UP = (0, 0, 1)
@@ -62,7 +58,7 @@ def wait_from(page: ViserPage, preset: Preset) -> None:
 def test_cube_shows_how_the_scene_is_seen(page: ViserPage) -> None:
     for position in ((0.9, -0.8, 0.7), (-0.9, 0.6, 0.4), (0.5, 1.0, 0.9)):
         page.look_from(Camera(position, CENTRE))
-        page.page.wait_for_timeout(500)
+        page.settled(lambda: camera(page), "the camera")
         origin, top = page.project(CENTRE), face(page, "top")
         middle = np.mean([face(page, "front"), face(page, "back")], axis=0)
         for name, out in [*OUT.items(), ("top", UP)]:
@@ -99,10 +95,9 @@ def test_fit_fills_the_picture_with_the_arm(page: ViserPage) -> None:
     direction = np.array((1.0, -2.0, 0.8)) / np.linalg.norm((1.0, -2.0, 0.8))
     for distance in (4.0, 0.6):
         page.look_from(Camera(tuple(3 * [0.2] + distance * direction), (0.2, 0.2, 0.2)))
-        page.page.wait_for_timeout(500)
+        page.settled(lambda: camera(page), "the camera")
         page.page.get_by_role("button", name="Fit", exact=True).click()
-        page.page.wait_for_timeout(800)
-        position, target = camera(page)
+        position, target = page.settled(lambda: camera(page), "the camera")
         away = position - target
         assert np.allclose(away / np.linalg.norm(away), direction, atol=1e-2)
         box = page.frame.locator("canvas").first.bounding_box()
@@ -119,8 +114,7 @@ def test_fit_fills_the_picture_with_the_arm(page: ViserPage) -> None:
 def test_double_click_looks_at_a_point(page: ViserPage) -> None:
     turn(page, "3D")
     wait_from(page, Preset.FREE)
-    page.page.wait_for_timeout(500)
-    before = camera(page)
+    before = page.settled(lambda: camera(page), "the camera")
     cup = page.node_pose("/cup")[:3, 3] + (0.0, 0.0, 0.05)
     page.page.mouse.dblclick(*page.project(cup))
     page.wait_until(lambda: np.linalg.norm(camera(page)[1] - cup) < 0.06, "the cup in the middle")
@@ -129,50 +123,5 @@ def test_double_click_looks_at_a_point(page: ViserPage) -> None:
     assert np.linalg.norm(after[1] - after[0]) < 0.61
     # A double-click on nothing changes nothing.
     page.page.mouse.dblclick(60, 160)
-    page.page.wait_for_timeout(500)
+    page.page.wait_for_timeout(200)
     assert np.allclose(camera(page), after, atol=1e-3)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("size", SIZES)
-def test_cube_covers_no_other_control(
-    server: AppServer, open_page: OpenPage, size: tuple[int, int], artefacts: Path
-) -> None:
-    finger = min(size) < 500
-    page = open_page(
-        server.url,
-        nodes=("/arm", MOVE),
-        window=size,
-        own_camera=True,
-        color_scheme="dark",
-        has_touch=finger,
-        is_mobile=finger,
-    )
-    page.page.wait_for_selector("#cube", state="attached")
-    page.page.wait_for_timeout(500)
-    page.keep(artefacts / f"view-cube-{size[0]}.png")
-    for opened in ("", "#jog-button"):
-        if opened:
-            page.page.click(opened)
-            page.page.wait_for_timeout(500)
-            page.keep(artefacts / f"view-cube-jog-{size[0]}.png")
-        group = page.page.get_by_role("group", name="Camera")
-        views = group.get_by_label(
-            "View" if finger else "Iso: view from above and the side", exact=True
-        )
-        for button in (views, group.get_by_text("Fit", exact=True)):
-            # Fails if anything lies over it.
-            button.click(trial=True)
-            box = button.bounding_box()
-            assert box is not None
-            assert min(box["width"], box["height"]) >= (44.0 if finger else 32.0)
-    for button in page.page.locator("#jog button:visible").all():
-        button.click(trial=True)
-    if finger:
-        assert not page.page.locator("#cube").is_visible()
-        for _ in range(2):
-            views.select_option("Right")
-            wait_from(page, Preset.SIDE)
-            page.look_from(Camera())
-            page.page.wait_for_timeout(500)
-    assert page.errors == []
