@@ -11,7 +11,7 @@ from websockets.exceptions import InvalidStatus
 
 from katana450.arm.control.lease import Role
 from tests.browser.server import APP, AppServer
-from tests.gateway.client import ask, controlling
+from tests.gateway.client import ask
 from tests.gateway.site import open_site
 from tests.rosbridge.ros_client import FOLLOW, TWIST, ros, trajectory, twist
 
@@ -54,26 +54,6 @@ def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
                 async with ros(url, f"?token={viewer}", origin=ELSEWHERE):
                     pass
             assert viewer not in site.server.output
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
-def test_client_is_refused_while_another_drives() -> None:
-    async def act() -> None:
-        with AppServer(APP) as server:
-            async with controlling(server.url) as page, ros(server.url) as client:
-                await page.say("acquire")
-                await client.when(lambda state: state["holder"] is not None)
-                await client.say("publish", id="t", topic=TWIST, msg=twist(vx=0.2))
-                assert "holds the arm" in await client.refusal("t")
-                goal = trajectory((1.0, [0.1, -1.2, 1.4, 0.1, 0.0]))
-                result = await client.result(await client.goal(FOLLOW, goal))
-                assert result["status"] == 6
-                assert "holds the arm" in result["values"]["error_string"]
-                hold = (await client.call("/hold"))["values"]
-                assert hold["success"] is False
-                assert "holds the arm" in hold["message"]
 
     asyncio.run(act())
 

@@ -11,16 +11,13 @@ import numpy as np
 import pytest
 
 from tests.browser.server import AppServer
-from tests.gateway.client import controlling
 from tests.rosbridge.ros_client import (
     FOLLOW,
     GRIPPER,
-    JOINT_JOG,
     JOINTS,
     TWIST,
     RosClient,
     ros,
-    stamp,
     trajectory,
     twist,
 )
@@ -72,7 +69,7 @@ def test_cancel_brings_the_arm_to_rest(server: AppServer) -> None:
             await client.home()
             number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
             await client.when(lambda state: state["moving"])
-            await asyncio.sleep(0.5)
+            await asyncio.sleep(0.2)
             await client.say("cancel_action_goal", id=number, action=FOLLOW)
             result = await client.result(number)
             assert result["status"] == 5
@@ -111,7 +108,7 @@ def test_stop_cancels_a_goal_and_nothing_moves_afterwards(server: AppServer) -> 
             values = (await other.call("/clear_stop"))["values"]
             assert values["success"] is False, "the arm was stopped less than a second ago"
             await client.clear()
-            await asyncio.sleep(0.5)
+            await asyncio.sleep(0.2)
             cleared = await client.state()
             assert cleared["stopped"] is None
             assert cleared["q"] == pytest.approx((await client.state())["q"])
@@ -131,23 +128,6 @@ def test_stop_while_a_goal_is_planned_cancels_it(server: AppServer) -> None:
             assert (await client.result(number))["status"] == 5
             await client.clear()
             assert (await client.state())["q"] == pytest.approx(home["q"], abs=0.05)
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
-def test_other_driver_ends_a_goal(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client, controlling(server.url) as page:
-            await client.home()
-            number = await client.goal(FOLLOW, trajectory((6.0, AWAY)))
-            await client.when(lambda state: state["moving"])
-            await page.say("take")
-            result = await client.result(number)
-            assert result["status"] == 5
-            assert "lease" in result["values"]["error_string"]
-            await page.say("release_lease")
-            await page.wait(holder=None)
 
     asyncio.run(act())
 
@@ -203,47 +183,6 @@ def test_twist_moves_the_tool_point_until_the_commands_end(server: AppServer) ->
 
 
 @pytest.mark.long
-def test_twist_turns_the_tool_about_its_two_axes(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            before = await client.home()
-            await stream(client, TWIST, twist("tcp", wx=0.5), 0.8)
-            rolled = await client.when(lambda state: not state["moving"])
-            assert rolled["roll"] - before["roll"] > 0.1
-            assert rolled["pitch"] == pytest.approx(before["pitch"], abs=0.01)
-            # wrist_link pitches and does not roll: its y axis is the axis of pitch.
-            await stream(client, TWIST, twist("wrist_link", wy=-0.5), 0.8)
-            pitched = await client.when(lambda state: not state["moving"])
-            assert pitched["pitch"] - rolled["pitch"] < -0.1
-            assert pitched["roll"] == pytest.approx(rolled["roll"], abs=0.01)
-            await client.say("publish", id="t", topic=TWIST, msg=twist("wrist_link", wz=0.5))
-            why = await client.refusal("t")
-            assert "five axes" in why
-            assert "0.4 rad/s" in why
-            assert "(0.000, 0.000, 1.000)" in why
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
-def test_joint_jog_moves_a_joint_until_the_commands_end(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url, "?command_in_type=speed_units") as client:
-            before = (await client.home())["q"]
-            jog = {"joint_names": ["axis_1", "axis_5"], "velocities": [0.4, -0.2]}
-            await stream(client, JOINT_JOG, jog, 1.0)
-            ended = time.monotonic()
-            after = (await client.when(lambda state: not state["moving"]))["q"]
-            assert time.monotonic() - ended < 2.0
-            moved = np.array(after) - before
-            assert 0.2 < moved[0] < 0.6
-            assert -0.3 < moved[4] < -0.1
-            assert np.abs(moved[1:4]).max() < 1e-3
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
 def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url) as client:
@@ -254,7 +193,7 @@ def test_stream_over_a_stop_stays_refused_until_it_pauses(server: AppServer) -> 
             stopped = await client.when(lambda state: state["stop"] == "confirmed")
             await client.clear()
             assert not streaming.done(), "the stop was cleared during the stream"
-            await asyncio.sleep(0.5)
+            await asyncio.sleep(0.2)
             state = await client.state()
             assert state["stopped"] is None
             assert not state["moving"]
@@ -280,21 +219,6 @@ def test_client_that_leaves_ends_its_goal(server: AppServer) -> None:
             state = await other.when(lambda state: not state["moving"], 5.0)
             assert abs(state["q"][0] - AWAY[0]) > 0.1
             await other.home()
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
-def test_tolerances_of_a_goal_are_kept(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            home = await client.home()
-            # Half a turn of the first axis in 0.2 s is too fast for the arm.
-            goal = trajectory((0.2, [1.5, *home["q"][1:]]), goal_time_tolerance=stamp(0.1))
-            result = await client.result(await client.goal(FOLLOW, goal))
-            assert (result["status"], result["values"]["error_code"]) == (6, -5)
-            assert "Nothing has moved" in result["values"]["error_string"]
-            assert (await client.state())["q"] == pytest.approx(home["q"])
 
     asyncio.run(act())
 
@@ -327,7 +251,7 @@ def test_nothing_moves_after_the_result(server: AppServer) -> None:
             state = await client.state()
             assert (result["status"] == 4) == (state["q"] == pytest.approx(AWAY, abs=1e-3)), result
             assert not state["moving"]
-            await asyncio.sleep(1.0)
+            await asyncio.sleep(0.2)
             assert (await client.state())["q"] == pytest.approx(state["q"], abs=1e-6)
 
     asyncio.run(act())

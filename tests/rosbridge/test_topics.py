@@ -59,51 +59,6 @@ def test_topics_describe_the_arm_as_it_is(server: AppServer, robot: Robot) -> No
     asyncio.run(act())
 
 
-@pytest.mark.long
-def test_topic_is_sent_at_its_rate_or_more_seldom(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url, watches=False) as client:
-            await client.say("subscribe", topic="/joint_states", id="a", throttle_rate=250)
-            await client.message("/joint_states")
-            before = client.counts["/joint_states"]
-            await asyncio.sleep(2.0)
-            assert 4 <= client.counts["/joint_states"] - before <= 9
-            await client.say("subscribe", topic="/joint_states", id="b")
-            await client.message("/joint_states")
-            before = client.counts["/joint_states"]
-            await asyncio.sleep(1.0)
-            assert 20 <= client.counts["/joint_states"] - before <= 55
-            await client.say("unsubscribe", topic="/joint_states")
-            await client.call("/rosapi/nodes")
-            before = client.counts["/joint_states"]
-            await asyncio.sleep(0.3)
-            assert client.counts["/joint_states"] == before
-
-    asyncio.run(act())
-
-
-@pytest.mark.long
-def test_diagnostics_report_a_stop_at_once(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            await client.home()
-            await client.say("subscribe", topic="/diagnostics")
-            arm, loop, driver = (await client.message("/diagnostics"))["status"]
-            assert (arm["name"], arm["level"], arm["message"]) == ("katana450: arm", 0, "ok")
-            assert {each["key"] for each in loop["values"]} >= {"period [ms]", "ticks lost"}
-            assert driver["message"].endswith("drives")
-            await client.call("/stop")
-            # The next one would be due within a second, which the news of the stop precedes.
-            async with asyncio.timeout(0.5):
-                while arm["level"] != 2:
-                    await asyncio.sleep(0.01)
-                    (arm, *_) = client.newest["/diagnostics"]["status"]
-            assert "STOP" in arm["message"]
-            await client.clear()
-
-    asyncio.run(act())
-
-
 def test_rosapi_lists_what_there_is(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url, watches=False) as client:

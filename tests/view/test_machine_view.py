@@ -13,9 +13,8 @@ import pytest
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.appearance import Appearance, AppearanceTrait
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -31,14 +30,11 @@ from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.hub import Hub
-from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.panel_tabs import PanelTabs
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.tint import Tint
 from katana450.server.view.view import ViewOptions
 from katana450.server.viser_bridge.guard import PERSONAL
-from tests.exchange.conftest import GANTRY
 from tests.exchange.trees import tree
 from tests.recording.recorded import state_message
 from tests.robot.hands import column, hand, rail
@@ -78,16 +74,6 @@ def test_every_link_is_shown_in_its_pose(server: viser.ViserServer, robot: Robot
         nodes.move(values)
         for name, T in robot.frames(values).items():
             np.testing.assert_allclose(shown(server, nodes.path[name]), T, rtol=0, atol=1e-9)
-
-
-def test_link_is_painted(server: viser.ViserServer) -> None:
-    robot = load(GANTRY)
-    nodes = ArmNodes(server, robot)
-    blue = Appearance().having("cart", AppearanceTrait.COLOUR, (0.0, 0.0, 1.0))
-    PaintNodes(server, nodes).follow(replace(standing(robot), appearance=blue))
-    assert not nodes.shapes["cart"][0].visible
-    coat: Any = internals.nodes(server)[f"{nodes.path['cart']}/paint0"]
-    assert tuple(coat.color) == (0, 0, 255)
 
 
 def test_panel_has_a_slider_per_joint_and_shows_the_reason(
@@ -198,23 +184,3 @@ def test_recorded_joints_are_drawn(server: viser.ViserServer, tmp_path: Path, te
     assert node.visible
     drawing.hide()
     assert not node.visible
-
-
-def test_links_before_a_contact_are_coated_with_what_is_checked(
-    server: viser.ViserServer, tmp_path: Path
-) -> None:
-    path = tmp_path / "rail.urdf"
-    path.write_text(rail())
-    robot = load(path)
-    scene = ArmNodes(server, robot)
-    tint, state = Tint(server, robot, scene.path), standing(robot)
-    tint.follow(state)
-    coats = [name for name in internals.nodes(server) if "/contact" in name]
-    assert coats == []
-    near = Finding(Reason.CONTACT, 0.005, parts=("left", "right"))
-    tint.follow(replace(state, findings=(near,), blocked=True))
-    coated = {name.split("/")[-2] for name in internals.nodes(server) if "/contact" in name}
-    assert coated == {"left", "right"}
-    tint.follow(state)
-    coat: Any = internals.nodes(server)[f"{scene.path['left']}/contact0"]
-    assert not coat.visible
