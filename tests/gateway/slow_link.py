@@ -65,6 +65,8 @@ class SlowLink:
         )
         self._loop.run_forever()
         server.close()
+        # A task that never begins would leave the connection open that was just accepted.
+        self._loop.run_until_complete(asyncio.sleep(0.01))
         tasks = asyncio.all_tasks(self._loop)
         for task in tasks:
             task.cancel()
