@@ -304,9 +304,6 @@ def generate_launch_description():
 )
 
 _RVIZ = """\
-Panels:
-  - Class: rviz_common/Displays
-    Name: Displays
 Visualization Manager:
   Class: ""
   Displays:
@@ -324,14 +321,6 @@ Visualization Manager:
       Description Topic:
         Value: /robot_description
         Durability Policy: Transient Local
-        History Policy: Keep Last
-        Depth: 1
-        Reliability Policy: Reliable
-    - Class: rviz_default_plugins/TF
-      Name: Frames
-      Enabled: false
-      Value: false
-  Enabled: true
   Global Options:
     Fixed Frame: '{root}'
     Frame Rate: 30
@@ -376,7 +365,7 @@ def control_launch(package: str, xacro: str, controllers: Sequence[str]) -> str:
 
 
 def rviz_text(robot: Robot) -> str:
-    """Return the configuration of RViz: grid, robot and frames, seen from outside its bounds."""
+    """Return the configuration of RViz: grid and robot, seen from outside its bounds."""
     low, high = robot.bounds
     x, y, z = (0.5 * (low + high)).tolist()
     return _RVIZ.format(

@@ -10,13 +10,13 @@ from collections import Counter
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.companions import Companions
-from katana450.extensions.importers.gltf_buffers import Buffers
+from katana450.extensions.importers.archive import Companions
 from katana450.extensions.importers.gltf_document import (
     FAN,
     LINE_MODES,
     STRIP,
     TRIANGLES,
+    Buffers,
     Document,
     Primitive,
     decoded,

@@ -16,8 +16,7 @@ from typing import IO
 from katana450.disk_cache import decoded
 from katana450.errors import InputError
 from katana450.extensions.convex_body import ConvexBody
-from katana450.extensions.importers.archive import ChoiceError, packed
-from katana450.extensions.importers.companions import is_inside
+from katana450.extensions.importers.archive import ChoiceError, is_inside, packed
 from katana450.extensions.importers.shape_file import (
     MAX_FILE_BYTES,
     MAX_MEMORY_BYTES,

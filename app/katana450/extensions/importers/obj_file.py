@@ -13,7 +13,7 @@ from collections import Counter
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.importers.companions import Companions
+from katana450.extensions.importers.archive import Companions
 from katana450.extensions.importers.surface import (
     MeshReading,
     as_bytes,

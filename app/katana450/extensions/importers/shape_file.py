@@ -16,8 +16,7 @@ import numpy as np
 
 from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError, digits_beyond
-from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, packed, unpacked
-from katana450.extensions.importers.companions import Companions
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, Companions, packed, unpacked
 from katana450.extensions.importers.gltf_file import read_gltf
 from katana450.extensions.importers.obj_file import read_obj
 from katana450.extensions.importers.off_file import read_off

@@ -17,7 +17,7 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_node import Node, Value
 from katana450.extensions.export.vrml_text import HEADER
-from katana450.extensions.importers.companions import Companions
+from katana450.extensions.importers.archive import Companions
 from katana450.extensions.importers.surface import (
     MAX_COPIES,
     MeshBuilder,
