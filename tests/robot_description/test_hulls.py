@@ -24,11 +24,11 @@ from robot_description.cad.hulls import (
     build_hulls,
     hulls_of,
     pieces,
-    whole,
     with_collisions,
 )
 from robot_description.cad.shoulder import RING_FOOT
 from robot_description.cad.solid import block, rod
+from tests.robot_description.solids import solid
 
 STANDOFF = 5.0  # mm
 EXCESS = 0.10  # of the volume
@@ -42,12 +42,6 @@ LINKS = [make.__name__ for make in PARTS]
 @functools.cache
 def robot() -> yourdfpy.URDF:
     return yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
-
-
-@functools.cache
-def solid(link: str) -> Manifold:
-    """Return all bodies of ``link``, mm."""
-    return whole(next(make() for make in PARTS if make.__name__ == link))
 
 
 @functools.cache

@@ -304,6 +304,9 @@ def generate_launch_description():
 )
 
 _RVIZ = """\
+Panels:
+  - Class: rviz_common/Displays
+    Name: Displays
 Visualization Manager:
   Class: ""
   Displays:
