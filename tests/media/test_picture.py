@@ -79,7 +79,7 @@ def test_the_arm_covers_the_same_pixels_as_in_pillow(
     # Rays through the middle of each pixel, as in a picture, but without light.
     y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
     eye = np.array(at.position, dtype=np.float32)
-    hits = first_hits(scene, Tracer(scene), eye, at.directions(x, y), -10.0)
+    hits = first_hits(Tracer(scene), eye, at.directions(x, y), -10.0)
     theirs = silhouette(placed(URDF_PATH, katana.values(pose)), view)
     assert overlap((hits.item >= 0).reshape(SIZE, SIZE), theirs) >= 0.98
 

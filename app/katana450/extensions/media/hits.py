@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,56 +18,6 @@ NOTHING = -1
 def check_traceable() -> None:
     """Raise MissingExtraError if embreex is missing, to report this before a long run."""
     require("embreex", "pictures", "Pictures and films")
-
-
-class Meeting(NamedTuple):
-    """The first triangles that n rays hit.
-
-    Attributes:
-        face: (n,) number of the triangle, or NOTHING.
-        distance: (n,) [m], infinite without a hit.
-        second: (n,) barycentric coordinate of its second corner.
-        third: (n,) barycentric coordinate of its third corner.
-    """
-
-    face: Ints
-    distance: Floats
-    second: Floats
-    third: Floats
-
-
-class Tracer:
-    """A scene prepared for ray queries."""
-
-    def __init__(self, scene: RenderScene) -> None:
-        """Build the acceleration structure. Raises MissingExtraError without embreex."""
-        check_traceable()
-        rtcore: Any = import_module("embreex.rtcore_scene")
-        meshes: Any = import_module("embreex.mesh_construction")
-        self._scene = rtcore.EmbreeScene()
-        self._empty = not len(scene.faces)
-        if not self._empty:
-            meshes.TriangleMesh(self._scene, scene.vertices, scene.faces)
-
-    def first(self, origins: Floats, directions: Floats) -> Meeting:
-        """Return the first hits of rays from ``origins`` (n, 3) [m] along ``directions`` (n, 3)."""
-        count = len(origins)
-        if self._empty or not count:
-            nowhere = np.full(count, np.inf, dtype=np.float32)
-            zero = np.zeros(count, dtype=np.float32)
-            return Meeting(np.full(count, NOTHING, dtype=np.int32), nowhere, zero, zero)
-        found = self._scene.run(origins, directions, output=True)
-        face: Ints = found["primID"]
-        distance = np.where(face == NOTHING, np.float32(np.inf), found["tfar"])
-        return Meeting(face, distance, found["u"], found["v"])
-
-    def blocked(self, origins: Floats, directions: Floats, reach: float) -> Bools:
-        """Return (n,) whether each ray hits anything within ``reach`` [m]."""
-        if self._empty or not len(origins):
-            return np.zeros(len(origins), dtype=bool)
-        reached = np.full(len(origins), reach, dtype=np.float32)
-        found = self._scene.run(origins, directions, dists=reached, query="OCCLUDED")
-        return np.asarray(found != NOTHING)
 
 
 FLOOR, NOWHERE = -1, -2
@@ -112,39 +62,71 @@ class Hits:
         )
 
 
-def first_hits(
-    scene: RenderScene, tracer: Tracer, eye: Floats, directions: Floats, floor: float
-) -> Hits:
+class Tracer:
+    """A scene prepared for ray queries."""
+
+    def __init__(self, scene: RenderScene) -> None:
+        """Build the acceleration structure. Raises MissingExtraError without embreex."""
+        check_traceable()
+        rtcore: Any = import_module("embreex.rtcore_scene")
+        meshes: Any = import_module("embreex.mesh_construction")
+        self._scene, self._embree = scene, rtcore.EmbreeScene()
+        self._empty = not len(scene.faces)
+        if not self._empty:
+            meshes.TriangleMesh(self._embree, scene.vertices, scene.faces)
+
+    def hits(self, eye: Floats, directions: Floats) -> Hits:
+        """Return the hits of rays from ``eye`` (3,) [m] along ``directions`` (n, 3)."""
+        count = len(directions)
+        distance = np.full(count, BACKGROUND_DISTANCE, dtype=np.float32)
+        item = np.full(count, NOWHERE, dtype=np.int32)
+        normals = np.tile(UPWARD, (count, 1))
+        if not self._empty and count:
+            found = self._embree.run(_from(eye, directions), directions, output=True)
+            face: Ints = found["primID"]
+            hit = np.flatnonzero(face != NOTHING)
+            distance[hit] = np.minimum(found["tfar"][hit], BACKGROUND_DISTANCE)
+            item[hit] = self._scene.item[face[hit]]
+            places = (found["u"][hit, None], found["v"][hit, None])
+            normals[hit] = _normals(self._scene, face[hit], places, directions[hit])
+        return Hits(directions, distance, _ends(eye, distance, directions), normals, item)
+
+    def blocked(self, origins: Floats, directions: Floats, reach: float) -> Bools:
+        """Return (n,) whether each ray hits anything within ``reach`` [m]."""
+        if self._empty or not len(origins):
+            return np.zeros(len(origins), dtype=bool)
+        reached = np.full(len(origins), reach, dtype=np.float32)
+        found = self._embree.run(origins, directions, dists=reached, query="OCCLUDED")
+        return np.asarray(found != NOTHING)
+
+
+def first_hits(tracer: Tracer, eye: Floats, directions: Floats, floor: float) -> Hits:
     """Return the hits of rays from ``eye`` (3,) along ``directions`` (n, 3).
 
     ``floor`` is the height of the floor [m].
     """
-    meeting = tracer.first(_from(eye, directions), directions)
+    hits = tracer.hits(eye, directions)
     down = directions[:, 2]
     to_floor = np.full(len(directions), BACKGROUND_DISTANCE, dtype=np.float32)
     np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
-    nearest = np.minimum(meeting.distance, BACKGROUND_DISTANCE)
-    on_floor = (to_floor > 0.0) & (to_floor < nearest)
-    distance = np.where(on_floor, to_floor, nearest).astype(np.float32)
-    hit = np.flatnonzero(meeting.face != NOTHING)
-    normals = np.zeros_like(directions)
-    normals[:, 2] = 1.0
-    normals[hit] = _normals(scene, meeting, directions, hit)
-    item = np.where(on_floor, FLOOR, NOWHERE).astype(np.int32)
-    item[hit] = scene.item[meeting.face[hit]]
-    return Hits(directions, distance, _ends(eye, distance, directions), normals, item)
+    on_floor = (to_floor > 0.0) & (to_floor < hits.distance)
+    distance = np.where(on_floor, to_floor, hits.distance).astype(np.float32)
+    return Hits(
+        directions,
+        distance,
+        _ends(eye, distance, directions),
+        np.where(on_floor[:, None], UPWARD, hits.normals),
+        np.where(on_floor, FLOOR, hits.item).astype(np.int32),
+    )
 
 
 def hits_behind(
-    scene: RenderScene, tracer: Tracer, eye: Floats, before: Hits
+    tracer: Tracer, eye: Floats, before: Hits
 ) -> tuple[np.typing.NDArray[np.intp], Hits]:
     """Return the numbers (m,) of rays that hit another scene ``before`` they end, and the hits."""
-    meeting = tracer.first(_from(eye, before.directions), before.directions)
-    hit = np.flatnonzero(meeting.distance < before.distance)
-    directions, distance = before.directions[hit], meeting.distance[hit]
-    normals = _normals(scene, meeting, before.directions, hit)
-    points = _ends(eye, distance, directions)
-    return hit, Hits(directions, distance, points, normals, scene.item[meeting.face[hit]])
+    hits = tracer.hits(eye, before.directions)
+    nearer = hits.distance < before.distance
+    return np.flatnonzero(nearer), hits.some(nearer)
 
 
 def lit(tracer: Tracer, hits: Hits, towards: Floats) -> Bools:
@@ -166,21 +148,25 @@ def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
 
 
 def _normals(
-    scene: RenderScene, meeting: Meeting, directions: Floats, hit: np.typing.NDArray[np.intp]
+    scene: RenderScene, face: Ints, places: tuple[Floats, Floats], directions: Floats
 ) -> Floats:
-    """Return smooth unit normals (m, 3) at the ends of the rays ``hit``."""
-    face = meeting.face[hit]
+    """Return smooth unit normals (m, 3) on the triangles ``face`` (m,), towards the camera.
+
+    places: barycentric coordinates (m, 1) of the second and third corner.
+    """
     a, b, c = (scene.normals[scene.faces[face, corner]] for corner in range(3))
-    second, third = meeting.second[hit, None], meeting.third[hit, None]
-    smooth = a + second * (b - a) + third * (c - a)
+    smooth = a + places[0] * (b - a) + places[1] * (c - a)
     size = np.sqrt(np.einsum("ni,ni->n", smooth, smooth))[:, None]
     plane = scene.flat[face]
     # An open surface can be seen from both sides.
-    inside = np.einsum("ni,ni->n", plane, directions[hit]) > 0.0
+    inside = np.einsum("ni,ni->n", plane, directions) > 0.0
     side = np.where(inside, np.float32(-1.0), np.float32(1.0))[:, None]
     shaded = np.where(size > MIN_DENOMINATOR, smooth / np.maximum(size, MIN_DENOMINATOR), plane)
     return np.asarray(side * shaded, dtype=np.float32)
 
+
+UPWARD = np.array((0.0, 0.0, 1.0), dtype=np.float32)
+"""The normal of the floor, and of what no ray hits."""
 
 STEEPNESS = 1e-6
 """Sine of the inclination below which a ray counts as level."""

@@ -145,7 +145,7 @@ class _Renderer:
     def _samples(self, x: Floats, y: Floats) -> _Samples:
         """Return what the rays through x, y (n,) [px] show."""
         directions = self._camera.directions(x, y)
-        hits = first_hits(self._solid, self._tracer, self._eye, directions, FLOOR_AT)
+        hits = first_hits(self._tracer, self._eye, directions, FLOOR_AT)
         reached = lit(self._tracer, hits, LAMPS[0].towards)
         light = background(self._theme, self._camera, y)
         floor, solid = hits.item == FLOOR, hits.item >= 0
@@ -155,7 +155,7 @@ class _Renderer:
         light[solid] = _surface(self._solid, hits.some(solid), reached[solid])
         item = hits.item.copy()
         if self._thin.names:
-            which, surface = hits_behind(self._thin, self._behind, self._eye, hits)
+            which, surface = hits_behind(self._behind, self._eye, hits)
             # Water has the same illumination as the point behind it.
             shown = _surface(self._thin, surface, reached[which])
             light[which] += self._opacity[surface.item][:, None] * (shown - light[which])
