@@ -18,8 +18,7 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.new_folder import new_folder
-from katana450.extensions.recording.datasets.recorded_states import RecordedStates
-from katana450.extensions.recording.datasets.sampling import frame_times, sampled
+from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times, sampled
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import columns
 from katana450.maths.geometry.arrays import FloatArray

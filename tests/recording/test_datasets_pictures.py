@@ -22,7 +22,7 @@ from katana450.extensions.media.options import CAMERAS
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
-from katana450.extensions.recording.datasets.recorded_states import RecordedStates
+from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.datasets.statistics import QUANTILES, PixelCounts
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.options import VIEWS

@@ -26,8 +26,13 @@ from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
 from katana450.extensions.recording.datasets.lerobot_form import DatasetShape
 from katana450.extensions.recording.datasets.lerobot_writer import LerobotWriter
 from katana450.extensions.recording.datasets.new_folder import new_folder
-from katana450.extensions.recording.datasets.recorded_states import RecordedStates, columns_from
-from katana450.extensions.recording.datasets.sampling import check_fps, frame_times, sampled
+from katana450.extensions.recording.datasets.sampling import (
+    RecordedStates,
+    check_fps,
+    columns_from,
+    frame_times,
+    sampled,
+)
 from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.maths.geometry.arrays import FloatArray

@@ -19,8 +19,7 @@ from katana450.extensions.media.film import check_filmable, write_film
 from katana450.extensions.media.hits import check_traceable
 from katana450.extensions.media.rendering_pool import RenderingPool, Shot
 from katana450.extensions.progress import progress
-from katana450.extensions.recording.datasets.recorded_states import RecordedStates
-from katana450.extensions.recording.datasets.sampling import frame_times
+from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH

@@ -25,7 +25,7 @@ from katana450.extensions.recording.episodes.episode import (
     episodes_of,
     message_of,
 )
-from katana450.extensions.recording.files.mcap_records import (
+from katana450.extensions.recording.files.message_writer import (
     DATA_END_BYTES,
     FOOTER,
     MAGIC,
