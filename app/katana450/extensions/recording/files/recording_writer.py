@@ -19,8 +19,9 @@ from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.script_runs import (
     PROGRAM,
+    ProgramEvent,
     attached_script,
-    program_event,
+    sha256,
 )
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import (
@@ -128,7 +129,9 @@ class RecordingWriter:
         if (script.name, since, began) not in self._scripts:
             self._scripts.add((script.name, since, began))
             self._writer.attach(script)
-            self.event(t, PROGRAM, program_event(name, script, since, began=began))
+            digest = sha256(script.data)
+            event = ProgramEvent(t, PROGRAM, began, name, script.name, digest, since)
+            self._add(EVENTS, t, event)
 
     def episode(self, t: float, message: EpisodeMessage) -> None:
         """Record the description of an episode at ``t`` [s]; see ``episodes.episode``."""

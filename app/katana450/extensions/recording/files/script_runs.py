@@ -10,7 +10,7 @@ import hashlib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import msgspec
 
@@ -47,19 +47,18 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def program_event(name: str, script: Attachment, since: float, *, began: bool) -> dict[str, Any]:
-    """Return the fields of an event besides its time and kind. ``since``: begin of the run [s]."""
-    return {
-        "began": began,
-        "name": name,
-        "script": script.name,
-        "sha256": sha256(script.data),
-        "since": since,
-    }
-
-
 class ProgramEvent(msgspec.Struct):
-    """Event of the begin or the end of a run; see ``program_event``."""
+    """Event of the begin or the end of a run.
+
+    Attributes:
+        t: time of the event [s].
+        kind: PROGRAM.
+        began: whether the run began.
+        name: name of the script.
+        script: name of the attachment with its text.
+        sha256: SHA-256 of its text.
+        since: begin of the run [s].
+    """
 
     t: float
     kind: str
