@@ -94,39 +94,26 @@ def _csv_columns(path: Path, text: str) -> dict[str, list[float]]:
     rows = [[cell.strip() for cell in row] for row in csv.reader(text.splitlines()) if row]
     if not rows:
         raise InputError(f"{path} is empty. Its first line must name the columns, t first.")
-    if rows[0][0] == "t_s":
-        rows = _of_report(rows)
     names = rows[0]
     if len(set(names)) != len(names):
         raise InputError(f"{path} names a column twice: {', '.join(names)}.")
+    # Place and unit of each column; a report has more columns than a motion.
+    columns = {name: (place, 1.0) for place, name in enumerate(names)}
+    if names[0] == "t_s":
+        columns = {
+            "gripper" if match[1] == "fingers" else match[1]: (place, REPORT_UNITS[match[2]])
+            for place, name in enumerate(names)
+            if (match := REPORT_COLUMN.fullmatch(name))
+        }
     numbers: list[list[float]] = []
     for count, row in enumerate(rows[1:], start=1):
         try:
             if len(row) != len(names):
                 raise ValueError(f"it has {len(row)} values, not {len(names)}")
-            numbers.append([float(cell) for cell in row])
+            numbers.append([unit * float(row[place]) for place, unit in columns.values()])
         except ValueError as error:
             raise InputError(f"Row {count} of {path}: {error}.") from error
-    return {name: [row[place] for row in numbers] for place, name in enumerate(names)}
-
-
-def _of_report(rows: list[list[str]]) -> list[list[str]]:
-    """Return the times and joints of the table of a report, in the units of a motion."""
-    taken: list[tuple[int, str, float]] = []
-    for place, name in enumerate(rows[0]):
-        if match := REPORT_COLUMN.fullmatch(name):
-            known = "gripper" if match[1] == "fingers" else match[1]
-            taken.append((place, known, REPORT_UNITS[match[2]]))
-
-    def cell(row: list[str], place: int, unit: float) -> str:
-        try:
-            return repr(unit * float(row[place]))
-        except (ValueError, IndexError):
-            # Reported with its row by the reader of all tables.
-            return row[place] if place < len(row) else ""
-
-    head = [known for _, known, _ in taken]
-    return [head, *([cell(row, place, unit) for place, _, unit in taken] for row in rows[1:])]
+    return {name: [row[number] for row in numbers] for number, name in enumerate(columns)}
 
 
 def _motion(path: Path, columns: Mapping[str, list[float]], robot: Robot) -> RecordedMotion:
