@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.surfaces import Material, VisualMesh
+from katana450.arm.robot.surfaces import VisualMesh
 from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.srgb import to_light
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]
@@ -65,7 +66,7 @@ class RenderScene:
             _stacked([shape.normals @ R for shape, R, _ in turned], np.float32),
             _stacked([s.faces + at for s, at in zip(shapes, starts[:-1], strict=True)], np.int32),
             np.repeat(np.arange(len(shapes)), [len(shape.faces) for shape in shapes]).astype("i4"),
-            _stacked([[linear(material) for material in materials]], np.float32),
+            _stacked([[to_light(material.colour) for material in materials]], np.float32),
         )
 
     @cached_property
@@ -73,17 +74,6 @@ class RenderScene:
         """The unit normals (f, 3) of the triangles; 0 for a triangle without area."""
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         return unit(np.cross(b - a, c - a))
-
-
-def linear(material: Material) -> Floats:
-    """Return the linear colour (3,) of ``material``: IEC 61966-2-1."""
-    return light_of(np.array(material.colour, dtype=np.float32))
-
-
-def light_of(srgb: npt.NDArray[Any]) -> Floats:
-    """Return sRGB values 0..1 of any shape as linear light: IEC 61966-2-1."""
-    low = srgb / 12.92
-    return np.where(srgb <= 0.04045, low, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
 def unit(v: npt.NDArray[Any]) -> Floats:

@@ -11,9 +11,10 @@ import numpy as np
 
 from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.hits import Hits
-from katana450.extensions.media.scene import Bools, Floats, Ints, light_of, unit
+from katana450.extensions.media.scene import Bools, Floats, Ints, unit
 from katana450.server.view.room import FILL, KEY, RIM
 from katana450.server.viser_bridge.themes import Theme
+from katana450.srgb import to_light, to_srgb
 
 CELLS = ((0.05, 0.6), (0.25, 1.0))
 """Distance [m] and width [px] of the lines on the floor: fine lines, and main lines."""
@@ -26,7 +27,7 @@ def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
     """Return the light (n, 3) of the background at rows ``y`` (n,) [px] of the picture."""
     fraction = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
     top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (theme.sky, theme.floor))
-    return light_of(top + fraction * (bottom - top))
+    return to_light(top + fraction * (bottom - top)).astype(np.float32)
 
 
 def floor_light(theme: Theme, camera: Camera, hits: Hits, lit: Bools, behind: Floats) -> Floats:
@@ -36,7 +37,7 @@ def floor_light(theme: Theme, camera: Camera, hits: Hits, lit: Bools, behind: Fl
         fraction = _lines(camera, hits, apart, wide)[:, None]
         colour += fraction * (np.array(line, dtype=np.float32) / 255.0 - colour)
     colour[~lit] *= 1.0 - theme.shadow
-    shown = light_of(colour)
+    shown = to_light(colour)
     east, north = (hits.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
     left = np.clip(1.0 - np.hypot(east, north) / FADE_DISTANCE, 0.0, 1.0)[:, None]
     return np.asarray(behind + left * (shown - behind), dtype=np.float32)
@@ -89,7 +90,9 @@ class Lamp(NamedTuple):
 
 def lamp(position: tuple[float, float, float], rgb: tuple[int, int, int], power: float) -> Lamp:
     """Return a lamp at ``position``, directed to the base. ``rgb`` is its colour, 0 to 255."""
-    return Lamp(unit(np.array(position)), power * light_of(np.array(rgb, dtype=np.float32) / 255.0))
+    return Lamp(
+        unit(np.array(position)), power * to_light(np.array(rgb) / 255.0).astype(np.float32)
+    )
 
 
 LAMPS: tuple[Lamp, ...] = (
@@ -121,8 +124,7 @@ def developed(light: Floats) -> Floats:
     """Return light as sRGB 0..1: unchanged up to the shoulder, then softly up to white."""
     over = np.maximum(light - SHOULDER, 0.0) / (1.0 - SHOULDER)
     soft = SHOULDER + (1.0 - SHOULDER) * (1.0 - np.exp(-over))
-    x = np.clip(np.where(light > SHOULDER, soft, light), 0.0, 1.0)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1.0 / 2.4) - 0.055).astype(np.float32)
+    return to_srgb(np.where(light > SHOULDER, soft, light)).astype(np.float32)
 
 
 SHOULDER = 0.75
