@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 import katana450
@@ -125,18 +124,6 @@ def _pids(server: AppServer) -> tuple[int, int]:
     """Return the ids of the arm's process and of the one that records."""
     waited_for(partial(_other_child, server, 0), "the process that records")
     return server.arm, server.child(RECORDER)
-
-
-@pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
-def test_viewers_get_no_recording(folder: Path, role: Role) -> None:
-    who = Identity("session", "Vera", role)
-    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
-    request = Request({"type": "http", "query_string": b"", "headers": []})
-    with pytest.raises(HTTPException) as caught:
-        asyncio.run(RecordingRoutes(context, RecordingStore(folder)).routes()[0].endpoint(request))
-    # An operator passes the check of the role, and learns that the folder is still empty.
-    assert caught.value.status_code == (403 if role is Role.VIEWER else 409)
-    assert ("may watch" if role is Role.VIEWER else "has no recording") in caught.value.detail
 
 
 def test_script_leaves_no_file_even_if_nobody_takes_it(

@@ -1,80 +1,21 @@
-"""A writer is killed at random moments: what it had synced is recovered, for every reader."""
+"""Damaged recordings are repaired around the damage, for every reader."""
 
 from __future__ import annotations
 
 import json
-import pickle
-import random
-import signal
-import subprocess
-import sys
-from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 
 import katana450
-from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.messages import COMMANDS
-from tests.conftest import LONG
-from tests.recording.recorded import header, record, run
-
-KILLS = 50 if LONG else 1
-MAX_LOSS = 1.1
-"""[s] Maximum time at the end of a recording that a kill can lose."""
+from tests.recording.recorded import record
 
 ROOT = Path(__file__).resolve().parents[2]
 NODE_MODULES = ROOT / "tests" / "javascript" / "node_modules"
-
-
-@pytest.fixture(scope="module")
-def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a file with the header and the records that the killed process writes."""
-    records: list[TickRecord] = []
-    run(200, 3, records.append)
-    path = tmp_path_factory.mktemp("given") / "records"
-    path.write_bytes(pickle.dumps((replace(header(), environment=None), records)))
-    return path
-
-
-def killed(given: Path, target: Path, puts: int) -> tuple[float, float]:
-    """Kill a writer after ``puts`` ticks; return the times of its last tick and its last sync."""
-    command = [sys.executable, "-m", "tests.recording.killed_writer", str(given), str(target)]
-    last = {"put": 0.0, "synced": 0.0}
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        for number, line in enumerate(process.stdout):
-            kind, t = line.split()
-            last[kind] = float(t)
-            if number == puts:
-                process.send_signal(signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
-    return last["put"], last["synced"]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-@pytest.mark.parametrize("number", range(KILLS))
-def test_killed_writer_loses_a_second_at_most(number: int, given: Path, tmp_path: Path) -> None:
-    path, chance = tmp_path / "killed.mcap", random.Random(number)
-    put, synced = killed(given, path, chance.randint(150, 600))
-    assert main(["record", "info", str(path)]) == 1
-    assert main(["record", "recover", str(path)]) == 0
-    with RecordingFile.open(path) as file:
-        ticks = [each.t for each in file.messages(COMMANDS)]
-    assert ticks[-1] >= synced - 1e-6
-    assert put - ticks[-1] <= MAX_LOSS
-    # Nothing is missing before.
-    assert max(after - before for before, after in pairwise(ticks)) < 0.1
-    with path.open("rb") as opened:
-        found = list(make_reader(opened, validate_crcs=True).iter_messages(topics=[COMMANDS]))
-    assert len(found) == len(ticks)
-    content = path.read_bytes()
-    assert main(["record", "recover", str(path)]) == 0
-    assert path.read_bytes() == content
 
 
 @pytest.mark.cases(1)
