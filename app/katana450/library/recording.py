@@ -23,11 +23,11 @@ from katana450.extensions.recording.files.checking import (
     TickReader,
     content_of,
     session_for,
+    verified,
 )
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.table import columns
-from katana450.extensions.recording.files.verifying import verified
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
 from katana450.extensions.recording.replay import Verification
 from katana450.extensions.recording.run_again.again_command import (

@@ -1,8 +1,14 @@
-"""Simulation of a recording again, and comparison with what was recorded."""
+"""Simulation of a recording again, and comparison with what was recorded.
+
+A verification rounds as the process that recorded: in a process of its own if this one does not.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +22,7 @@ from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, json_form
+from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import (
@@ -33,6 +40,7 @@ from katana450.extensions.recording.messages import (
 from katana450.extensions.recording.replay import Checker, Verification
 from katana450.extensions.recording.shared_values import SharedText
 from katana450.extensions.recording.ticks import TickInput, tick_input
+from katana450.portable_rounding import ROUNDS_PORTABLY, can_round_portably, portable_rounding
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
@@ -166,3 +174,59 @@ def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot
     except (ValueError, TypeError) as error:
         raise InputError(f"{file.path} does not state the settings of its session.") from error
     return find_robot(settings, path, used.tool)
+
+
+def verified(
+    path: Path, urdf: Path | None = None, progress: Callable[[float, float], None] | None = None
+) -> Verification:
+    """Return the comparison of the recording at ``path`` with its simulation.
+
+    The simulation runs in a process of its own if this one rounds otherwise than the server did,
+    and this processor has the rounding of the server.
+
+    Args:
+        path: file of the recording.
+        urdf: file of its robot, if it is not the one of this program.
+        progress: called with the simulated time and the whole time [s]; a separate process shows
+            its progress itself, on standard error.
+
+    Raises:
+        InputError: the file is damaged, or is of another robot.
+        RobotDescriptionError: the files of the robot cannot be read.
+    """
+    with RecordingFile.open(path) as file:
+        if simulates_apart(file):
+            return _verified_apart(path, urdf, shows=progress is not None)
+        start, length = file.start, file.end - file.start
+        inner = None if progress is None else lambda t: progress(t - start, length)
+        return verify_recording(file, session_for(file, urdf).session, inner)
+
+
+def simulates_apart(file: RecordingFile) -> bool:
+    """Return whether ``file`` is simulated in a process that rounds otherwise than this one."""
+    portable = file.metadata.get(ROUNDING) == PORTABLE
+    return portable and can_round_portably() and not ROUNDS_PORTABLY
+
+
+def _verified_apart(path: Path, urdf: Path | None, *, shows: bool) -> Verification:
+    # -P: Python does not search the current folder, which may contain an `app.py`.
+    command = [sys.executable, "-P", "-m", "katana450", "record", "verify", str(path), "--json"]
+    if urdf is not None:
+        command += ["--urdf", str(urdf)]
+    done = subprocess.run(
+        command,
+        env=portable_rounding(os.environ),
+        stdout=subprocess.PIPE,
+        stderr=None if shows else subprocess.PIPE,
+        check=False,
+    )
+    try:
+        found = msgspec.json.decode(done.stdout)
+        if "error" in found:
+            raise InputError(found["error"])
+        return msgspec.convert(found, Verification)
+    except msgspec.MsgspecError as error:
+        text = (done.stderr or b"").decode(errors="replace").strip()
+        raise InputError(
+            f"The process that simulates {path} ended with status {done.returncode}. {text}"
+        ) from error

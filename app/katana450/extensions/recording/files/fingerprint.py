@@ -57,7 +57,6 @@ def fingerprint() -> dict[str, str]:
         "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,
         "machine": f"{sys.platform} {platform.machine()}",
         "cpu": _cpu(),
-        "cpu_features": _cpu_features(),
         ROUNDING: PORTABLE if ROUNDS_PORTABLY else "of the processor",
         "libm_rounding": _libm_rounding(),
         "blas_rounding": _blas_rounding(),
@@ -143,14 +142,3 @@ def _cpu() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or UNKNOWN
-
-
-def _cpu_features() -> str:
-    """Return the SIMD extensions that numpy uses, in short: their number and their hash."""
-    config: Any = np.show_config(mode="dicts")
-    with suppress(KeyError, TypeError):
-        found = config["SIMD Extensions"]
-        names = sorted((*found["baseline"], *found.get("found", ())))
-        digest = hashlib.sha256(" ".join(names).encode()).hexdigest()[:HASH_DIGITS]
-        return f"{len(names)} extensions, {digest}"
-    return UNKNOWN

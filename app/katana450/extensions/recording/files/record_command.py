@@ -19,6 +19,7 @@ from katana450.extensions.recording.datasets.export_command import check_options
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_command import episodes
 from katana450.extensions.recording.episodes.episode_file import episodes_in
+from katana450.extensions.recording.files.checking import simulates_apart, verified
 from katana450.extensions.recording.files.fingerprint import (
     DISTANCES,
     OF_PROCESS,
@@ -30,7 +31,6 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.trimming import Trimmed, trim
-from katana450.extensions.recording.files.verifying import simulates_apart, verified
 from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.replay import Verification
 
