@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import yaml
+from yaml.reader import ReaderError
 
 from katana450.errors import InputError
 from katana450.extensions.programs.expression import PLAIN
-from katana450.extensions.programs.yaml_errors import explained
 
 MAX_BYTES = 64 * 1024
 """[bytes] Maximum size of a script."""
@@ -26,6 +26,35 @@ MAX_VALUES = 10_000
 
 NULL, TEXT = "tag:yaml.org,2002:null", "tag:yaml.org,2002:str"
 WHOLE, REAL = "tag:yaml.org,2002:int", "tag:yaml.org,2002:float"
+
+
+UNFINISHED = {
+    "could not find expected ':'": "A colon and a blank are missing behind this name.",
+    "expected ',' or ']'": "A comma or ] is missing in a list that begins with [. "
+    "A text with brackets needs quotes.",
+    "expected ',' or '}'": "A comma or } is missing in a mapping that begins with {. "
+    "A text with brackets needs quotes.",
+    "unexpected end of stream": "A quote has no end. Close it.",
+}
+"""Texts for errors of PyYAML that it notices behind their place, by a part of its text."""
+
+MISPLACED = {
+    r"'\t'": "A tab cannot stand here. Indent with blanks.",
+    "that cannot start": "No value begins with this character. Put the text in quotes.",
+    "mapping values are not": "A colon cannot stand here. Is one missing in the line before? A "
+    "name begins in the column of its neighbours, and a text with a colon needs quotes.",
+    "sequence entries are not": "A list cannot begin here. Put its `-` on a line of its own.",
+    "<block end>, but found '}'": "This } closes nothing. Remove it.",
+    "<block end>, but found ']'": "This ] closes nothing. Remove it.",
+    "<block end>, but found '<scalar>'": "This stands behind the end of a value. Remove it, or put "
+    "the whole text in quotes.",
+    "expected <block end>": "This is indented differently from the lines before it. Begin all "
+    "entries of a list, and all names of a mapping, in the same column.",
+    "unknown escape": r"Write \\ for a backslash, or use single quotes.",
+    "expected the node content": "A value is missing here.",
+    "another document": "A second document begins here. Remove the line `---`.",
+}
+"""Texts for the others, the special ones first."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +153,7 @@ def composed(text: str, what: str, file: str) -> yaml.Node | None:
         _check_bounds(text, what, file)
         return yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
-        raise ScriptError((Problem(*explained(error, text), file),)) from error
+        raise ScriptError((Problem(*_explained(error, text), file),)) from error
 
 
 def _check_bounds(text: str, what: str, file: str) -> None:
@@ -171,3 +200,20 @@ def _number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+def _explained(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
+    """Return line and column, from 1, and the problem of a ``text`` that is not valid YAML."""
+    if isinstance(error, ReaderError):
+        lines = text[: error.position].split("\n")
+        problem = f"The character U+{ord(text[error.position]):04X} is not allowed. Remove it."
+        return len(lines), len(lines[-1]) + 1, problem
+    assert isinstance(error, yaml.MarkedYAMLError)
+    raw, mark, begin = str(error.problem), error.problem_mark, error.context_mark
+    assert mark is not None
+    for part, problem in (UNFINISHED | MISPLACED).items():
+        if part in raw:
+            if part in UNFINISHED and begin is not None and begin.line < mark.line:
+                mark = begin
+            return mark.line + 1, mark.column + 1, problem
+    return mark.line + 1, mark.column + 1, f"This is not valid YAML: {raw}."
