@@ -10,11 +10,11 @@ import pytest
 
 import katana450.extensions.programs
 from katana450.extensions.programs.actions import FollowPlan
+from katana450.extensions.programs.motion_measures import score
 from katana450.extensions.programs.pour import PourDemo, Spot
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.score import score
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import ScriptError
 from katana450.maths.water.flow import Water
