@@ -18,7 +18,7 @@ from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
-from katana450.extensions.programs.server.panel_access import PanelAccess
+from katana450.extensions.programs.server.panel import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests

@@ -6,6 +6,7 @@ import re
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import Program, compiled
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
-from katana450.extensions.programs.server.panel import ProgramsPanel, _page
+from katana450.extensions.programs.server.panel import PanelAccess, ProgramsPanel, _page
 from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.server.step_list import ListedStep, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
@@ -84,7 +85,8 @@ def panel_of(
 ) -> ProgramsPanel:
     """Return the panel of an arm that keeps its state."""
     gestures = RecordedGestures()
-    return ProgramsPanel(server, robot, runner, scripts, gestures, lambda: state, lambda: session)
+    access = cast(PanelAccess, runner)
+    return ProgramsPanel(server, robot, access, scripts, gestures, lambda: state, lambda: session)
 
 
 def test_panel_previews_and_steers(

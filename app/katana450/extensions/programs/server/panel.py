@@ -7,7 +7,7 @@ import math
 import threading
 from collections.abc import Callable, Coroutine
 from html import escape
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 
@@ -15,13 +15,12 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.errors import KatanaError
+from katana450.errors import KatanaError, LeaseError
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts
 from katana450.extensions.programs.server import step_list
-from katana450.extensions.programs.server.panel_access import PanelAccess
 from katana450.extensions.programs.server.preview import TIME_STEP, Preview
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.programs.server.state_line import RUNS
@@ -29,6 +28,8 @@ from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
 from katana450.server.api.program_requests import ProgramOrder
+from katana450.server.service.hub import Hub
+from katana450.server.service.participants import Participant
 from katana450.server.view.controls import GestureGate, refuse, set_value
 from katana450.server.view.panel_folder import FolderContext
 
@@ -39,38 +40,60 @@ ORDERS = {
 """The order that each button gives to the program."""
 
 
-class Steering(Protocol):
-    """The program runner as the panel uses it.
+ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
+"""Statuses of a program whose run has ended."""
 
-    Its methods raise KatanaError with the reason if they refuse.
-    """
 
-    def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        """Plan the script ``text`` for ``actor``, then execute the order ``then``, if any."""
-        ...
+class PanelAccess:
+    """The interface of the panel to the runner: for any thread, with the actor of a gesture."""
 
-    def steer(self, order: ProgramOrder, actor: Actor) -> None:
-        """Execute ``order`` of ``actor`` for the present program."""
-        ...
+    def __init__(
+        self, runner: ProgramRunner, hub: Hub, call: Callable[[Callable[[], None]], None]
+    ) -> None:
+        """Use ``call`` to run functions in the server's thread, see ``FolderContext``."""
+        self._runner = runner
+        self._hub = hub
+        self._call = call
 
     @property
     def progress(self) -> Progress | None:
-        """The progress of the present or last program; None before the first one."""
-        ...
+        """Progress of the present or last program."""
+        return self._runner.progress()
 
     @property
     def program(self) -> Program | None:
-        """The program whose planning has succeeded; None without one."""
-        ...
+        """The program that is planned."""
+        return self._runner.program
 
     @property
     def text(self) -> str:
-        """The script that was sent last, by anybody; "" before the first one."""
-        ...
+        """The script that was planned last; "" before the first one."""
+        return self._runner.planner.text
 
+    def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
+        """Plan ``text`` for ``actor``, then carry out ``then``. Raises KatanaError."""
+        self._call(lambda: self._plan(text, then, actor))
 
-ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
-"""Statuses of a program whose run has ended."""
+    def steer(self, order: ProgramOrder, actor: Actor) -> None:
+        """Give the program an order of ``actor``. Raises LeaseError if it is refused."""
+        self._call(lambda: self._steer(order, actor))
+
+    def _steer(self, order: ProgramOrder, actor: Actor) -> None:
+        self._runner.steer(self._participant_of(actor), order)
+
+    def _plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
+        participant = self._participant_of(actor)
+        if then is not None:
+            self._hub.gate.check_not_stopped()
+        self._runner.script(participant, text, more=False, speed=1.0)
+        self._runner.planner.then = then
+
+    def _participant_of(self, actor: Actor) -> Participant:
+        self._hub.gate.check_current(actor)
+        participant = self._hub.participant(actor.key)
+        if participant is None:
+            raise LeaseError("Open the start page to run programs.")
+        return participant
 
 
 TAB = "Programs"
@@ -102,7 +125,7 @@ class ProgramsPanel:
         self,
         server: viser.ViserServer,
         robot: Robot,
-        steering: Steering,
+        access: PanelAccess,
         scripts: Scripts,
         gestures: GestureGate,
         state: Callable[[], State],
@@ -112,7 +135,7 @@ class ProgramsPanel:
 
         ``state`` returns the newest state, and ``session`` the rules of the arm.
         """
-        self._steering = steering
+        self._access = access
         self._scripts = scripts
         self._gestures = gestures
         self._state = state
@@ -159,7 +182,7 @@ class ProgramsPanel:
 
     def follow(self) -> None:
         """Update the display of the program's progress, and the list of scripts."""
-        progress = self._steering.progress
+        progress = self._access.progress
         self._follow_choice(progress)
         edit = _edit_button(self._choice.value) if self._choice.value in self._names else ""
         if edit != self._edit.content:
@@ -185,7 +208,7 @@ class ProgramsPanel:
 
     def _follow_choice(self, progress: Progress | None) -> None:
         """Choose the script that was sent last, by anybody, and keep it while it is used."""
-        sent, is_new = self._steering.text, False
+        sent, is_new = self._access.text, False
         in_use = progress is not None and progress.status in (*RUNS, "planning")
         if sent != self._sent and progress is not None and (progress.name or not in_use):
             names = (self._choice.value, *self._names)
@@ -204,7 +227,7 @@ class ProgramsPanel:
 
     def _follow_program(self) -> None:
         is_chosen = self._sent_name in ("", self._choice.value)
-        program = self._steering.program if is_chosen else None
+        program = self._access.program if is_chosen else None
         if program is not self._drawn:
             self._drawn = program
             self._draw(program)
@@ -241,20 +264,20 @@ class ProgramsPanel:
 
     def _order(self, actor: Actor) -> None:
         button = self._orders.value
-        progress = self._steering.progress
+        progress = self._access.progress
         status = "" if progress is None else progress.status
         if button != "Preview" and status in RUNS:
-            self._steering.steer(ORDERS[button], actor)
+            self._access.steer(ORDERS[button], actor)
             return
         name = self._choice.value
         text = self._scripts.text(name) if name in self._names else self._sent
-        if button != "Preview" and status == "planning" and text == self._steering.text:
+        if button != "Preview" and status == "planning" and text == self._access.text:
             # This script is being planned for a preview; it runs once it is planned.
-            self._steering.steer(ORDERS[button], actor)
+            self._access.steer(ORDERS[button], actor)
             return
         with self._order_lock:
             self._with_ghosts = button == "Preview"
-            self._steering.plan(text, ORDERS.get(button), actor)
+            self._access.plan(text, ORDERS.get(button), actor)
             # If the plan of this script was kept, `follow` draws it again.
             self._drawn = None
             self._draw(None)
