@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from katana450.arm.control import commands as cmd
-from katana450.errors import LeaseError
+from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.continuation import Interruption, continued
 from katana450.extensions.programs.plan_builder import PlanContext
 from katana450.extensions.programs.program import Program, compiled
@@ -13,7 +13,7 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.server.idle_planner import IdlePlanner
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.server.script_parts import ScriptParts
+from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
@@ -39,7 +39,8 @@ class ProgramPlanner:
         self.then: ProgramOrder | None = None
         self._hub = hub
         self._owner = owner
-        self._parts = ScriptParts()
+        # The parts of the incomplete script of each sender.
+        self._parts: dict[str, str] = {}
         self._idly = idly
         self._idle: IdlePlanner | None = None
         # Name of the script that the breakpoints belong to, and the indices of their steps.
@@ -63,8 +64,11 @@ class ProgramPlanner:
         while another program is planned, and InputError for too long a script.
         """
         check_may_drive(participant.person)
-        script = self._parts.add(participant.person.key, text, more=more)
-        if script is None:
+        script = self._parts.pop(participant.person.key, "") + text
+        if len(script.encode()) > MAX_BYTES:
+            raise InputError(f"A script has at most {MAX_BYTES // 1024} KB.")
+        if more:
+            self._parts[participant.person.key] = script
             return False
         arm = self._hub.present()
         self.check_at_rest()
@@ -145,7 +149,7 @@ class ProgramPlanner:
 
     def forget_parts(self, participant: Participant) -> None:
         """Forget the parts of an incomplete script of ``participant``."""
-        self._parts.forget(participant.person.key)
+        self._parts.pop(participant.person.key, None)
 
     def check_free(self, participant: Participant) -> None:
         """Raise LeaseError unless the arm rests, and take the lease for ``participant``.
