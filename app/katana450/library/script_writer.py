@@ -2,26 +2,57 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
+import numpy as np
 import yaml
 
 from katana450.errors import InputError
 from katana450.extensions.programs.attached_files import attached
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import files_in
-from katana450.library.script_values import (
-    Number,
-    Place,
-    Point,
-    given,
-    object_value,
-    place_value,
-    plain,
-)
+from katana450.maths.geometry.arrays import FloatArray
+
+Number = float | str
+"""A number in the unit of its place (mm, deg, s, ml), or a text with a unit, such as "4 cm"."""
+
+Point = Sequence[Number] | FloatArray | Mapping[str, Number] | str
+"""A point: three numbers, {x, y, z}, or the name of a pose."""
+
+Place = Mapping[str, Any] | str
+"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, yaw, branch}."""
+
+
+class OrientationOptions(TypedDict, total=False):
+    """The orientation of the tool [deg]; what is absent stays."""
+
+    pitch: Number | None
+    roll: Number | None
+    yaw: Number | None
+
+
+class PlaceOptions(OrientationOptions, total=False):
+    """The orientation of the tool, and the branch of the arm, such as "front-up"."""
+
+    branch: str | None
+
+
+class PathOptions(OrientationOptions, total=False):
+    """The orientation of the tool at the end of a path, and its speed along it [mm/s]."""
+
+    feed: Number | None
+
+
+class GraspOptions(TypedDict, total=False):
+    """Side of a grasp, "front" or "above", its pitch [deg] and its height [mm]."""
+
+    side: str | None
+    pitch: Number | None
+    height: Number | None
 
 
 class ScriptWriter:
@@ -73,13 +104,10 @@ class ScriptWriter:
         at: Point | None = None,
         *,
         joints: Sequence[Number] | None = None,
-        pitch: Number | None = None,
-        roll: Number | None = None,
-        yaw: Number | None = None,
-        branch: str | None = None,
+        **how: Unpack[PlaceOptions],
     ) -> str:
         """Name a place, by a point or by five joint angles, and return its name."""
-        self._poses[name] = place_value(at, joints, pitch, roll, branch, yaw)
+        self._poses[name] = place_value(at, how, joints)
         return name
 
     def expect(
@@ -96,14 +124,14 @@ class ScriptWriter:
         """
         with self._block() as inside:
             yield
-        self._add("repeat", {"times": times, **given(until=until), "steps": inside})
+        self._add("repeat", times=times, until=until, steps=inside)
 
     @contextmanager
     def when(self, **condition: Any) -> Iterator[None]:
         """Do the steps of the block if a condition holds when it is reached: ``held="cup"``."""
         with self._block() as inside:
             yield
-        self._add("if", {**condition, "then": inside})
+        self._add("if", **condition, then=inside)
 
     @contextmanager
     def otherwise(self) -> Iterator[None]:
@@ -134,52 +162,37 @@ class ScriptWriter:
 
     def joints(self, *angles: Number) -> None:
         """Move to five joint angles [deg], round obstacles."""
-        self._add("joints", list(angles))
+        self._add("joints", "q", q=angles)
 
     def nudge(self, axis: int, by: Number) -> None:
         """Turn the joint ``axis``, 1 to 5, by an angle [deg]."""
-        self._add("nudge", {"axis": axis, "by": by})
+        self._add("nudge", axis=axis, by=by)
 
     def move(
-        self,
-        to: Point | None = None,
-        *,
-        by: Point | None = None,
-        pitch: Number | None = None,
-        roll: Number | None = None,
-        yaw: Number | None = None,
-        branch: str | None = None,
+        self, to: Point | None = None, *, by: Point | None = None, **how: Unpack[PlaceOptions]
     ) -> None:
         """Move to a pose or a point [mm], or by an offset [mm], on any path round obstacles."""
-        if isinstance(to, str) and (by, pitch, roll, yaw, branch) == (None,) * 5:
-            self._add("move", to)
-        elif by is not None and to is None:
-            self._add("move", {"by": by, **given(pitch=pitch, roll=roll, yaw=yaw, branch=branch)})
-        elif by is None:
-            self._add("move", place_value(to, None, pitch, roll, branch, yaw))
-        else:
+        if to is not None and by is not None:
             raise InputError("A move takes `to` or `by`, not both.")
+        if by is not None:
+            self._add("move", by=by, **how)
+        else:
+            is_name = isinstance(to, str) and not how
+            self._add("move", "to", to=to if is_name else place_value(to, how))
 
     def via(self, *places: Place, blend: float | None = None) -> None:
         """Move the joints through places with rounded corners."""
-        self._add("via", {"through": list(places), **given(blend=blend)})
+        self._add("via", through=places, blend=blend)
 
     def line(
-        self,
-        to: Point | None = None,
-        *,
-        by: Point | None = None,
-        pitch: Number | None = None,
-        roll: Number | None = None,
-        yaw: Number | None = None,
-        feed: Number | None = None,
+        self, to: Point | None = None, *, by: Point | None = None, **how: Unpack[PathOptions]
     ) -> None:
         """Move the tool point on a straight line, to a point or by an offset [mm]."""
-        self._add("line", given(to=to, by=by, pitch=pitch, roll=roll, yaw=yaw, feed=feed))
+        self._add("line", to=to, by=by, **how)
 
     def lines(self, *places: Place, blend: float | None = None, feed: Number | None = None) -> None:
         """Move the tool point on straight lines through places with rounded corners."""
-        self._add("lines", {"through": list(places), **given(blend=blend, feed=feed)})
+        self._add("lines", through=places, blend=blend, feed=feed)
 
     def arc(
         self,
@@ -188,34 +201,25 @@ class ScriptWriter:
         angle: Number,
         *,
         climb: Number | None = None,
-        pitch: Number | None = None,
-        roll: Number | None = None,
-        yaw: Number | None = None,
-        feed: Number | None = None,
+        **how: Unpack[PathOptions],
     ) -> None:
         """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
-        value = {"centre": centre, "axis": axis, "angle": angle}
-        self._add(
-            "arc", {**value, **given(climb=climb, pitch=pitch, roll=roll, yaw=yaw, feed=feed)}
-        )
+        self._add("arc", centre=centre, axis=axis, angle=angle, climb=climb, **how)
 
-    def circle(  # noqa: PLR0913 - the fields of the step
+    def circle(
         self,
         centre: Point,
         normal: str | Sequence[float],
         radius: Number,
         *,
         turns: Number | None = None,
-        pitch: Number | None = None,
-        roll: Number | None = None,
-        yaw: Number | None = None,
         branch: str | None = None,
-        feed: Number | None = None,
+        **how: Unpack[PathOptions],
     ) -> None:
         """Move to the highest point of a circle [mm], then round it."""
-        value = {"centre": centre, "normal": normal, "radius": radius}
-        more = given(turns=turns, pitch=pitch, roll=roll, yaw=yaw, branch=branch, feed=feed)
-        self._add("circle", {**value, **more})
+        self._add(
+            "circle", centre=centre, normal=normal, radius=radius, turns=turns, branch=branch, **how
+        )
 
     def screw(
         self,
@@ -226,7 +230,7 @@ class ScriptWriter:
         climb: Number | None = None,
     ) -> None:
         """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
-        self._add("screw", {"point": point, "axis": axis, **given(angle=angle, climb=climb)})
+        self._add("screw", point=point, axis=axis, angle=angle, climb=climb)
 
     def trajectory(
         self, times: Sequence[Number] | str, postures: Sequence[Sequence[Number]] = ()
@@ -236,84 +240,70 @@ class ScriptWriter:
         ``times`` may be the name of a .csv file beside the script instead, with both.
         """
         if isinstance(times, str):
-            self._add("trajectory", {"file": times})
-            return
-        rows = zip(times, postures, strict=True)
-        self._add("trajectory", {"through": [[time, *angles] for time, angles in rows]})
+            self._add("trajectory", file=times)
+        else:
+            rows = zip(times, postures, strict=True)
+            self._add("trajectory", through=[[time, *angles] for time, angles in rows])
 
-    def gripper(self, where: Number, *, holding: str | None = None) -> None:
+    def gripper(self, to: Number, *, holding: str | None = None) -> None:
         """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide.
 
         With ``holding`` they must hold this object then.
         """
-        self._add("gripper", where if holding is None else {"to": where, "holding": holding})
+        self._add("gripper", "to", to=to, holding=holding)
 
     def grip(self, until: Number, *, holding: str | None = None) -> None:
         """Close the fingers until they press with a force [N].
 
         With ``holding`` they must hold this object then.
         """
-        self._add("grip", {"until": until, **given(holding=holding)})
+        self._add("grip", until=until, holding=holding)
 
     def wait(self, seconds: Number) -> None:
         """Wait [s]."""
-        self._add("wait", seconds)
+        self._add("wait", "seconds", seconds=seconds)
 
     def wait_for(self, *, timeout: Number | None = None, **condition: Any) -> None:
         """Wait until a condition holds, such as ``held="cup"``; see docs/programs.md."""
-        self._add("wait_for", {**condition, **given(timeout=timeout)})
+        self._add("wait_for", **condition, timeout=timeout)
 
     def tool(self, name: str) -> None:
         """Use another tool frame for all later points."""
-        self._add("tool", name)
+        self._add("tool", "name", name=name)
 
     def speed(self, fraction: Number) -> None:
         """Limit all later motions to a fraction of full speed."""
-        self._add("speed", fraction)
+        self._add("speed", "value", value=fraction)
 
     def put(self, name: str, x: Number, y: Number) -> None:
         """Set an object to another place on the table [mm], without the arm."""
-        self._add("put", {"object": name, "x": x, "y": y})
+        self._add("put", object=name, x=x, y=y)
 
     def fill(self, ml: Number) -> None:
         """Fill the cup with water [ml]."""
-        self._add("fill", ml)
+        self._add("fill", "ml", ml=ml)
 
-    def grasp(
-        self,
-        name: str,
-        *,
-        side: str | None = None,
-        pitch: Number | None = None,
-        height: Number | None = None,
-    ) -> None:
+    def grasp(self, name: str, **how: Unpack[GraspOptions]) -> None:
         """Grasp an object where it stands, from the "front" or from "above".
 
         Side, pitch [deg] and height [mm] are found unless given.
         """
-        self._add("grasp", object_value(name, side=side, pitch=pitch, height=height))
+        self._add("grasp", "object", object=name, **how)
 
-    def pick(
-        self,
-        name: str,
-        *,
-        side: str | None = None,
-        pitch: Number | None = None,
-        height: Number | None = None,
-    ) -> None:
+    def pick(self, name: str, **how: Unpack[GraspOptions]) -> None:
         """Grasp an object as ``grasp`` does, and lift it."""
-        self._add("pick", object_value(name, side=side, pitch=pitch, height=height))
+        self._add("pick", "object", object=name, **how)
 
     def place(self, at: Point | None = None, *, on: str | None = None) -> None:
         """Put the held object down, upright, at a place, or on another object.
 
         The place is x, y and, if wanted, z [mm] of its underside and its yaw [deg].
         """
-        self._add("place", given(at=at, on=on))
+        self._add("place", at=at, on=on)
 
     def stack(self, name: str, *, on: str) -> None:
         """Pick an object and place it on the middle of another."""
-        self._add("stack", {"object": name, "on": on})
+        self._add("stack", object=name, on=on)
 
     def release(self) -> None:
         """Open the fingers on the held object where it is."""
@@ -328,8 +318,7 @@ class ScriptWriter:
         rate: Number | None = None,
     ) -> None:
         """Pour the cup in the hand into an object: all of it or some [ml], at a rate [ml/s]."""
-        more = given(ml=ml, shake=shake, rate=rate)
-        self._add("pour", {"into": into, **more} if more else into)
+        self._add("pour", "into", into=into, ml=ml, shake=shake, rate=rate)
 
     def set_down(self) -> None:
         """Put the held object back to where it was grasped."""
@@ -337,10 +326,15 @@ class ScriptWriter:
 
     def call(self, name: str, **parameters: Any) -> None:
         """Do the steps of a definition of an included file, with other values of parameters."""
-        self._add("call", {"name": name, "with": parameters} if parameters else name)
+        self._add("call", "name", name=name, **({"with": parameters} if parameters else {}))
 
-    def _add(self, name: str, value: Any) -> None:
-        self._steps.append({name: plain(value)})
+    def _add(self, step: str, short: str = "", /, **fields: Any) -> None:
+        """Append a step with those fields that are not None.
+
+        ``short``: the field that is the value of the step if no other one is given.
+        """
+        value = given(**fields)
+        self._steps.append({step: plain(value[short] if [*value] == [short] else value)})
 
 
 @contextmanager
@@ -394,3 +388,37 @@ def program(
     script = ScriptWriter({**head, "speed": plain(speed)})
     yield script
     script.check()
+
+
+def given(**values: Any) -> dict[str, Any]:
+    """Return the values that are not None."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def place_value(
+    at: Point | None, how: PlaceOptions, joints: Sequence[Number] | None = None
+) -> dict[str, Any]:
+    """Return a place as a mapping. Raises InputError for a point that is none."""
+    angles = given(**how)
+    if joints is not None:
+        return {"joints": plain(list(joints)), **angles}
+    point = plain(at)
+    if isinstance(point, list) and len(point) == 3:
+        point = dict(zip("xyz", point, strict=True))
+    if not isinstance(point, dict):
+        raise InputError(f"A place needs three numbers x, y and z, not {at!r}.")
+    return {**point, **angles}
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` as YAML writes it; numbers of numpy become those of Python."""
+    match value:
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
+        case Mapping():
+            return {str(name): plain(each) for name, each in value.items()}
+        case list() | tuple():
+            return [plain(each) for each in value]
+        case float() if not math.isfinite(value):
+            raise InputError(f"A number of a script must be finite, not {value}.")
+    return value
