@@ -10,6 +10,7 @@ from katana450.extensions.programs.pick import Pick
 from katana450.extensions.programs.script import Script, parse
 from katana450.extensions.programs.settings_steps import TimedPause
 from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_moves import Line
 
 HEAD = """\
@@ -31,9 +32,10 @@ def test_names_and_units_stand_wherever_a_number_stands() -> None:
     script = parse(f"{HEAD}steps:\n  - move: start\n  - line: {{by: [0, half, -1 cm]}}\n")
     move, line = (each.step for each in script.steps)
     assert isinstance(move, Move)
-    assert move.place.position is not None
-    assert move.place.position.tolist() == pytest.approx([0.3, -0.02, 0.24])
-    assert move.place.angles.pitch == pytest.approx(0.5)
+    assert isinstance(move.to, StepTarget)
+    assert move.to.position is not None
+    assert move.to.position.tolist() == pytest.approx([0.3, -0.02, 0.24])
+    assert move.to.angles.pitch == pytest.approx(0.5)
     assert isinstance(line, Line)
     assert line.by is not None
     assert line.by.tolist() == pytest.approx([0.0, 0.02, -0.01])
@@ -44,9 +46,11 @@ def test_name_of_a_point_stands_wherever_a_point_stands() -> None:
     move, line = (each.step for each in script.steps)
     assert isinstance(move, Move)
     assert isinstance(line, Line)
-    assert move.place.position is not None
+    assert isinstance(move.to, StepTarget)
+    assert move.to.position is not None
     assert line.to is not None
-    assert move.place.position.tolist() == line.to.tolist()
+    assert line.to.position is not None
+    assert move.to.position.tolist() == line.to.position.tolist()
 
 
 def test_index_counts_from_0_in_nested_loops() -> None:

@@ -11,7 +11,6 @@ from katana450.errors import CancelledError, InputError
 from katana450.extensions.programs.actions import PutObject
 from katana450.extensions.programs.compiler import FINDING, TIMING, Compiler, PlanningStage
 from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
-from katana450.extensions.programs.planned_steps import PlannedStep
 from katana450.extensions.programs.pour import PourDemo
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
@@ -159,9 +158,7 @@ def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
 @pytest.mark.usefixtures("untimed")
 def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
     builder, found = layout(stage, PourDemo(basin=NEAR).text)
-    names = [
-        name for step in found.all() if isinstance(step, PlannedStep) for name, _ in step.actions
-    ]
+    names = [task.name for task in found.tasks()]
     # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1
@@ -172,12 +169,12 @@ def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: St
 def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
     with pytest.raises(InputError, match="cannot be emptied into basin") as refused:
-        layout(stage, text)[1].all()
+        layout(stage, text)[1].tasks()
     assert "other pitch" not in str(refused.value)
 
 
 @pytest.mark.usefixtures("untimed")
 def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
     with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:
-        layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].all()
+        layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].tasks()
     assert "with a pitch of 30.0 deg" in str(refused.value)

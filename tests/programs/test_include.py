@@ -22,6 +22,7 @@ from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import Scripts, files_in, script_text
 from katana450.extensions.programs.settings_steps import TimedPause
 from katana450.extensions.programs.source import Problem, ScriptError, read
+from katana450.extensions.programs.step_target import StepTarget
 from tests.programs.conftest import Stage
 
 PARTS = """\
@@ -70,8 +71,9 @@ def test_names_of_a_file_are_known() -> None:
     assert text.splitlines()[1].endswith("   # the library")
     move, first, second = parse(text).steps
     assert isinstance(move.step, Move)
-    assert move.step.place.position is not None
-    assert move.step.place.position.tolist() == [0.32, 0.0, 0.15]
+    assert isinstance(move.step.to, StepTarget)
+    assert move.step.to.position is not None
+    assert move.step.to.position.tolist() == [0.32, 0.0, 0.15]
     assert (first.step, second.step) == (TimedPause(2.0), TimedPause(3.0))
     # A step has its place in the file, and the line of the script that calls it.
     assert (first.file, first.line, first.script_line) == ("parts.yaml", 10, 5)

@@ -249,7 +249,7 @@ def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("step", "message"),
     [
-        ("place: {}", "`place` needs `at` or `on`"),
+        ("place: {}", "A place step needs `at` or `on`"),
         ("place: {on: a, at: {x: 1, y: 2, z: 3}}", "either `on` or the height z"),
         ("place: {at: {x: 1}}", "The place of an object needs 'y'"),
         ("place: a", "A place step must be a mapping"),

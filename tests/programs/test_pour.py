@@ -10,7 +10,7 @@ import pytest
 
 import katana450.extensions.programs
 from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.motion_measures import score
+from katana450.extensions.programs.measures import score
 from katana450.extensions.programs.pour import PourDemo, Spot
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program, compiled

@@ -34,7 +34,7 @@ def refusal(builder: PlanBuilder, frame: str, p: tuple[float, ...], pitch: float
     builder.frame = ScriptFrame.of(T, in_base=script.in_base)
     try:
         # Only whether it can be reached; the way there is not planned.
-        builder.joints_at(step.step.place)  # type: ignore[union-attr]
+        builder.joints_at(step.step.to)  # type: ignore[union-attr]
     except InputError as error:
         return str(error)
     return ""

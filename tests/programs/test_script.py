@@ -12,6 +12,7 @@ from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.moves import Move
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
+from katana450.extensions.programs.step_target import StepTarget
 from katana450.extensions.programs.tool_moves import Circle, Line
 
 GOOD = """\
@@ -41,15 +42,16 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
     assert len(script.steps) == 1 + 2 + 3 * 2 + 1
     move, line, circle = (script.steps[i].step for i in (2, 3, -1))
     assert isinstance(move, Move)
-    assert move.place.position is not None
-    assert move.place.position.tolist() == [0.3, 0.0, 0.2]
-    assert move.place.angles.pitch == math.radians(45.0)
-    assert move.place.in_base
+    assert isinstance(move.to, StepTarget)
+    assert move.to.position is not None
+    assert move.to.position.tolist() == [0.3, 0.0, 0.2]
+    assert move.to.angles.pitch == math.radians(45.0)
+    assert move.to.in_base
     assert isinstance(line, Line)
     assert line.by is not None
     assert line.by.tolist() == [0.0, 0.0, -0.05]
     assert isinstance(circle, Circle)
-    assert circle.turn.axis.tolist() == [-1.0, 0.0, 0.0]
+    assert circle.axis.tolist() == [-1.0, 0.0, 0.0]
     assert [placed.line for placed in script.steps[1:4]] == [10, 11, 15]
 
 

@@ -13,13 +13,12 @@ from jsonschema import Draft202012Validator
 from docs.script_schema import FILE, content
 from katana450.extensions.programs.blocks import BLOCKS
 from katana450.extensions.programs.circle import CircleDemo
+from katana450.extensions.programs.declaration import Schema
 from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.schema_parts import Schema
 from katana450.extensions.programs.script import parse
 from katana450.extensions.programs.script_files import script_text
 from katana450.extensions.programs.script_schema import (
     STEP_VALUES,
-    TOP,
     WITHOUT_VALUE,
     script_schema,
 )
@@ -87,8 +86,8 @@ def test_schema_accepts_every_script_of_the_project(name: str) -> None:
 
 
 def test_schema_has_every_field_of_a_script_and_every_step() -> None:
-    assert known_fields("zzz: 1\nsteps: [home]") == set(TOP)
-    assert set(STEP_VALUES) == {*STEPS, *BLOCKS}
+    assert known_fields("zzz: 1\nsteps: [home]") == set(script_schema()["properties"])
+    assert set(STEP_VALUES) == {*STEPS, *BLOCKS, "stack"}
     for name in WITHOUT_VALUE:
         parse(f"steps: [{name}]")
 

@@ -102,7 +102,7 @@ def test_simulation_takes_conditions_for_true(stage: Stage) -> None:
         ("{held: cup, gripper: {at_most: 1}}", "exactly one"),
         ("{hold: cup}", "did you mean 'held'"),
         ("{held: cup, timeout: 0}", "not between"),
-        ("{volume: {of: cup}}", "A volume needs `at_least`, `at_most` or both"),
+        ("{volume: {of: cup}}", "A volume needs `at_least` or `at_most`"),
         ("{joint: {axis: 33, at_most: 3}}", "not between 1 and 32"),
         ("{placed: {object: cup}}", "needs 'at'"),
         ("held", "mapping of names to values"),

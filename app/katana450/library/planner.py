@@ -14,8 +14,8 @@ from katana450.arm.control.session import Session
 from katana450.errors import InputError
 from katana450.extensions.programs.places import ROOMIEST
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
-from katana450.extensions.programs.step_target import Angles
-from katana450.extensions.programs.tool_moves import ArcGeometry, Circle, Line
+from katana450.extensions.programs.step_target import Angles, StepTarget
+from katana450.extensions.programs.tool_moves import Circle, Line
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
 from katana450.maths.kinematics.branch import AnyBranch
@@ -68,11 +68,15 @@ class Planner:
         """Plan a straight line of the tool point."""
         if to is not None and by is not None:
             raise InputError("Give a line either `to`, its end, or `by`, its length and direction.")
+        in_base, end = self.frame.in_base, None
+        if to is not None:
+            position = finite_array(to, (3,), "The end of the line")
+            end = StepTarget(position=position, in_base=in_base)
         step = Line(
-            None if to is None else finite_array(to, (3,), "The end of the line"),
+            end,
             None if by is None else finite_array(by, (3,), "The vector `by` of the line"),
             _checked(angles),
-            self.frame.in_base,
+            in_base=in_base,
         )
         builder = self._builder(start)
         step.build(builder)
@@ -102,15 +106,20 @@ class Planner:
                 f"The number of turns is {count:g}; it must be at most {MAX_TURNS:g} and not 0."
             )
         is_roomiest = angles[0] == ROOMIEST
-        arc = ArcGeometry(
-            finite_array(centre, (3,), "The centre of the circle"),
-            axis / length,
-            _checked((None, *angles[1:]) if is_roomiest else angles),
-            self.frame.in_base,
-            is_roomiest,
+        pitch, roll, yaw = _checked((None, *angles[1:]) if is_roomiest else angles)
+        circle = Circle(
+            centre=finite_array(centre, (3,), "The centre of the circle"),
+            axis=axis / length,
+            pitch=ROOMIEST if is_roomiest else pitch,
+            roll=roll,
+            yaw=yaw,
+            in_base=self.frame.in_base,
+            radius=size,
+            turns=count,
+            branch=branch,
         )
         builder = self._builder(start)
-        Circle(arc, size, count, branch).build(builder)
+        circle.build(builder)
         if start is None:
             del builder.actions[:-1]
         return _timed(builder)

@@ -245,12 +245,12 @@ class ScriptWriter:
             rows = zip(times, postures, strict=True)
             self._add("trajectory", through=[[time, *angles] for time, angles in rows])
 
-    def gripper(self, to: Number, *, holding: str | None = None) -> None:
+    def gripper(self, where: Number, *, holding: str | None = None) -> None:
         """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide.
 
         With ``holding`` they must hold this object then.
         """
-        self._add("gripper", "to", to=to, holding=holding)
+        self._add("gripper", "to", to=where, holding=holding)
 
     def grip(self, until: Number, *, holding: str | None = None) -> None:
         """Close the fingers until they press with a force [N].

@@ -22,8 +22,7 @@ from katana450.extensions.importers.archive import (
 from katana450.extensions.importers.mesh_file import content_of, read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
 from katana450.extensions.programs.attached_files import attached
-from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft
-from katana450.extensions.programs.scene_reader import parsed
+from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft, parsed
 from katana450.extensions.programs.script import is_script, parse
 from katana450.extensions.programs.script_files import files_in
 from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
@@ -140,7 +139,7 @@ def _stored(
     draft: SceneDraft, opened: Callable[[str, int], bytes], T_palm_tool: FloatArray | None
 ) -> StoredScene:
     mesh_files = {
-        entry.mesh: entry.at for entry in reversed(draft.entries) if entry.mesh is not None
+        entry.mesh: entry.source for entry in reversed(draft.entries) if entry.mesh is not None
     }
     meshes: dict[MeshFile, Mesh] = {}
     problems: list[Problem] = []

@@ -16,7 +16,7 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.actions import FollowPlan, Task
 from katana450.extensions.programs.curves import ToolCoordinates
-from katana450.extensions.programs.motion_measures import motion_measures, water_measures
+from katana450.extensions.programs.measures import motion_measures, water_measures
 from katana450.extensions.programs.pose_path import PosePath
 from katana450.extensions.programs.pouring import POURING
 from katana450.extensions.programs.program import Program

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -19,27 +18,30 @@ ACTION_TIMEOUT = 10.0
 """[s] Timeout of a finger motion, and of an arm that is blocked."""
 
 
-class Action(Protocol):
-    """One action of a program. All methods are pure."""
+class Action:
+    """One action of a program; by default one that commands nothing and takes no time.
 
-    def commands(self, speed: float) -> tuple[cmd.Command, ...]:
+    All methods are pure.
+    """
+
+    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
         """Return the commands that start the action; ``speed`` is the program's fraction."""
-        ...
+        return ()
 
-    def done(self, state: State, waited: float) -> bool:
+    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return whether it is done, ``waited`` [s] after its start.
 
         Raises InputError if the action failed.
         """
-        ...
+        return True
 
-    def fraction(self, state: State, waited: float) -> float:
-        """Return the completed fraction, from 0 to 1."""
-        ...
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the completed fraction, from 0 to 1; 0 if it is not known."""
+        return 0.0
 
 
 @dataclass(frozen=True, eq=False)
-class FollowPlan:
+class FollowPlan(Action):
     """Follow ``plan`` to its end from ``tau`` [s] of it, 0 at its start.
 
     ``note``: a sentence on times of the script that the plan cannot keep; empty if it keeps them.
@@ -74,7 +76,7 @@ class FollowPlan:
 
 
 @dataclass(frozen=True)
-class MoveFingers:
+class MoveFingers(Action):
     """Drive the fingers to ``angle`` [rad].
 
     ``holding``: name of the object that they must hold then; "" if they may be empty. ``seconds``:
@@ -107,13 +109,9 @@ class MoveFingers:
             )
         return True
 
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return 1 when the fingers are at their goal, else 0."""
-        return float(state.gripper_setpoint == state.gripper_goal)
-
 
 @dataclass(frozen=True)
-class FillCup:
+class FillCup(Action):
     """Fill the cup with ``volume`` [m^3] of water."""
 
     volume: float
@@ -128,13 +126,9 @@ class FillCup:
             raise InputError("There is no cup to fill.")
         return True
 
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return 1: filling takes no time."""
-        return 1.0
-
 
 @dataclass(frozen=True, eq=False)
-class PutObject:
+class PutObject(Action):
     """Place ``scene_object`` at its pose."""
 
     scene_object: SceneObject
@@ -147,20 +141,12 @@ class PutObject:
         """Return whether an object has the requested pose."""
         return any(np.array_equal(each.T, self.scene_object.T) for each in state.objects)
 
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return 1: placing takes no time."""
-        return 1.0
-
 
 @dataclass(frozen=True)
-class Wait:
+class Wait(Action):
     """Wait for ``seconds`` [s] at rest."""
 
     seconds: float
-
-    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
-        """Return no command."""
-        return ()
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return whether the time has passed."""
@@ -172,7 +158,7 @@ class Wait:
 
 
 @dataclass(frozen=True)
-class UseTool:
+class UseTool(Action):
     """Use the tool frame ``name`` from now on."""
 
     name: str
@@ -185,13 +171,9 @@ class UseTool:
         """Return whether the tool frame is selected."""
         return state.tool == self.name
 
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return 1 when the tool frame is selected, else 0."""
-        return float(state.tool == self.name)
-
 
 @dataclass(frozen=True)
-class SetSpeed:
+class SetSpeed(Action):
     """Limit the speed to the fraction ``value`` of the program's speed."""
 
     value: float
@@ -203,14 +185,6 @@ class SetSpeed:
     def scale(self, speed: float) -> float:
         """Return the fraction of full speed for a program with the fraction ``speed``."""
         return max(self.value * speed, cmd.MIN_SPEED)
-
-    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
-        """Return True: the speed applies at once."""
-        return True
-
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return 1: the speed applies at once."""
-        return 1.0
 
 
 def expected_time(action: Action, speed: float) -> float:

@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 import yaml
 
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
+from katana450.extensions.programs.declaration import Kind
 from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.kinds import TEXT, any_of
 from katana450.extensions.programs.source import MAX_BYTES, ScriptError, YamlValue, composed
 
 INCLUDE, SCENE = "include", "scene"
@@ -82,6 +83,17 @@ def attached_file(value: YamlValue, suffix: str = YAML) -> AttachedFile:
     return AttachedFile(value.fields[0][0], names[0], texts)
 
 
+FILE = Kind(
+    lambda value, _: attached_file(value),
+    any_of(
+        "A file, or a mapping of its name to its text",
+        TEXT.schema,
+        {"type": "object", "additionalProperties": TEXT.schema, "minProperties": 1},
+    ),
+)
+"""A file of YAML."""
+
+
 def is_file_name(value: YamlValue) -> bool:
     """Return whether ``value`` looks like the name of a file that can be attached."""
     return value.kind == "text" and str(value.held).endswith((".yaml", ".yml"))
@@ -95,7 +107,7 @@ def _text(value: YamlValue) -> str:
 
 def _checked_name(value: YamlValue, suffix: str) -> str:
     """Return the name of a file in the folder of the script or below. Raises ScriptError."""
-    name = read.text(value)
+    name = TEXT(value)
     if not NAMES[suffix].fullmatch(name) or ".." in name.split("/") or not name.isprintable():
         raise value.wrong(
             f"{name!r} is not the name of a {suffix} file in the folder of the script or below."

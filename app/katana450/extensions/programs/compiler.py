@@ -6,8 +6,8 @@ each of them, until both are in the same situation, and then once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from katana450.arm.control.messages import part
 from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
-from katana450.extensions.programs.actions import Action, FollowPlan
+from katana450.extensions.programs.actions import Action, FollowPlan, Task
 from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.conditions import Condition, Held, ProgramTime
 from katana450.extensions.programs.hand_planning import difference
@@ -32,17 +32,12 @@ from katana450.extensions.programs.plan_builder import (
     PlanBuilder,
     UntimedPath,
 )
-from katana450.extensions.programs.planned_steps import (
-    Actions,
-    PlannedChoice,
-    PlannedStep,
-    PlannedSteps,
-)
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.settings_steps import Speed, Tool
 from katana450.extensions.programs.situation import Situation
 from katana450.extensions.programs.source import Problem, ScriptError
 from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.task_list import PlannedChoice, PlannedStep, task_list
 
 FINDING, TIMING = "finding paths", "timing paths"
 """The two phases of planning."""
@@ -108,33 +103,10 @@ class _Place(NamedTuple):
     copies: int
 
 
-@dataclass(frozen=True, eq=False)
-class _UntimedStep:
-    number: int
-    located: LocatedStep
-    compiled: CompiledStep
-    used: int = 1
-
-
-@dataclass(frozen=True, eq=False)
-class _UntimedChoice:
-    number: int
-    located: LocatedStep
-    condition: Condition | ProgramTime
-    predicted: bool | None
-    then: list[_Untimed]
-    otherwise: list[_Untimed]
-    used: int
-    ends: tuple[_Place, ...]
-
-
-_Untimed = _UntimedStep | _UntimedChoice
-
-
 class _Line(NamedTuple):
     """Steps that are planned one after another, and the different places where they end."""
 
-    steps: list[_Untimed]
+    steps: list[PlannedStep | PlannedChoice]
     ends: tuple[_Place, ...]
 
 
@@ -163,8 +135,8 @@ class Compiler:
         self._plans: dict[int, FollowPlan] = {}
         self._copies = 1
 
-    def all(self, first: int = 0) -> PlannedSteps:
-        """Return the planned steps from the index ``first``.
+    def tasks(self, first: int = 0) -> tuple[Task, ...]:
+        """Return the tasks from the step with the index ``first``.
 
         Of the steps before it only those are planned that choose the tool frame or the speed.
         Raises InputError if no step, or one inside an ``if``, has this index, and ScriptError with
@@ -177,9 +149,9 @@ class Compiler:
         ]
         if first and first not in (each.number for each in steps):
             raise InputError(self._no_beginning(first))
-        found = self._line(steps, len(steps))
+        line = self._line(steps, len(steps))
         # Paths are timed last, so that no time is spent on a script that is refused.
-        return self._timed(found.steps)
+        return task_list(line.steps, self._timed)
 
     def _no_beginning(self, first: int) -> str:
         """Return why the program cannot begin at the step with the index ``first``."""
@@ -191,7 +163,7 @@ class Compiler:
     def _line(self, steps: Sequence[NumberedStep], end: int) -> _Line:
         """Plan ``steps[:end]`` one after another, from the present place. Raises ScriptError."""
         builder = self._builder
-        found: list[_Untimed] = []
+        found: list[PlannedStep | PlannedChoice] = []
         # The index of the step that grasped the held object, and the place before that step.
         grasp: tuple[int, _Place] | None = None
         refused: Problem | None = None
@@ -199,7 +171,7 @@ class Compiler:
         while (index := sum(each.used for each in found)) < end:
             before = self._place
             try:
-                found.append(self._one(steps, index, end))
+                planned, ends = self._one(steps, index, end)
             except ScriptError as error:
                 self._return_to(before)
                 refused = refused or error.problems[0]
@@ -212,22 +184,24 @@ class Compiler:
                 grasp = None
                 del found[number:]
                 continue
-            last = found[-1]
-            if isinstance(last, _UntimedChoice) and len(last.ends) > 1:
-                # Its alternatives have all steps that follow.
-                return _Line(found, last.ends)
+            found.append(planned)
+            if len(ends) > 1:
+                # The alternatives of an `if` have all steps that follow.
+                return _Line(found, ends)
             if builder.taken is None:
                 grasp, refused, builder.given_up = None, None, ()
                 reasons.clear()
             elif builder.taken is not before.taken:
-                tried_again = builder.taken.chosen is not None and isinstance(last, _UntimedStep)
+                tried_again = builder.taken.chosen is not None and isinstance(planned, PlannedStep)
                 grasp = (len(found) - 1, before) if tried_again else None
         return _Line(found, (self._place,))
 
-    def _one(self, steps: Sequence[NumberedStep], index: int, end: int) -> _Untimed:
+    def _one(
+        self, steps: Sequence[NumberedStep], index: int, end: int
+    ) -> tuple[PlannedStep | PlannedChoice, tuple[_Place, ...]]:
         """Plan the step ``index`` of ``steps``; an ``if`` with those up to ``end`` that it needs.
 
-        Raises ScriptError.
+        The second value has the places where it ends. Raises ScriptError.
         """
         number, located = steps[index]
         self._report(PlanningStage(FINDING, number + 1, self._steps))
@@ -236,7 +210,7 @@ class Compiler:
         self._builder.ahead = [each.located.step for each in steps[index + 1 :]]
         compiled_step = self._step(located, located.step)
         _, self._builder.state, self._builder.taken = compiled_step
-        return _UntimedStep(number, located, compiled_step)
+        return PlannedStep(number, located, compiled_step.actions), (self._place,)
 
     def _choice(
         self,
@@ -244,7 +218,7 @@ class Compiler:
         located: LocatedStep,
         step: Conditional,
         rest: Sequence[NumberedStep],
-    ) -> _UntimedChoice:
+    ) -> tuple[PlannedChoice, tuple[_Place, ...]]:
         """Plan both alternatives of an ``if``, and steps of ``rest`` in each until they agree."""
         condition: Condition | ProgramTime = step.condition
         predicted = None
@@ -278,9 +252,8 @@ class Compiler:
                 break
         self._return_to(ends[0]._replace(copies=before.copies))
         then, otherwise = (line.steps for line in lines)
-        return _UntimedChoice(
-            number, located, condition, predicted, then, otherwise, 1 + used, ends
-        )
+        choice = PlannedChoice(number, located, condition, predicted, then, otherwise, 1 + used)
+        return choice, ends
 
     def _line_from(self, place: _Place, steps: Sequence[NumberedStep], end: int) -> _Line:
         """Plan ``steps[:end]`` from ``place``. Raises ScriptError."""
@@ -322,36 +295,19 @@ class Compiler:
             point, frame = (T[:3, :3] @ point + T[:3, 3]).tolist(), "the base frame"
         return PathError(error.text, point, frame, tuple(map(part, error.parts)))
 
-    def _timed(self, line: Sequence[_Untimed]) -> PlannedSteps:
-        """Return the steps of ``line`` with all paths timed."""
-        found: list[PlannedStep | PlannedChoice] = []
-        for each in line:
-            self._report(PlanningStage(TIMING, each.number + 1, self._steps))
-            if isinstance(each, _UntimedStep):
+    def _timed(self, step: PlannedStep) -> Iterator[tuple[str, Action]]:
+        """Yield the actions of ``step`` with all paths timed. Raises ScriptError."""
+        self._report(PlanningStage(TIMING, step.number + 1, self._steps))
+        for name, action in step.actions:
+            if not isinstance(action, UntimedPath):
+                yield name, action
+                continue
+            if id(action) not in self._plans:
                 try:
-                    actions = self._timed_actions(each.compiled)
-                except InputError as error:
-                    raise _at(each.located, error) from error
-                found.append(PlannedStep(each.number, each.located, actions))
-            else:
-                then, otherwise = self._timed(each.then), self._timed(each.otherwise)
-                found.append(
-                    PlannedChoice(
-                        each.number, each.located, each.condition, each.predicted, then, otherwise
-                    )
-                )
-        return tuple(found)
-
-    def _timed_actions(self, compiled_step: CompiledStep) -> Actions:
-        found: Actions = []
-        for name, action in compiled_step.actions:
-            if isinstance(action, UntimedPath):
-                if id(action) not in self._plans:
                     self._plans[id(action)] = action.timed()
-                found.append((name, self._plans[id(action)]))
-            else:
-                found.append((name, action))
-        return found
+                except InputError as error:
+                    raise _at(step.located, error) from error
+            yield name, self._plans[id(action)]
 
     def _error(self, refused: Problem, reasons: Set[Problem]) -> ScriptError:
         """Return the first refusal, with the other pitches of the grasp that have failed too.

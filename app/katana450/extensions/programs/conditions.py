@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Protocol, Self, TypeVar
+from typing import Annotated, Self
 
 import numpy as np
 
@@ -14,14 +14,22 @@ from katana450.arm.control.pouring import BASIN, CUP, is_vessel
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
-from katana450.extensions.programs import places
-from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.places import MAX_JOINTS
+from katana450.extensions.programs.declaration import Declared, Group, Kind, record
+from katana450.extensions.programs.kinds import (
+    FINGER_PLACE,
+    XYZ,
+    Axis,
+    Length,
+    Object,
+    ObjectName,
+    angle,
+    bound,
+    millimetres,
+    number,
+    one_of,
+)
+from katana450.extensions.programs.places import Point
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.scope import Scope
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.units import MILLILITRE
@@ -29,59 +37,52 @@ from katana450.maths.water.units import MILLILITRE
 MAX_TIME = 86_400.0
 """[s] Maximum time of a condition."""
 
+Millilitres = Annotated[float, number(0.0, 10_000.0, "ml")]
+JointBound = Annotated[float, angle(-720.0, 720.0)]
+FingerBound = Annotated[float, FINGER_PLACE]
+Seconds = Annotated[float, number(0.0, MAX_TIME, "s")]
 
-class ValueBounds(NamedTuple):
-    """Bounds of a measured value, both included."""
 
-    at_least: float = -math.inf
-    at_most: float = math.inf
+class Bounded(Declared):
+    """A condition on a value, which is within bounds, both included."""
 
-    @classmethod
-    def read(cls, fields: Fields, number: Callable[[YamlValue], float]) -> ValueBounds:
-        """Read ``at_least`` and ``at_most``, of which at least one is needed."""
-        found = cls(
-            fields.take("at_least", number, -math.inf), fields.take("at_most", number, math.inf)
-        )
-        if found == cls() and not fields.problems:
-            problem = f"{fields.what.capitalize()} needs `at_least`, `at_most` or both."
-            fields.problems += fields.value.wrong(problem).problems
-        return found
+    needs = ("at_least", "at_most")
 
-    def hold(self, value: float) -> bool:
+    at_least: float
+    at_most: float
+
+    def has(self, value: float) -> bool:
         """Return whether ``value`` is within the bounds."""
         return self.at_least <= value <= self.at_most
 
 
-class Condition(Protocol):
+class Condition(Declared):
     """A condition on the measured state of an arm and its surroundings."""
 
     @property
+    @abstractmethod
     def awaited(self) -> str:
         """Words for what is awaited, as in "wait for cup in the hand"."""
-        ...
 
-    def checked(self, builder: PlanBuilder) -> Condition:
+    @abstractmethod
+    def checked(self, builder: PlanBuilder) -> Self:
         """Return the condition for the arm of ``builder``.
 
         Raises InputError if it can never hold for that arm.
         """
-        ...
 
+    @abstractmethod
     def holds(self, state: State) -> bool:
         """Return whether it holds in ``state``."""
-        ...
 
 
 @dataclass(frozen=True)
-class Held:
-    """The fingers hold the object ``name``."""
+class Held(Condition):
+    """The fingers hold this object."""
 
-    name: str
+    short = "name"
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object. Raises ScriptError."""
-        return cls(read.text(value))
+    name: ObjectName
 
     @property
     def awaited(self) -> str:
@@ -100,26 +101,22 @@ class Held:
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """The object ``name`` stands within ``within`` [m] of the point ``at`` (3,) [m]."""
+class Placed(Condition):
+    """An object stands at a point.
 
-    name: str
-    at: FloatArray
-    within: float
-    in_base: bool
+    Attributes:
+        name: name of the object.
+        at: (3,) the point [m].
+        within: maximum distance from it [m].
+        in_base: whether it is in the base frame, not in {S}.
+    """
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {object, at, within}. Raises ScriptError."""
-        fields = Fields(value, "placed")
-        found = cls(
-            fields.need("object", read.text, ""),
-            fields.need("at", lambda each: places.point(each, setting), frozen(np.zeros(3))),
-            fields.take("within", read.millimetres(0.1, 1000.0), 0.01),
-            setting.in_base,
-        )
-        fields.done()
-        return found
+    noun = "placed"
+
+    name: Object
+    at: Point
+    within: Annotated[float, millimetres(0.1, 1000.0, "Distance, mm; 10 unless given")] = 0.01
+    in_base: bool = False
 
     @property
     def awaited(self) -> str:
@@ -143,20 +140,14 @@ class Placed:
 
 
 @dataclass(frozen=True)
-class Volume:
-    """The water in the basin or in a vessel is within ``bounds`` [ml]."""
+class Volume(Bounded, Condition):
+    """Water in the cup, the basin or another vessel, ml."""
 
-    of: str
-    bounds: ValueBounds
+    noun = "a volume"
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {of, at_least, at_most}. Raises ScriptError."""
-        fields = Fields(value, "a volume")
-        of = fields.need("of", read.text, CUP)
-        found = cls(of, ValueBounds.read(fields, read.number(0.0, 10_000.0, "ml")))
-        fields.done()
-        return found
+    of: ObjectName
+    at_least: Millilitres = -math.inf
+    at_most: Millilitres = math.inf
 
     @property
     def awaited(self) -> str:
@@ -180,24 +171,23 @@ class Volume:
         water, vessel = state.poured.water, state.poured.water.vessel(self.of)
         if vessel is None and self.of != BASIN:
             return False
-        return self.bounds.hold((water.basin if vessel is None else vessel.volume) / MILLILITRE)
+        return self.has((water.basin if vessel is None else vessel.volume) / MILLILITRE)
 
 
 @dataclass(frozen=True)
-class JointAngle:
-    """The angle of the joint ``axis``, from 0, is within ``bounds`` [rad]."""
+class JointAngle(Bounded, Condition):
+    """Angle of a joint, deg.
 
-    axis: int
-    bounds: ValueBounds
+    Attributes:
+        axis: index of the joint, from 0.
+        at_least, at_most: bounds [rad].
+    """
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {axis, at_least, at_most}. Raises ScriptError."""
-        fields = Fields(value, "a joint")
-        axis = fields.need("axis", read.whole(1, MAX_JOINTS), 1)
-        found = cls(axis - 1, ValueBounds.read(fields, read.angle(-720.0, 720.0)))
-        fields.done()
-        return found
+    noun = "a joint"
+
+    axis: Axis
+    at_least: JointBound = -math.inf
+    at_most: JointBound = math.inf
 
     @property
     def awaited(self) -> str:
@@ -210,7 +200,7 @@ class JointAngle:
         if self.axis >= chain.n:
             raise InputError(f"There is no axis {self.axis + 1}: the robot has {chain.n} axes.")
         lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
-        if self.bounds.at_least > upper or self.bounds.at_most < lower:
+        if self.at_least > upper or self.at_most < lower:
             raise InputError(
                 f"Axis {self.axis + 1} never gets there: its range is {math.degrees(lower):.1f} to "
                 f"{math.degrees(upper):.1f} deg."
@@ -219,19 +209,21 @@ class JointAngle:
 
     def holds(self, state: State) -> bool:
         """Return whether the angle is within the bounds."""
-        return self.bounds.hold(float(state.q[self.axis]))
+        return self.has(float(state.q[self.axis]))
 
 
 @dataclass(frozen=True)
-class FingerPlace:
-    """The place of the fingers is within ``bounds`` [deg or mm in a script, else rad or m]."""
+class FingerPlace(Bounded, Condition):
+    """Angle of the fingers, deg, or their place, mm, if they slide.
 
-    bounds: ValueBounds
+    Attributes:
+        at_least, at_most: bounds [deg or mm]; of a condition that is checked [rad or m].
+    """
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {at_least, at_most}. Raises ScriptError."""
-        return cls(_bounds(value, "a gripper", read.number(-180.0, 180.0, "deg or mm")))
+    noun = "a gripper"
+
+    at_least: FingerBound = -math.inf
+    at_most: FingerBound = math.inf
 
     @property
     def awaited(self) -> str:
@@ -244,40 +236,52 @@ class FingerPlace:
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         scale = 1e-3 if fingers.slides else math.radians(1.0)
-        return replace(self, bounds=ValueBounds(*(scale * each for each in self.bounds)))
+        return replace(self, at_least=scale * self.at_least, at_most=scale * self.at_most)
 
     def holds(self, state: State) -> bool:
         """Return whether the fingers are within the bounds."""
-        return self.bounds.hold(state.gripper)
+        return self.has(state.gripper)
+
+
+@dataclass(frozen=True)
+class CoordinateBounds(Bounded):
+    """Bounds of a coordinate [m]."""
+
+    noun = "a coordinate"
+
+    at_least: Length = -math.inf
+    at_most: Length = math.inf
+
+
+Coordinate = Annotated[CoordinateBounds | None, record(CoordinateBounds)]
 
 
 @dataclass(frozen=True, eq=False)
-class ToolPlace:
-    """Coordinates of the tool point are within ``bounds`` [m], in the frame of the script.
+class ToolPlace(Condition):
+    """Coordinates of the tool point, mm.
 
     Attributes:
-        bounds: the bounds by the names of the coordinates.
+        x, y, z: bounds of each, in the frame of the script; None for any.
         in_base: whether they are in the base frame, not in {S}.
         arm: the arm model, once it is known.
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
     """
 
-    bounds: Mapping[str, ValueBounds]
-    in_base: bool
+    noun = "a tool"
+    needs = XYZ
+
+    x: Coordinate = None
+    y: Coordinate = None
+    z: Coordinate = None
+    in_base: bool = False
     arm: ArmModel | None = None
     T_base_shoulder: FloatArray = field(default_factory=lambda: np.eye(4))
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read bounds of x, y and z. Raises ScriptError."""
-        fields = Fields(value, "a tool")
-        found = {name: fields.take(name, _length_bounds, None) for name in read.XYZ}
-        bounds = {name: each for name, each in found.items() if each is not None}
-        if not bounds and not fields.problems:
-            problem = "A tool needs bounds of `x`, `y` or `z`."
-            fields.problems += value.wrong(problem).problems
-        fields.done()
-        return cls(bounds, setting.in_base)
+    @property
+    def bounds(self) -> dict[str, CoordinateBounds]:
+        """The bounds by the names of their coordinates."""
+        bounds = {"x": self.x, "y": self.y, "z": self.z}
+        return {name: bound for name, bound in bounds.items() if bound is not None}
 
     @property
     def awaited(self) -> str:
@@ -295,32 +299,18 @@ class ToolPlace:
         p = forward(self.arm.chain_to(state.tool), state.q)[:3, 3]
         if self.in_base:
             p = self.T_base_shoulder[:3, :3] @ p + self.T_base_shoulder[:3, 3]
-        at = dict(zip(read.XYZ, p.tolist(), strict=True))
-        return all(bounds.hold(at[name]) for name, bounds in self.bounds.items())
-
-
-def _length_bounds(value: YamlValue) -> ValueBounds:
-    return _bounds(value, "a coordinate", read.millimetres())
-
-
-def _bounds(value: YamlValue, what: str, number: Callable[[YamlValue], float]) -> ValueBounds:
-    """Read a mapping with bounds alone; ``what`` names it in messages. Raises ScriptError."""
-    fields = Fields(value, what)
-    found = ValueBounds.read(fields, number)
-    fields.done()
-    return found
+        at = dict(zip(XYZ, p.tolist(), strict=True))
+        return all(bounds.has(at[name]) for name, bounds in self.bounds.items())
 
 
 @dataclass(frozen=True)
-class ProgramTime:
-    """The time since the program began, with pauses, is within ``bounds`` [s]."""
+class ProgramTime(Bounded):
+    """Time since the program began, with pauses, s."""
 
-    bounds: ValueBounds
+    noun = "a time"
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {at_least, at_most}. Raises ScriptError."""
-        return cls(_bounds(value, "a time", read.number(0.0, MAX_TIME, "s")))
+    at_least: Seconds = -math.inf
+    at_most: Seconds = math.inf
 
     @property
     def awaited(self) -> str:
@@ -328,54 +318,20 @@ class ProgramTime:
         return "the time"
 
 
-C_co = TypeVar("C_co", covariant=True)
-
-
-class ConditionReader(Protocol[C_co]):
-    """Reader of a condition."""
-
-    def __call__(self, value: YamlValue, setting: ScriptContext) -> C_co:
-        """Return the condition ``value``. Raises ScriptError."""
-        ...
-
-
-CONDITIONS: Mapping[str, ConditionReader[Condition]] = {
-    "held": Held.read,
-    "placed": Placed.read,
-    "volume": Volume.read,
-    "joint": JointAngle.read,
-    "gripper": FingerPlace.read,
-    "tool": ToolPlace.read,
+CONDITIONS: dict[str, Kind[Condition]] = {
+    "held": record(Held),
+    "placed": record(Placed),
+    "volume": record(Volume),
+    "joint": record(JointAngle),
+    "gripper": record(FingerPlace),
+    "tool": record(ToolPlace),
 }
-"""Readers of the conditions on the state, by their names in a script."""
+"""The conditions on the state, by their names in a script."""
 
-CHOICE_CONDITIONS: Mapping[str, ConditionReader[Condition | ProgramTime]] = {
-    **CONDITIONS,
-    "time": ProgramTime.read,
-}
-"""Readers of all conditions of an ``if``, by their names in a script."""
+CONDITION: Group[Condition | None] = one_of(CONDITIONS)
+"""One condition on the state."""
 
-
-def one_condition(
-    fields: Fields,
-    readers: Mapping[str, ConditionReader[C_co]],
-    setting: ScriptContext,
-    scope: Scope | None = None,
-) -> C_co | None:
-    """Return the only condition of ``readers`` that ``fields`` has; None after a mistake.
-
-    Names of ``scope`` may stand for values. Mistakes are added to the problems of ``fields``.
-    """
-
-    def condition(name: str) -> C_co | None:
-        def bound(value: YamlValue) -> C_co:
-            return readers[name](value if scope is None else scope.bound(value), setting)
-
-        return fields.take(name, bound, None)
-
-    found = [condition(name) for name in readers if fields.has(name)]
-    if len(found) == 1:
-        return found[0]
-    problem = f"{fields.what.capitalize()} needs exactly one of {', '.join(readers)}."
-    fields.problems += fields.value.wrong(problem).problems
-    return None
+Choice = Condition | ProgramTime
+CHOICES: dict[str, Kind[Choice]] = {**CONDITIONS, "time": record(ProgramTime)}
+CHOICE: Group[Choice | None] = one_of({name: bound(kind) for name, kind in CHOICES.items()})
+"""One condition of an ``if``, in which names may stand for values."""

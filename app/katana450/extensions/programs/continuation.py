@@ -11,11 +11,11 @@ from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.state import State
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.actions import FollowPlan, MoveFingers, Task, UseTool
-from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
 from katana450.extensions.programs.program import Program
 from katana450.extensions.programs.runner import Phase, Run
 from katana450.extensions.programs.situation import Situation
+from katana450.extensions.programs.task_list import ConditionalJump
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.plan import Plan

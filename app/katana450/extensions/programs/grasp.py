@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, NamedTuple, Self
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -14,24 +14,14 @@ from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers, UseTool
 from katana450.extensions.programs.approach import ABOVE, DOWN, FRONT, LOW, Approach
 from katana450.extensions.programs.carry import APPROACHES
 from katana450.extensions.programs.conditions import Held
-from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.finger_planning import with_fingers
+from katana450.extensions.programs.kinds import Object, angle, choice, millimetres
 from katana450.extensions.programs.located_step import Conditional
 from katana450.extensions.programs.plan_builder import GraspInfo, PlanBuilder
-from katana450.extensions.programs.schema_parts import (
-    OBJECT,
-    Schema,
-    any_of,
-    mapping,
-    number_or_text,
-)
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
@@ -82,20 +72,9 @@ class _Room:
     is_missed: bool = False
 
 
-def grasp_schema(about: str) -> Schema:
-    """Return the name of an object, or how to grasp it."""
-    how = {
-        "side": {"enum": [FRONT, ABOVE], "description": "Side of the tool; found unless given"},
-        "pitch": number_or_text(0.0, 90.0, "Pitch of the tool, deg; found unless given"),
-        "height": number_or_text(1.0, 500.0, "Height above the underside, mm; found unless given"),
-    }
-    fields = mapping("An object, and how to grasp it", "object", {"object": OBJECT, **how})
-    return any_of(about, OBJECT, fields)
-
-
 @dataclass(frozen=True)
-class Grasp:
-    """Grasp an object: open the fingers, approach it, close until both sides touch.
+class Grasp(Step, word="grasp"):
+    """Open, approach an object, and close the fingers on it.
 
     Attributes:
         name: name of the object.
@@ -104,27 +83,17 @@ class Grasp:
         height: above the underside of the object [m]; None for HEIGHT_FRACTIONS of its height.
     """
 
-    schema: ClassVar[Schema] = grasp_schema("Open, approach an object, and close the fingers on it")
+    short = "name"
 
-    name: str
-    side: str = ""
-    pitch: float | None = None
-    height: float | None = None
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {object, side, pitch, height}. Raises ScriptError."""
-        if value.kind == "text":
-            return cls(read.text(value))
-        fields = Fields(value, "a grasp")
-        found = cls(
-            fields.need("object", read.text, ""),
-            fields.take("side", read.choice(FRONT, ABOVE), ""),
-            fields.take("pitch", read.angle(0.0, 90.0), None),
-            fields.take("height", read.millimetres(1.0, 500.0), None),
-        )
-        fields.done()
-        return found
+    name: Object
+    side: Annotated[str, choice(FRONT, ABOVE).about("Side of the tool; found unless given")] = ""
+    pitch: Annotated[
+        float | None, angle(0.0, 90.0, "Pitch of the tool, deg; found unless given")
+    ] = None
+    height: Annotated[
+        float | None,
+        millimetres(1.0, 500.0, "Height above the underside, mm; found unless given"),
+    ] = None
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the grasp. Raises InputError if the object cannot be taken."""
@@ -378,7 +347,3 @@ def _smallest_distance(
     hand, world, fingers = builder.hand, builder.world, builder.state.gripper_setpoint
     distances = (least + np.arange(0.0, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP)).tolist()
     return builder.first(distances, joints_with_room)
-
-
-STEPS: dict[str, type[Step]] = {"grasp": Grasp}
-"""Program steps of this module, by their names in a script."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
-from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.finger_planning import with_fingers
+from katana450.extensions.programs.kinds import ObjectName, number
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import OBJECT, Schema, mapping, number_or_text
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.extensions.touch.touch_model import TouchModel
 
@@ -81,7 +77,7 @@ def _angle_for(force: float, model: TouchModel, state: State, gripper: GripperMo
 
 
 @dataclass(frozen=True)
-class GripUntil:
+class GripUntil(Step, word="grip"):
     """Close the fingers until they press with a force.
 
     Attributes:
@@ -89,26 +85,11 @@ class GripUntil:
         holding: name of the object that they must hold then; "" for any.
     """
 
-    schema: ClassVar[Schema] = mapping(
-        "Close the fingers until they press with a force",
-        "until",
-        {
-            "until": number_or_text(MIN_FORCE, MAX_FORCE, "Force of a finger, N, such as 3 N"),
-            "holding": OBJECT,
-        },
-    )
-
-    force: float
-    holding: str = ""
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {until, holding}. Raises ScriptError."""
-        fields = Fields(value, "a grip")
-        force = fields.need("until", read.number(MIN_FORCE, MAX_FORCE, "N"), MIN_FORCE)
-        holding = fields.take("holding", read.text, "")
-        fields.done()
-        return cls(force, holding)
+    force: Annotated[
+        float,
+        number(MIN_FORCE, MAX_FORCE, "N", "Force of a finger, N, such as 3 N").named("until"),
+    ]
+    holding: ObjectName = ""
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the motion of the fingers.
@@ -137,7 +118,3 @@ class GripUntil:
         action = CloseUntil(angle, closed.held.name, force=self.force, model=model, gripper=fingers)
         builder.state = closed
         builder.note(f"grip until {self.force:g} N", action, with_fingers(builder, angle))
-
-
-STEPS: dict[str, type[Step]] = {"grip": GripUntil}
-"""Steps of this module, by their names in a script."""

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any
 
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.approach import UP
-from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.grasp import Grasp, grasp_schema
+from katana450.extensions.programs.declaration import Declared
+from katana450.extensions.programs.grasp import Grasp
+from katana450.extensions.programs.kinds import Object, ObjectName
 from katana450.extensions.programs.place import PlaceHeld
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import Schema
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 
 LIFTS = (0.06, 0.04, 0.025, 0.015)
@@ -22,10 +20,8 @@ LIFTS = (0.06, 0.04, 0.025, 0.015)
 
 
 @dataclass(frozen=True)
-class Pick(Grasp):
+class Pick(Grasp, word="pick"):
     """Grasp an object, and lift it."""
-
-    schema: ClassVar[Schema] = grasp_schema("Grasp an object, and lift it")
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan grasp and lifting. Raises InputError if it is not possible."""
@@ -42,18 +38,23 @@ class Pick(Grasp):
             raise error.after(f"{self.name} cannot be lifted") from error
 
 
-def stacked(value: YamlValue, setting: ScriptContext) -> tuple[Step, Step]:
-    """Read {object, on}: the steps that pick an object and place it on another. Raises ScriptError.
+@dataclass(frozen=True)
+class Stack(Declared):
+    """Pick an object and place it on the middle of another."""
 
-    They are two steps, so that the object is picked in another way if it cannot be placed.
-    """
-    fields = Fields(value, "a stack")
-    name, on = (fields.need(each, read.text, "") for each in ("object", "on"))
-    fields.done()
-    if name == on:
-        raise value.wrong(f"{name} cannot stand on itself.")
-    return Pick(name), PlaceHeld(None, setting.in_base, on, None)
+    noun = "a stack"
 
+    name: Object
+    on: ObjectName
+    in_base: bool = False
 
-STEPS: dict[str, type[Step]] = {"pick": Pick}
-"""Steps of this module, by their names in a script."""
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of an object on itself."""
+        if given.get("name") is not None and given["name"] == given.get("on"):
+            yield "", f"{given['name']} cannot stand on itself."
+
+    @property
+    def steps(self) -> tuple[Step, Step]:
+        """Two steps, so that the object is picked in another way if it cannot be placed."""
+        return Pick(self.name), PlaceHeld(on=self.on, in_base=self.in_base)

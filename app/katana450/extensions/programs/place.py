@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,27 +13,14 @@ from katana450.arm.control.pouring import BASIN, is_vessel
 from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.arm.control.support import check_carried, is_over, surface_below
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.carry import APPROACHES, carry
-from katana450.extensions.programs.fields import Fields
 from katana450.extensions.programs.finger_planning import with_fingers
-from katana450.extensions.programs.places import point
+from katana450.extensions.programs.kinds import NAME
+from katana450.extensions.programs.places import SPOT, Spot
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import (
-    LENGTH,
-    OBJECT,
-    TEXT,
-    TURN,
-    Schema,
-    any_of,
-    mapping,
-    reference,
-)
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
-from katana450.extensions.programs.step import Step, nothing
+from katana450.extensions.programs.step import Step
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import DragTarget
@@ -49,61 +36,31 @@ CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
 """[m] Heights over its new place at which an object is brought there, tried from the highest."""
 
 
-@dataclass(frozen=True, eq=False)
-class PlaceHeld:
-    """Put the held object down somewhere, upright, and draw back.
+@dataclass(frozen=True)
+class PlaceHeld(Step, word="place"):
+    """Put the held object down, and draw back.
+
+    It stands upright then.
 
     Attributes:
-        at: (3,) its place [m]; the last number, the height of its underside, is NaN for that of
-            whatever is below. None for the middle of ``on``.
-        in_base: whether ``at`` is in the base frame instead of {S}.
+        at: its place; None for the middle of ``on``.
         on: name of the object on which to place it; "" for whatever is below.
-        yaw: its angle about the vertical [rad]; None for any.
+        in_base: whether ``at`` is in the base frame instead of {S}.
     """
 
-    schema: ClassVar[Schema] = {
-        **mapping(
-            "Put the held object down, and draw back",
-            "",
-            {
-                "at": any_of(
-                    "Its place: the name of a pose, [x, y, z], or x, y and, if wanted, z, yaw",
-                    TEXT,
-                    reference("point"),
-                    mapping(
-                        "Its place",
-                        "x y",
-                        {
-                            "x": LENGTH,
-                            "y": LENGTH,
-                            "z": {**LENGTH, "description": "Height of its underside, mm"},
-                            "yaw": {**TURN, "description": "Angle about the vertical, deg"},
-                        },
-                    ),
-                ),
-                "on": {**OBJECT, "description": "Object that carries it; its middle without `at`"},
-            },
-        ),
-        "minProperties": 1,
-    }
+    noun = "a place step"
+    needs = ("at", "on")
 
-    at: FloatArray | None
-    in_base: bool
-    on: str
-    yaw: float | None
+    at: Annotated[Spot | None, SPOT] = None
+    on: Annotated[str, NAME.about("Object that carries it; its middle without `at`")] = ""
+    in_base: bool = False
 
     @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {at: {x, y, z, yaw}, on}. Raises ScriptError."""
-        fields = Fields(value, "a place step")
-        at, yaw = fields.take("at", lambda each: _spot(each, setting), (None, None))
-        on = fields.take("on", read.text, "")
-        fields.done()
-        if at is None and not on:
-            raise value.wrong("`place` needs `at` or `on`.")
-        if at is not None and on and not math.isnan(at[2]):
-            raise value.wrong("Give either `on` or the height z, which follows from `on`.")
-        return cls(at, setting.in_base, on, yaw)
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of two heights."""
+        at = given.get("at")
+        if at is not None and "on" in given and not math.isnan(at.z):
+            yield "", "Give either `on` or the height z, which follows from `on`."
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the way and the release. Raises InputError if it is not possible."""
@@ -111,7 +68,7 @@ class PlaceHeld:
         spot = self._spot(builder, held)
         try:
             builder.first(
-                _over(builder, held, spot, self.yaw),
+                _over(builder, held, spot, None if self.at is None else self.at.yaw),
                 lambda low: _bring(builder, held, low),
             )
         except InputError as error:
@@ -124,8 +81,8 @@ class PlaceHeld:
             at = builder.scene_object(self.on).T[:3, 3]
         if self.at is not None:
             T = np.eye(4) if self.in_base else builder.plan_context.T_base_shoulder
-            at = T[:3, :3] @ np.nan_to_num(self.at) + T[:3, 3]
-        if self.at is None or math.isnan(self.at[2]):
+            at = T[:3, :3] @ np.nan_to_num((self.at.x, self.at.y, self.at.z)) + T[:3, 3]
+        if self.at is None or math.isnan(self.at.z):
             high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
             at = np.array((at[0], at[1], surface_below(_objects_around(builder), high)))
         standing = _standing(held, at)
@@ -141,19 +98,10 @@ class PlaceHeld:
 
 
 @dataclass(frozen=True)
-class SetDown:
-    """Put the held object back to its place of the grasp, and draw back."""
+class SetDown(Step, word="set_down"):
+    """Put the held object back to where it was grasped, and draw back."""
 
-    schema: ClassVar[Schema] = {
-        "type": "null",
-        "description": "Put the held object back to where it was grasped, and draw back",
-    }
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the step, which takes no value. Raises ScriptError."""
-        nothing(value, "set_down")
-        return cls()
+    noun = "`set_down`"
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the motions. Raises InputError if nothing is held, or there is no room."""
@@ -169,19 +117,13 @@ class SetDown:
 
 
 @dataclass(frozen=True)
-class Release:
-    """Open the fingers where the arm is, and draw back; the object stands on what is below it."""
+class Release(Step, word="release"):
+    """Open the fingers on the held object where it is, and draw back.
 
-    schema: ClassVar[Schema] = {
-        "type": "null",
-        "description": "Open the fingers on the held object where it is, and draw back",
-    }
+    The object stands on what is below it.
+    """
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the step, which takes no value. Raises ScriptError."""
-        nothing(value, "release")
-        return cls()
+    noun = "`release`"
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the release. Raises InputError if the object would fall, or there is no room."""
@@ -245,18 +187,6 @@ def let_go(builder: PlanBuilder) -> None:
     builder.taken = None
 
 
-def _spot(value: YamlValue, setting: ScriptContext) -> tuple[FloatArray, float | None]:
-    """Read {x, y, z, yaw} or the name of a pose; z is NaN if it is absent. Raises ScriptError."""
-    if value.kind != "mapping":
-        return point(value, setting), None
-    fields = Fields(value, "the place of an object")
-    x, y = (fields.need(name, read.millimetres(), 0.0) for name in "xy")
-    z = fields.take("z", read.millimetres(), math.nan)
-    yaw = fields.take("yaw", read.angle(-360.0, 360.0), None)
-    fields.done()
-    return np.array((x, y, z)), yaw
-
-
 def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
     """Return the held object upright with its underside at ``at`` (3,) [m] in the base frame."""
     return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
@@ -291,7 +221,3 @@ def _over(
     T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
     goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
     return builder.hand.over(held, T_base_object, builder.q, goal, yaw)
-
-
-STEPS: dict[str, type[Step]] = {"place": PlaceHeld, "set_down": SetDown, "release": Release}
-"""Steps of this module, by their names in a script."""

@@ -3,38 +3,79 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Annotated, Any
 
 from numpy.polynomial.polynomial import polyval
 
 from katana450.arm.control.pouring import CUP, is_vessel
 from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.actions import SetSpeed, Wait
+from katana450.extensions.programs import kinds
+from katana450.extensions.programs.actions import Action, SetSpeed, Wait
 from katana450.extensions.programs.carry import carry
-from katana450.extensions.programs.drain import Drain
+from katana450.extensions.programs.declaration import Kind
 from katana450.extensions.programs.expression import PLAIN
-from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.kinds import NAME, ObjectName, number, whole
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.pour_tilt import RatedTilt, RatePlan, film_after, tilt_for
-from katana450.extensions.programs.schema_parts import (
-    OBJECT,
-    Schema,
-    any_of,
-    mapping,
-    number_or_text,
-)
-from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.scope import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.extensions.programs.vessel_turn import VesselTurn, turns_over
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.water.flow import VesselWater
+from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
+
+MAX_DRAIN = 180.0
+"""[s] Maximum time to wait."""
+
+END_FLOW = 0.2 * ML
+"""[m^3/s] Flow at which a cup counts as emptied."""
+
+
+@dataclass(frozen=True)
+class Drain(Action):
+    """Wait until a tilted cup has poured enough.
+
+    Attributes:
+        vessel: name of the vessel.
+        rest: volume that stays in it with its film [fl]; None to wait until the flow ends.
+    """
+
+    vessel: str
+    rest: int | None = None
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether enough has flowed. Raises InputError if that takes too long."""
+        if state.poured is None:
+            raise InputError("There is no cup to pour.")
+        water = state.poured.water.vessel(self.vessel)
+        if water is None:
+            raise InputError(f"There is no {self.vessel} to pour.")
+        if self.rest is None:
+            return outflow(state.poured.water) < END_FLOW or waited > MAX_DRAIN
+        if waited > MAX_DRAIN:
+            left = (water.kept - self.rest) * FEMTOLITRE / ML
+            raise InputError(f"After {MAX_DRAIN:g} s, {left:.1f} ml have still to be poured.")
+        return water.kept <= self.rest
+
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the maximum time that has passed."""
+        return min(waited / MAX_DRAIN, 1.0)
+
+
+def outflow(water: Water) -> float:
+    """Return the flow over the lip in the last time step [m^3/s]."""
+    if not water.parcels or water.parcels[-1].age > 0.0:
+        return 0.0
+    newest = water.parcels[-1]
+    return newest.volume * FEMTOLITRE / newest.span
+
 
 POUR_PACE = 0.3
 """[1] Fraction of the speed while pouring: slow enough for a thin, coherent stream."""
@@ -73,9 +114,23 @@ POURING = "pour"
 """Name of the task that turns the cup over."""
 
 
+FLOW = number(
+    1.0, 50.0, RATE_UNIT, "Flow while pouring, ml/s, or a text such as 10 ml/s", lambda ml: ML * ml
+)
+
+
+def _rate(value: YamlValue, context: ScriptContext) -> float:
+    """Read a flow [m^3/s], as a number in ml/s or a text such as 10 ml/s."""
+    if isinstance(value.held, str) and value.held.endswith(RATE_UNIT):
+        with suppress(ValueError):
+            flow = float(value.held.removesuffix(RATE_UNIT))
+            value = replace(value, kind="number", number=flow, unit=PLAIN)
+    return FLOW(value, context)
+
+
 @dataclass(frozen=True)
-class Pour:
-    """Carry a vessel over an object, turn it over, shake it, and turn it back.
+class Pour(Step, word="pour"):
+    """Carry a held vessel over an object, turn it over, shake it, and turn it back.
 
     It stays upright until then. An arm of the five-axis family keeps the pitch of the grasp, and
     turns it by the roll of its wrist; over another vessel the lip stays in its place. Other arms
@@ -84,54 +139,40 @@ class Pour:
     Attributes:
         into: name of the object.
         source: name of the vessel in the hand; None for any.
-        shake: number of shakes.
         volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
             when the rest is left, kept so until then, and turned back.
         rate: flow while pouring [m^3/s]; None to turn the cup evenly. Of all, the last
             LAST_FRACTION flows faster.
+        shake: number of shakes after all is poured; None for SHAKES.
     """
 
-    schema: ClassVar[Schema] = any_of(
-        "Carry a held vessel over an object, turn it over, shake it, and turn it back",
-        OBJECT,
-        mapping(
-            "An object, and how much to pour",
-            "into",
-            {
-                "into": OBJECT,
-                "from": {**OBJECT, "description": "The vessel in the hand, for a check"},
-                "ml": number_or_text(1.0, 1000.0, "How much to pour, ml; all unless given"),
-                "rate": number_or_text(
-                    1.0, 50.0, "Flow while pouring, ml/s, or a text such as 10 ml/s"
-                ),
-                "shake": number_or_text(
-                    0, 20, "Number of shakes after all is poured, 3 unless given"
-                ),
-            },
-        ),
-    )
+    short = "into"
 
-    into: str
-    shake: int
-    volume: float | None = None
-    rate: float | None = None
-    source: str | None = None
+    into: ObjectName
+    source: Annotated[
+        str | None, NAME.about("The vessel in the hand, for a check").named("from")
+    ] = None
+    volume: Annotated[
+        float | None,
+        kinds.volume(1.0, 1000.0, "How much to pour, ml; all unless given").named("ml"),
+    ] = None
+    rate: Annotated[float | None, Kind(_rate, FLOW.schema)] = None
+    shake: Annotated[
+        int | None, whole(0, 20, "Number of shakes after all is poured, 3 unless given")
+    ] = None
 
     @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of an object, or {into, from, shake, ml, rate}. Raises ScriptError."""
-        if value.kind == "text":
-            return cls(read.text(value), SHAKES)
-        fields = Fields(value, "a pour")
-        into = fields.need("into", read.text, "")
-        source = fields.take("from", read.text, None)
-        ml = fields.take("ml", read.number(1.0, 1000.0, "ml"), None)
-        shake = fields.take("shake", read.whole(0, 20), SHAKES if ml is None else 0)
-        rate = fields.take("rate", _rate, None)
-        fields.done()
-        if ml is not None and shake:
-            raise value.wrong("A shaken cup does not keep the rest: leave out `shake` or `ml`.")
-        return cls(into, shake, None if ml is None else ML * ml, rate, source)
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of a part that is shaken out."""
+        if "volume" in given and given.get("shake"):
+            yield "shake", "A shaken cup does not keep the rest: leave out `shake` or `ml`."
+
+    @property
+    def shakes(self) -> int:
+        """The number of shakes."""
+        if self.shake is None:
+            return SHAKES if self.volume is None else 0
+        return self.shake
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the pour, turning either way. Raises InputError if it is not possible."""
@@ -228,9 +269,9 @@ class Pour:
             curves = way.line(0.0, first), way.by(fitted), way.line(last, end)
             self._pour_at_rate(builder, rated.duration, *curves)
             end = end if self.volume is None else last
-        if self.shake:
+        if self.shakes:
             back = way.end - math.copysign(SHAKE_ANGLE, way.end)
-            builder.lead([way.line(end, back), way.line(back, end)] * self.shake, "shake")
+            builder.lead([way.line(end, back), way.line(back, end)] * self.shakes, "shake")
         self._drain(builder, vessel, rest)
         builder.lead([way.line(end, 0.0)], "turn back")
 
@@ -267,16 +308,3 @@ class Pour:
         held = water.kept * FEMTOLITRE
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
         return RatePlan.of(out, self.rate).tilts(held, inside)
-
-
-def _rate(value: YamlValue) -> float:
-    """Read a flow in ml/s, as a number or a text such as 10 ml/s; return it in m^3/s."""
-    if isinstance(value.held, str) and value.held.endswith(RATE_UNIT):
-        with suppress(ValueError):
-            number = float(value.held.removesuffix(RATE_UNIT))
-            value = replace(value, kind="number", number=number, unit=PLAIN)
-    return ML * read.number(1.0, 50.0, RATE_UNIT)(value)
-
-
-STEPS: dict[str, type[Step]] = {"pour": Pour}
-"""Steps of this module, by their names in a script."""

@@ -11,7 +11,6 @@ from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.actions import FollowPlan, SetSpeed, Task, expected_time
 from katana450.extensions.programs.compiler import Compiler, Report
-from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.conditions import ProgramTime
 from katana450.extensions.programs.located_step import (
     Conditional,
@@ -22,8 +21,8 @@ from katana450.extensions.programs.located_step import (
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.script_frame import ScriptFrame
-from katana450.extensions.programs.task_list import task_list
-from katana450.extensions.programs.wait_for import WaitUntil
+from katana450.extensions.programs.settings_steps import WaitUntil
+from katana450.extensions.programs.task_list import ConditionalJump
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -151,7 +150,7 @@ class Program:
             if isinstance(action, ConditionalJump):
                 holds = action.predicted
                 if isinstance(action.condition, ProgramTime):
-                    holds = action.condition.bounds.hold(elapsed)
+                    holds = action.condition.has(elapsed)
                 number = action.then if holds else action.otherwise
             else:
                 number = self.next(number)[0]
@@ -199,7 +198,7 @@ def compiled(
         state: the state before the program: posture, fingers, tool frame, scene and water.
         speed: fraction of the speed that the script sets.
         report: function that is called with each stage of the planning as it begins.
-        first_step: index of the first step of the program, see ``Compiler.all``.
+        first_step: index of the first step of the program, see ``Compiler.tasks``.
 
     Raises:
         ScriptError: a step is not possible; the error has its line.
@@ -214,7 +213,7 @@ def compiled(
     frame = ScriptFrame.of(plan_context.T_base_shoulder, in_base=script.in_base)
     builder = PlanBuilder(plan_context, state, frame)
     builder.state = builder.standing(state.setpoint)
-    tasks = task_list(Compiler(script, builder, report).all(first_step))
+    tasks = Compiler(script, builder, report).tasks(first_step)
     total_speed = script.speed * speed
     steps, alternatives = count(script.steps), tuple(_alternatives(script.steps, 0))
     return Program(script.name, total_speed, state.setpoint, tasks, steps, alternatives)

@@ -15,9 +15,10 @@ from katana450.extensions.programs.actions import (
     SetSpeed,
     expected_time,
 )
-from katana450.extensions.programs.conditional_jump import ConditionalJump
 from katana450.extensions.programs.grip_until import CloseUntil
 from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.task_list import ConditionalJump
+from katana450.server.api.answers import Progress
 
 FULL_SPEED = SetSpeed(1.0)
 """The speed before any task."""
@@ -67,29 +68,6 @@ class Run:
     elapsed: float = 0.0
     choices: tuple[tuple[int, bool], ...] = ()
     held: bool = False
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The progress of a run, for display.
-
-    Attributes:
-        step: current step, from 1.
-        steps: number of steps.
-        line: line of the script.
-        name: name of the task.
-        fraction: completed fraction of the task, from 0 to 1.
-        status: a phase, ``paused`` or ``blocked``.
-        why: reason of an early end.
-    """
-
-    step: int
-    steps: int
-    line: int
-    name: str
-    fraction: float
-    status: str
-    why: str
 
 
 def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple[cmd.Command, ...]]:
@@ -215,15 +193,37 @@ def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
     return replace(run, single=True), (cmd.Resume(),)
 
 
-def progress(program: Program, run: Run, state: State) -> Progress:
-    """Return the progress of ``run``."""
-    task = program.tasks[run.number]
-    fraction = 1.0 if run.phase is Phase.DONE else 0.0
+def task_fraction(program: Program, run: Run, state: State) -> float:
+    """Return the completed fraction of the current task, from 0 to 1."""
     if run.started and run.phase is Phase.RUNNING:
-        fraction = task.action.fraction(state, run.waited)
+        return program.tasks[run.number].action.fraction(state, run.waited)
+    return float(run.phase is Phase.DONE)
+
+
+def progress(
+    program: Program, run: Run, state: State, by: str = "", allowed: float = 1.0
+) -> Progress:
+    """Return the progress of ``run`` in ``state``.
+
+    ``by`` is the name of its owner, and ``allowed`` the maximum fraction of full speed.
+    """
+    task = program.tasks[run.number]
     status = run.phase.value
     if run.phase is Phase.RUNNING and state.paused:
         status = "paused"
     elif run.phase is Phase.RUNNING and state.blocked:
         status = "blocked"
-    return Progress(task.number + 1, program.steps, task.line, task.name, fraction, status, run.why)
+    return Progress(
+        name=program.name,
+        by=by,
+        status=status,
+        step=task.number + 1,
+        steps=program.steps,
+        line=task.line,
+        task=task.name,
+        fraction=task_fraction(program, run, state),
+        seconds=program.duration,
+        seconds_left=seconds_left(program, run, state, allowed),
+        why=run.why or " ".join(program.notes),
+        skipped=skipped(program, run),
+    )

@@ -1,4 +1,4 @@
-"""The named values of a script: numbers for expressions, and anything else by name."""
+"""The names at one place of a script: values, places and definitions."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from katana450.extensions.programs.expression import (
     evaluate,
 )
 from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.step_target import StepTarget
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """Pattern of a name."""
@@ -91,6 +92,38 @@ class Scope:
         except ExpressionError as error:
             return replace(value, why=str(error))
         return replace(value, kind="number", number=found.value, unit=found.kind)
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Named steps with parameters.
+
+    Attributes:
+        steps: the text of the steps.
+        parameters: the values by default, by the names of the parameters.
+        context: the names at the place of the definition, with the definitions before it.
+    """
+
+    steps: YamlValue
+    parameters: tuple[tuple[YamlValue, YamlValue], ...]
+    context: ScriptContext
+
+
+@dataclass(frozen=True)
+class ScriptContext:
+    """The names at one place of a script.
+
+    Attributes:
+        in_base: whether points are in the base frame, not in {S}.
+        scope: named values.
+        poses: named places.
+        definitions: named steps.
+    """
+
+    in_base: bool = False
+    scope: Scope = field(default_factory=Scope)
+    poses: Mapping[str, StepTarget] = field(default_factory=dict)
+    definitions: Mapping[str, Definition] = field(default_factory=dict)
 
 
 def _without(named: Mapping[str, V], word: str) -> dict[str, V]:

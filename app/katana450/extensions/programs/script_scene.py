@@ -13,9 +13,16 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.attached_files import attached_file, is_file_name
-from katana450.extensions.programs.scene_draft import Scene, SceneDraft, SceneEntry
-from katana450.extensions.programs.scene_reader import parsed, scene_draft, scene_entries
-from katana450.extensions.programs.scope import Scope
+from katana450.extensions.programs.declaration import Kind, record
+from katana450.extensions.programs.kinds import TEXT, any_of, bound
+from katana450.extensions.programs.scene_draft import (
+    OBJECTS,
+    Scene,
+    SceneDraft,
+    SceneEntry,
+    parsed,
+)
+from katana450.extensions.programs.scope import ScriptContext
 from katana450.extensions.programs.source import ScriptError, YamlValue
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE, ML
@@ -44,19 +51,6 @@ class ScriptScene:
     draft: SceneDraft
     file: str = ""
 
-    @classmethod
-    def read(cls, value: YamlValue, scope: Scope) -> ScriptScene:
-        """Read the name of a file, a list of objects, or a mapping like that of a scene file.
-
-        Names of ``scope`` may stand for values. Raises ScriptError.
-        """
-        if value.kind == "list":
-            return cls(value, SceneDraft(scene_entries(scope.bound(value)), None, None))
-        if value.kind == "mapping" and not any(is_file_name(name) for name, _ in value.fields):
-            return cls(value, scene_draft(scope.bound(value), versioned=False))
-        file = attached_file(value)
-        return cls(value, parsed(file.text, file.name), file.name)
-
     def begin(self, session: Session) -> State:
         """Return the state of an arm at rest in the scene. Raises InputError for a mesh.
 
@@ -64,7 +58,7 @@ class ScriptScene:
         """
         for entry in self.draft.entries:
             if entry.mesh is not None:
-                raise entry.at.wrong(
+                raise entry.source.wrong(
                     f"{entry.name} is a mesh, whose file is not read here. Use `katana450 run`."
                 )
         scene = self.draft.scene({}, _T_palm_tool(session))
@@ -106,6 +100,37 @@ class ScriptScene:
         if abs(wanted - cup) > SAME_VOLUME:
             return f"the cup has {cup:.1f} ml of water, not {wanted:.1f} ml of water"
         return ""
+
+
+def _scene(value: YamlValue, context: ScriptContext) -> ScriptScene | None:
+    """Read the name of a file, a list of objects, or a mapping like that of a scene file."""
+    if value.kind == "nothing":
+        return None
+    if value.kind == "list":
+        return ScriptScene(value, SceneDraft(entries=bound(OBJECTS)(value, context)))
+    if value.kind == "mapping" and not any(is_file_name(name) for name, _ in value.fields):
+        return ScriptScene(value, bound(record(SceneDraft))(value, context))
+    file = attached_file(value)
+    return ScriptScene(value, parsed(file.text, file.name), file.name)
+
+
+SCENE = Kind(
+    _scene,
+    any_of(
+        "The scene that the script needs: a file in its folder, or the objects",
+        TEXT.schema,
+        OBJECTS.schema,
+        SceneDraft.schema(),
+        {
+            "description": "A file, with its text",
+            "type": "object",
+            "patternProperties": {r"\.ya?ml$": TEXT.schema},
+            "additionalProperties": False,
+            "minProperties": 1,
+        },
+        {"type": "null"},
+    ),
+)
 
 
 def begun(session: Session, scene: Scene) -> State:

@@ -1,28 +1,29 @@
-"""Steps that move no joint: gripper, wait, tool frame and speed."""
+"""Steps that move no joint: gripper, waits, tool frame and speed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Annotated
 
 from katana450 import tolerances
 from katana450.arm.control.commands import MIN_SPEED
+from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
-from katana450.extensions.programs.actions import MoveFingers, SetSpeed, UseTool, Wait
-from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.actions import Action, MoveFingers, SetSpeed, UseTool, Wait
+from katana450.extensions.programs.conditions import CONDITION, Condition
+from katana450.extensions.programs.declaration import Kind
 from katana450.extensions.programs.finger_planning import finger_unit, with_fingers
+from katana450.extensions.programs.kinds import (
+    FINGER_PLACE,
+    TEXT,
+    ObjectName,
+    any_of,
+    choice,
+    number,
+)
 from katana450.extensions.programs.place import check_fall
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import (
-    OBJECT,
-    TEXT,
-    Schema,
-    any_of,
-    mapping,
-    number_or_text,
-)
-from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.scope import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 
@@ -30,42 +31,36 @@ MAX_PAUSE = 3600.0
 """[s] Maximum duration of a wait."""
 
 
-FINGERS = number_or_text(
-    -180.0, 180.0, "open, closed, or the angle of the fingers, deg; mm if they slide"
+def _finger_place(value: YamlValue, context: ScriptContext) -> float | str:
+    """Read ``open``, ``closed`` or a number. Raises ScriptError."""
+    if value.number is not None:
+        return FINGER_PLACE(value, context)
+    return choice("open", "closed")(value)
+
+
+FINGERS = Kind(
+    _finger_place,
+    any_of(
+        "open, closed, or the angle of the fingers, deg; mm if they slide",
+        *FINGER_PLACE.schema["anyOf"],
+    ),
 )
 
 
 @dataclass(frozen=True)
-class Gripper:
-    """Open or close the fingers, or move them to a position [deg], or [mm] for sliding fingers.
+class Gripper(Step, word="gripper"):
+    """Open or close the fingers, or move them to an angle, deg, or a place, mm, if they slide.
 
     Attributes:
-        where: ``open``, ``closed`` or a position.
+        to: ``open``, ``closed`` or a position [deg or mm].
         holding: name of the object that they must hold then; "" for any or none.
     """
 
-    schema: ClassVar[Schema] = any_of(
-        "open, closed, or the angle of the fingers, deg; mm if they slide",
-        FINGERS,
-        mapping(
-            "A position of the fingers, and what they must hold then",
-            "to",
-            {"to": FINGERS, "holding": OBJECT},
-        ),
-    )
+    noun = "a gripper step"
+    short = "to"
 
-    where: float | str
-    holding: str = ""
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read ``open``, ``closed``, a number, or {to, holding}. Raises ScriptError."""
-        if value.kind != "mapping":
-            return cls(_finger_position(value))
-        fields = Fields(value, "a gripper step")
-        found = cls(fields.need("to", _finger_position, 0.0), fields.take("holding", read.text, ""))
-        fields.done()
-        return found
+    to: Annotated[float | str, FINGERS]
+    holding: ObjectName = ""
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the finger motion.
@@ -78,7 +73,7 @@ class Gripper:
             raise InputError("This arm has no fingers.")
         ends = {"open": fingers.opened, "closed": fingers.closed}
         unit, scale = finger_unit(builder)
-        angle = ends[self.where] if isinstance(self.where, str) else scale * self.where
+        angle = ends[self.to] if isinstance(self.to, str) else scale * self.to
         if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:
             low, high = fingers.lower / scale, fingers.upper / scale
             raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
@@ -97,25 +92,13 @@ class Gripper:
             builder.taken = None
 
 
-def _finger_position(value: YamlValue) -> float | str:
-    """Read ``open``, ``closed`` or a number. Raises ScriptError."""
-    if value.number is not None:
-        return read.number(-180.0, 180.0, "deg or mm")(value)
-    return read.choice("open", "closed")(value)
-
-
 @dataclass(frozen=True)
-class TimedPause:
-    """Wait for ``seconds`` [s]."""
+class TimedPause(Step, word="wait"):
+    """Wait, s."""
 
-    schema: ClassVar[Schema] = number_or_text(0.0, MAX_PAUSE, "Wait, s")
+    short = "seconds"
 
-    seconds: float
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read a time [s]. Raises ScriptError."""
-        return cls(read.number(0.0, MAX_PAUSE, "s")(value))
+    seconds: Annotated[float, number(0.0, MAX_PAUSE, "s")]
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the wait."""
@@ -124,20 +107,12 @@ class TimedPause:
 
 
 @dataclass(frozen=True)
-class Tool:
-    """Select the tool frame to which all later points refer."""
+class Tool(Step, word="tool"):
+    """Tool frame of all later points: tcp, grasp or flange."""
 
-    schema: ClassVar[Schema] = {
-        **TEXT,
-        "description": "Tool frame of all later points: tcp, grasp or flange",
-    }
+    short = "name"
 
-    name: str
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read the name of a tool frame. Raises ScriptError."""
-        return cls(read.text(value))
+    name: Annotated[str, TEXT]
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the change of the tool frame. Raises InputError if it does not exist."""
@@ -148,29 +123,59 @@ class Tool:
 
 
 @dataclass(frozen=True)
-class Speed:
-    """Limit all later motions to the fraction ``value`` of the program's speed."""
+class Speed(Step, word="speed"):
+    """Fraction of full speed of all later motions."""
 
-    schema: ClassVar[Schema] = number_or_text(
-        MIN_SPEED, 1.0, "Fraction of full speed of all later motions"
-    )
+    short = "value"
 
-    value: float
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read a fraction. Raises ScriptError."""
-        return cls(read.number(MIN_SPEED, 1.0)(value))
+    value: Annotated[float, number(MIN_SPEED, 1.0)]
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the change of the speed."""
         builder.note(f"speed {self.value:g}", SetSpeed(self.value), builder.state)
 
 
-STEPS: dict[str, type[Step]] = {
-    "gripper": Gripper,
-    "wait": TimedPause,
-    "tool": Tool,
-    "speed": Speed,
-}
-"""Steps of this module, by their names in a script."""
+TIMEOUT = 60.0
+"""[s] Timeout unless the script gives one."""
+
+
+@dataclass(frozen=True, eq=False)
+class WaitUntil(Action):
+    """Wait at rest until ``condition`` holds, for at most ``timeout`` [s].
+
+    ``assumed``: whether it counts as true, for a simulation in which nobody makes it true.
+    """
+
+    condition: Condition
+    timeout: float
+    assumed: bool = False
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether the condition holds. Raises InputError after the timeout."""
+        if self.assumed or self.condition.holds(state):
+            return True
+        if waited > self.timeout:
+            raise InputError(f"The condition did not hold within {self.timeout:g} s.")
+        return False
+
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the timeout that has passed."""
+        return min(waited / self.timeout, 1.0)
+
+
+@dataclass(frozen=True)
+class WaitFor(Step, word="wait_for"):
+    """Wait at rest until one condition holds.
+
+    The steps after it are planned for the scene as it is when the script is planned. The program
+    fails after ``timeout`` [s].
+    """
+
+    condition: Annotated[Condition | None, CONDITION]
+    timeout: Annotated[float, number(0.01, MAX_PAUSE, "s", "s; 60 unless given")] = TIMEOUT
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the wait. Raises InputError if the condition can never hold."""
+        assert self.condition is not None
+        action = WaitUntil(self.condition.checked(builder), self.timeout)
+        builder.note(f"wait for {self.condition.awaited}", action, builder.state)

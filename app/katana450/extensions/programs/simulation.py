@@ -110,7 +110,7 @@ class Simulation:
         ticks = simulated(self._program, self._session, start, self._period, self._driven)
         for state, self.run in ticks:
             self._records.append((state, self.run.number))
-            fraction = runner.progress(self._program, self.run, state).fraction
+            fraction = runner.task_fraction(self._program, self.run, state)
             yield min((self.run.number + fraction) / count, 1.0)
 
     def _driven(self, state: State) -> State:

@@ -1,35 +1,28 @@
-"""The protocol of a program step."""
+"""The base class of program steps, and the table of all steps by their names."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol, Self
+from abc import abstractmethod
+from typing import Any
 
+from katana450.extensions.programs.declaration import Declared
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import Schema
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
+
+STEPS: dict[str, type[Step]] = {}
+"""The class of each step by its name in a script; a class enters itself with ``word``."""
 
 
-class Step(Protocol):
-    """A program step.
+class Step(Declared):
+    """A program step: declared fields, and how it is planned."""
 
-    Attributes:
-        schema: JSON Schema of its value, with which editors explain and check it.
-    """
+    def __init_subclass__(cls, word: str = "", **options: Any) -> None:
+        """Enter the class as the step ``word``, which is also its noun in messages."""
+        super().__init_subclass__(**options)
+        if word:
+            STEPS[word] = cls
+            if "noun" not in vars(cls):
+                cls.noun = f"an {word}" if word[0] in "aeiou" else f"a {word}"
 
-    schema: ClassVar[Schema]
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read the step from the value after its name. Raises ScriptError."""
-        ...
-
+    @abstractmethod
     def build(self, builder: PlanBuilder) -> None:
         """Append the step's actions, with their plans. Raises InputError if it is not possible."""
-        ...
-
-
-def nothing(value: YamlValue, name: str) -> None:
-    """Refuse a value after the step ``name``, which takes none. Raises ScriptError."""
-    if value.kind != "nothing":
-        raise value.wrong(f"`{name}` takes no value. Remove it.")

@@ -1,7 +1,6 @@
-"""All program steps by name.
+"""All program steps by name: the modules of the steps enter their classes.
 
-To add a kind, write a class with `schema`, `read` and `build` as in `Step`, and list it in `STEPS`
-of its module.
+To add a kind, write a class as ``Step`` describes it. List a new module here.
 """
 
 from __future__ import annotations
@@ -17,21 +16,13 @@ from katana450.extensions.programs import (
     table,
     tool_moves,
     trajectory,
-    wait_for,
 )
-from katana450.extensions.programs.step import Step
+from katana450.extensions.programs.step import STEPS
 
-STEPS: dict[str, type[Step]] = {
-    **moves.STEPS,
-    **tool_moves.STEPS,
-    **settings_steps.STEPS,
-    **table.STEPS,
-    **grasp.STEPS,
-    **grip_until.STEPS,
-    **pouring.STEPS,
-    **pick.STEPS,
-    **place.STEPS,
-    **wait_for.STEPS,
-    **trajectory.STEPS,
-}
-"""The class of each step by its name in a script."""
+MODULES = (
+    moves, tool_moves, settings_steps, table, grasp, grip_until, pouring, pick, place,
+    trajectory,
+)  # fmt: skip
+"""The modules with steps."""
+
+__all__ = ["MODULES", "STEPS"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import ClassVar, Self
+from typing import Annotated
 
 import numpy as np
 
@@ -13,74 +13,46 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.support import check_carried
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FillCup, PutObject
-from katana450.extensions.programs.fields import Fields
+from katana450.extensions.programs.kinds import Length, Object, volume
 from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import (
-    LENGTH,
-    OBJECT,
-    Schema,
-    mapping,
-    number_or_text,
-)
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import ML
 
 
 @dataclass(frozen=True)
-class Fill:
-    """Fill the cup with ``volume`` [m^3] of water."""
+class Fill(Step, word="fill"):
+    """Fill the cup with water, ml."""
 
-    schema: ClassVar[Schema] = number_or_text(0.0, 1000.0, "Fill the cup with water, ml")
+    short = "water"
 
-    volume: float
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read a volume [ml]. Raises ScriptError."""
-        return cls(ML * read.number(0.0, 1000.0, "ml")(value))
+    water: Annotated[float, volume(0.0, 1000.0, "ml")]
+    """[m^3]."""
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the filling. Raises InputError if the cup is absent or too small."""
-        command = cmd.Fill(self.volume / ML)
+        command = cmd.Fill(self.water / ML)
         builder.plan_context.session.check(command)
-        filled = FillCup(self.volume)
+        filled = FillCup(self.water)
         builder.note("fill", filled, builder.after(command, ticks=1))
 
 
 @dataclass(frozen=True)
-class Put:
-    """Place an object at x, y [m] in the base frame on the table; the arm does not carry it.
+class Put(Step, word="put"):
+    """Set an object to another place on the table, without the arm.
 
     Consecutive steps of this kind form one arrangement: an object may overlap the old place of
     another that is placed elsewhere by a later one of them.
+
+    Attributes:
+        name: name of the object.
+        x, y: its place [m] in the base frame.
     """
 
-    schema: ClassVar[Schema] = mapping(
-        "Set an object to another place on the table, without the arm",
-        "object x y",
-        {"object": OBJECT, "x": LENGTH, "y": LENGTH},
-    )
-
-    name: str
-    x: float
-    y: float
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {object, x, y} [mm]. Raises ScriptError."""
-        fields = Fields(value, "a put")
-        found = cls(
-            fields.need("object", read.text, ""),
-            fields.need("x", read.millimetres(), 0.0),
-            fields.need("y", read.millimetres(), 0.0),
-        )
-        fields.done()
-        return found
+    name: Object
+    x: Length
+    y: Length
 
     def build(self, builder: PlanBuilder) -> None:
         """Append the placement. Raises InputError if the place is occupied."""
@@ -108,7 +80,3 @@ def _overlap(one: SceneObject, other: SceneObject) -> bool:
     """Return whether two objects on the table overlap, each approximated by a circle."""
     apart = float(np.linalg.norm(one.T[:2, 3] - other.T[:2, 3]))
     return apart < girth(one) + girth(other)
-
-
-STEPS: dict[str, type[Step]] = {"fill": Fill, "put": Put}
-"""Steps of this module, by their names in a script."""

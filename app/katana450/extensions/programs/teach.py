@@ -71,7 +71,7 @@ def taught(script: Script) -> TaughtScript | None:
                 if len(passed) < len(through):
                     return None
                 poses += [*passed[:-1], replace(passed[-1], blend=False)]
-            case Gripper(where=float(where)) if last and last.gripper is None and not last.wait:
+            case Gripper(to=float(where)) if last and last.gripper is None and not last.wait:
                 poses[-1] = replace(last, gripper=where)
             case TimedPause(seconds=seconds) if last and not last.wait:
                 poses[-1] = replace(last, wait=seconds)

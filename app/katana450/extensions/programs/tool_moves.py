@@ -3,38 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import ClassVar, Self
+from typing import Annotated, Any
 
 import numpy as np
 
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
-from katana450.extensions.programs import fields as read
-from katana450.extensions.programs import places
-from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.moves import through
-from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.schema_parts import (
-    ARC_PITCH,
-    BLEND,
-    BRANCH,
-    FEED,
+from katana450.extensions.programs.kinds import (
+    DIRECTION,
     LENGTH,
-    OFFSET,
-    ORIENTATION,
-    TURN,
-    Schema,
-    mapping,
-    number_or_text,
-    reference,
+    Angle,
+    Branch,
+    Direction,
+    Offset,
+    Orientation,
+    millimetres,
+    number,
 )
-from katana450.extensions.programs.script_context import ScriptContext
-from katana450.extensions.programs.source import YamlValue
+from katana450.extensions.programs.places import (
+    ARC_PITCH,
+    ROOMIEST,
+    Blend,
+    Places,
+    Point,
+    Pose,
+)
+from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.step_target import Angles, StepTarget
+from katana450.extensions.programs.step_target import KEPT, Angles, StepTarget
 from katana450.extensions.programs.tool_planning import AnyCurve
 from katana450.extensions.programs.unfollowed import ANGLE, arc_remedies, line_remedies, unfollowed
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -46,53 +45,55 @@ LEVEL_TOLERANCE = 1e-6
 """[1] Maximum horizontal component of the normal of a level circle."""
 
 
-def feed(fields: Fields) -> float:
-    """Return the maximum speed of the tool point [m/s]; ``fields`` have it in mm/s, or not."""
-    return fields.take("feed", read.number(0.1, 1e3 * TOOL_SPEED), 1e3 * TOOL_SPEED) / 1e3
+Feed = Annotated[
+    float,
+    number(
+        0.1,
+        1e3 * TOOL_SPEED,
+        about="Speed of the tool point, mm/s; slower where limits require it",
+        convert=lambda feed: feed / 1e3,
+    ),
+]
+"""Maximum speed of the tool point [m/s]."""
+
+Climb = Annotated[float, LENGTH.about("Motion along the axis, mm")]
+"""Motion along an axis [m]."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """Move the tool on a straight line; its orientation changes evenly."""
+@dataclass(frozen=True, eq=False)
+class Line(Step, word="line"):
+    """Move the tool point on a straight line, to a point or by an offset.
 
-    schema: ClassVar[Schema] = mapping(
-        "Move the tool point on a straight line, to a point or by an offset",
-        "",
-        {"to": reference("point"), "by": OFFSET, **ORIENTATION, "feed": FEED},
-    )
+    Its orientation changes evenly.
 
-    to: FloatArray | None
-    by: FloatArray | None
-    angles: Angles
-    in_base: bool
-    tool_speed: float = TOOL_SPEED
+    Attributes:
+        to: the end; None to keep the present one.
+        by: (3,) motion of the tool point [m]; None for that to the end.
+        angles: orientation at the end; that of ``to`` where it has none.
+        feed: maximum speed of the tool point [m/s].
+        in_base: whether ``by`` and ``angles`` are in the base frame, not in {S}.
+    """
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {to, by, pitch, roll, yaw, feed}. Raises ScriptError."""
-        fields = Fields(value, "a line")
-        to = fields.take("to", lambda each: places.pose(each, setting), None)
-        by = fields.take("by", read.vector(read.millimetres(), partly=True), None)
-        if to is not None and by is not None:
-            fields.problems += value.wrong("A line takes `to` or `by`, not both.").problems
-        angles = places.angles(fields)
-        if to is not None:
-            angles = angles.or_else(to.angles)
-        end = None if to is None else to.position
-        found = cls(end, by, angles, setting.in_base, feed(fields))
-        fields.done()
-        return found
+    excludes = ("to", "by")
+
+    to: Pose | None = None
+    by: Offset | None = None
+    angles: Orientation = KEPT
+    feed: Feed = TOOL_SPEED
+    in_base: bool = False
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the line. Raises InputError if the tool cannot follow it."""
         start = builder.target
-        end = builder.target_at(StepTarget(None, self.to, self.angles, None, self.in_base))
+        goal = StepTarget(in_base=self.in_base) if self.to is None else self.to
+        angles = self.angles.or_else(goal.angles)
+        end = builder.target_at(replace(goal, angles=angles))
         if self.by is not None:
             offset = builder.direction(self.by, in_base=self.in_base)
             end = end.moved(frozen(start.position + offset))
         line = builder.planning.line(start, end)
         try:
-            builder.lead([line], "line", self.tool_speed)
+            builder.lead([line], "line", self.feed)
         except InputError as error:
             branch, frame = builder.branches(None)[0], builder.frame
             if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
@@ -102,79 +103,63 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Lines:
-    """Move the tool on straight lines through places without a rest, with rounded corners."""
+class Lines(Step, word="lines"):
+    """Move the tool point on straight lines through places, with rounded corners."""
 
-    schema: ClassVar[Schema] = mapping(
-        "Move the tool point on straight lines through places, with rounded corners",
-        "through",
-        {"through": reference("through"), "blend": BLEND, "feed": FEED},
-    )
+    noun = "lines"
 
-    through: tuple[StepTarget, ...]
-    blend: float
-    tool_speed: float
+    through: Places
+    blend: Blend = 0.5
+    feed: Feed = TOOL_SPEED
 
     @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {through, blend, feed}. Raises ScriptError."""
-        fields = Fields(value, "lines")
-        found = cls(*through(fields, setting), feed(fields))
-        if any(each.joints is not None or each.branch is not None for each in found.through):
-            problem = "`lines` takes points only. Use `via` for joint angles and branches."
-            fields.problems += value.wrong(problem).problems
-        fields.done()
-        return found
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of places that are no points."""
+        places = given.get("through") or ()
+        if any(place.joints is not None or place.branch is not None for place in places):
+            yield "", "`lines` takes points only. Use `via` for joint angles and branches."
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the lines. Raises InputError if the tool cannot follow them."""
         vias, planning = [builder.target], builder.planning
         branch = builder.branches(None)[0]
-        for number, each in enumerate(self.through, start=1):
+        for place_number, each in enumerate(self.through, start=1):
             vias.append(builder.target_at(each, vias[-1]))
             if planning.joints(builder.q, vias[-1], branch) is None:
-                raise InputError(f"Place {number}: {builder.unreached(vias[-1], branch)}")
+                raise InputError(f"Place {place_number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
             curves = [planning.lines(vias, blend)]
         else:
             curves = [planning.line(a, b) for a, b in pairwise(vias)]
-        builder.lead(curves, "lines", self.tool_speed)
+        builder.lead(curves, "lines", self.feed)
 
 
-@dataclass(frozen=True)
-class ArcGeometry:
-    """The common part of arcs and circles: the axis, and the orientation of the tool.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Turn(Step):
+    """The common part of arcs and circles.
 
     Attributes:
         centre: (3,) [m].
-        axis: (3,) unit vector.
-        angles: pitch, roll and yaw [rad]; None to keep one.
+        axis: (3,) unit vector; the normal of a circle.
+        pitch: [rad], ROOMIEST for the one farthest from the limits, or None to keep it.
+        roll, yaw: [rad]; None to keep one.
+        feed: maximum speed of the tool point along the curve [m/s].
         in_base: whether centre, axis and angles are in the base frame, not in {S}.
-        is_roomiest: whether the pitch is the one farthest from the limits.
-        tool_speed: maximum speed of the tool point along the curve [m/s].
     """
 
-    centre: FloatArray
-    axis: FloatArray
-    angles: Angles
-    in_base: bool
-    is_roomiest: bool = False
-    tool_speed: float = TOOL_SPEED
+    centre: Point
+    axis: Direction
+    pitch: Annotated[float | str | None, ARC_PITCH] = None
+    roll: Angle | None = None
+    yaw: Angle | None = None
+    feed: Feed = TOOL_SPEED
+    in_base: bool = False
 
-    @classmethod
-    def read(cls, fields: Fields, axis: str, setting: ScriptContext) -> Self:
-        """Read centre, axis, pitch, roll, yaw and feed. ``axis`` is the name of the axis field."""
-        centre = fields.need("centre", lambda each: places.point(each, setting), np.zeros(3))
-        direction = fields.need(axis, read.direction, np.eye(3)[0])
-        pitch = fields.take("pitch", places.pitch, None)
-        angles = Angles(
-            pitch if isinstance(pitch, float) else None,
-            fields.take("roll", read.angle(), None),
-            fields.take("yaw", read.angle(), None),
-        )
-        is_roomiest = pitch == places.ROOMIEST
-        return cls(centre, direction, angles, setting.in_base, is_roomiest, feed(fields))
+    @property
+    def is_roomiest(self) -> bool:
+        """True if the pitch is the one farthest from the limits."""
+        return self.pitch == ROOMIEST
 
     def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
         """Return centre [m] and axis, each (3,), in {S}."""
@@ -183,7 +168,9 @@ class ArcGeometry:
 
     def turned(self, builder: PlanBuilder) -> DragTarget:
         """Return the present target with the orientation at the end of the curve."""
-        return builder.target_at(StepTarget(None, None, self.angles, None, self.in_base))
+        pitch = self.pitch if isinstance(self.pitch, float) else None
+        angles = Angles(pitch, self.roll, self.yaw)
+        return builder.target_at(StepTarget(angles=angles, in_base=self.in_base))
 
     def follow(
         self, builder: PlanBuilder, arc: AnyCurve, name: str, branch: AnyBranch | None = None
@@ -197,7 +184,7 @@ class ArcGeometry:
 
         tool_path = builder.first(builder.branches(branch), path)
         builder.move_to(tool_path.start, f"{name}: to its start")
-        builder.follow([tool_path], name, self.tool_speed)
+        builder.follow([tool_path], name, self.feed)
 
     def follow_or_advise(
         self,
@@ -229,97 +216,54 @@ class ArcGeometry:
             raise unfollowed(builder, error, arc(end, 1.0), first, remedies) from error
 
 
-@dataclass(frozen=True)
-class Arc:
-    """Move the tool about an axis by ``angle`` [rad] and along it by ``climb`` [m]."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arc(_Turn, word="arc"):
+    """Move the tool point round an axis from its present place.
 
-    schema: ClassVar[Schema] = mapping(
-        "Move the tool point round an axis from its present place",
-        "centre axis angle",
-        {
-            "centre": reference("point"),
-            "axis": reference("direction"),
-            "angle": TURN,
-            "climb": {**LENGTH, "description": "Motion along the axis, mm"},
-            "pitch": ARC_PITCH,
-            "roll": TURN,
-            "yaw": TURN,
-            "feed": FEED,
-        },
-    )
+    Attributes:
+        angle: about the axis [rad].
+        climb: along the axis [m].
+    """
 
-    turn: ArcGeometry
-    angle: float
-    climb: float
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {centre, axis, angle, climb, pitch, roll, yaw, feed}. Raises ScriptError."""
-        fields = Fields(value, "an arc")
-        found = cls(
-            ArcGeometry.read(fields, "axis", setting),
-            fields.need("angle", read.angle(), 1.0),
-            fields.take("climb", read.millimetres(), 0.0),
-        )
-        fields.done()
-        return found
+    angle: Angle
+    climb: Climb = 0.0
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the arc. Raises InputError if the tool cannot follow it."""
-        start, end = builder.target, self.turn.turned(builder)
-        centre, axis = self.turn.seen(builder)
+        start, end = builder.target, self.turned(builder)
+        centre, axis = self.seen(builder)
         arc_of = builder.planning.arc
 
         def arc(end: DragTarget, fraction: float) -> AnyCurve:
             angle, climb = fraction * self.angle, fraction * self.climb
             return arc_of(centre, axis, angle, climb, start, end)
 
-        self.turn.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
+        self.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
 
 
-@dataclass(frozen=True)
-class Circle:
-    """Move the tool to the highest point of a circle of ``radius`` [m], and from there round it."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Circle(_Turn, word="circle"):
+    """Move to the highest point of a circle, then round it.
 
-    schema: ClassVar[Schema] = mapping(
-        "Move to the highest point of a circle, then round it",
-        "centre normal radius",
-        {
-            "centre": reference("point"),
-            "normal": reference("direction"),
-            "radius": number_or_text(0.1, 1000.0, "mm"),
-            "turns": number_or_text(-20.0, 20.0, "Number of turns, 1 unless given"),
-            "pitch": ARC_PITCH,
-            "roll": TURN,
-            "yaw": TURN,
-            "branch": BRANCH,
-            "feed": FEED,
-        },
-    )
+    Attributes:
+        radius: [m].
+        turns: number of turns.
+    """
 
-    turn: ArcGeometry
-    radius: float
-    turns: float
-    branch: AnyBranch | None
+    axis: Annotated[FloatArray, DIRECTION.named("normal")]
+    radius: Annotated[float, millimetres(0.1, 1000.0)]
+    turns: Annotated[float, number(-20.0, 20.0, about="Number of turns, 1 unless given")] = 1.0
+    branch: Branch = None
 
     @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read the fields of the schema. Raises ScriptError."""
-        fields = Fields(value, "a circle")
-        found = cls(
-            ArcGeometry.read(fields, "normal", setting),
-            fields.need("radius", read.millimetres(0.1, 1000.0), 0.1),
-            fields.take("turns", read.number(-20.0, 20.0), 1.0),
-            places.branch(fields),
-        )
-        if found.turns == 0.0:
-            fields.problems += value.wrong("`turns` must not be 0.").problems
-        fields.done()
-        return found
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of a circle without turns."""
+        if given.get("turns") == 0.0:
+            yield "turns", "`turns` must not be 0."
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the circle. Raises InputError if the tool cannot follow it."""
-        centre, normal = self.turn.seen(builder)
+        centre, normal = self.seen(builder)
         up = builder.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
         out = up - (up @ normal) * normal
         if math.hypot(*out) < LEVEL_TOLERANCE:
@@ -334,45 +278,28 @@ class Circle:
             return arc_of(centre, normal, turn, 0.0, there, there)
 
         size = "radius", 1e3 * self.radius
-        self.turn.follow_or_advise(builder, arc, self.turn.turned(builder), size, self.branch)
+        self.follow_or_advise(builder, arc, self.turned(builder), size, self.branch)
 
 
-@dataclass(frozen=True)
-class Screw:
-    """Move the tool as one rigid body about an axis and along it, as far as its axes can."""
+@dataclass(frozen=True, eq=False)
+class Screw(Step, word="screw"):
+    """Move the tool about an axis and along it, as one rigid body.
 
-    schema: ClassVar[Schema] = mapping(
-        "Move the tool about an axis and along it, as one rigid body",
-        "point axis",
-        {
-            "point": reference("point"),
-            "axis": reference("direction"),
-            "angle": TURN,
-            "climb": {**LENGTH, "description": "Motion along the axis, mm"},
-        },
-    )
+    Attributes:
+        point: (3,) of the axis [m].
+        axis: (3,) unit vector.
+        angle: about the axis [rad].
+        climb: along the axis [m].
+        in_base: whether point and axis are in the base frame, not in {S}.
+    """
 
-    point: FloatArray
-    axis: FloatArray
-    angle: float
-    climb: float
-    in_base: bool
+    needs = ("angle", "climb")
 
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:
-        """Read {point, axis, angle, climb}. Raises ScriptError."""
-        fields = Fields(value, "a screw")
-        found = cls(
-            fields.need("point", lambda each: places.point(each, setting), np.zeros(3)),
-            fields.need("axis", read.direction, np.eye(3)[0]),
-            fields.take("angle", read.angle(), 0.0),
-            fields.take("climb", read.millimetres(), 0.0),
-            setting.in_base,
-        )
-        if found.angle == 0.0 and found.climb == 0.0:
-            fields.problems += value.wrong("A screw needs an `angle`, a `climb` or both.").problems
-        fields.done()
-        return found
+    point: Point
+    axis: Direction
+    angle: Angle = 0.0
+    climb: Climb = 0.0
+    in_base: bool = False
 
     def build(self, builder: PlanBuilder) -> None:
         """Plan the screw. Raises InputError if the tool cannot follow it."""
@@ -385,13 +312,3 @@ class Screw:
             builder.lead([screw], "screw")
         except InputError as error:
             raise unfollowed(builder, error, screw, branch, iter(())) from error
-
-
-STEPS: dict[str, type[Step]] = {
-    "line": Line,
-    "lines": Lines,
-    "arc": Arc,
-    "circle": Circle,
-    "screw": Screw,
-}
-"""Steps of this module, by their names in a script."""

@@ -5,33 +5,32 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Annotated
 
 import numpy as np
 
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import BlockedError, InputError
-from katana450.extensions.programs import fields as read
 from katana450.extensions.programs.actions import FollowPlan
 from katana450.extensions.programs.attached_files import CSV, attached_file
-from katana450.extensions.programs.fields import Fields
-from katana450.extensions.programs.places import LEAST_JOINTS, MAX_JOINTS
-from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
-from katana450.extensions.programs.recorded_pace import recorded_scaling
-from katana450.extensions.programs.schema_parts import (
-    TEXT,
-    Schema,
+from katana450.extensions.programs.declaration import Kind
+from katana450.extensions.programs.kinds import (
+    LEAST_JOINTS,
+    MAX_ANGLE,
+    MAX_JOINTS,
     any_of,
+    defined,
+    degrees,
     list_of,
-    mapping,
-    reference,
+    listed,
+    number,
 )
-from katana450.extensions.programs.script_context import ScriptContext
+from katana450.extensions.programs.plan_builder import CARRY, PlanBuilder, UntimedPath
+from katana450.extensions.programs.scope import ScriptContext
 from katana450.extensions.programs.source import YamlValue
 from katana450.extensions.programs.step import Step
-from katana450.extensions.programs.trajectory_path import TrajectoryPath
+from katana450.extensions.programs.trajectory_path import TrajectoryPath, recorded_scaling
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
@@ -72,76 +71,45 @@ class UntimedTrajectory(UntimedPath):
         return FollowPlan(made, note=note)
 
 
-@dataclass(frozen=True, eq=False)
-class FollowTrajectory:
-    """Move through postures at given times, on a smooth path.
+TIME = number(0.0, MAX_TIME, "s")
+JOINT = degrees(-MAX_ANGLE, MAX_ANGLE)
 
-    The arm first moves to the first posture, on any path round obstacles. Where limits require it,
-    the motion is slower than given.
 
-    Attributes:
-        times: (m,) [s], from any zero.
-        postures: (m, n) [rad].
-    """
-
-    schema: ClassVar[Schema] = mapping(
-        "Move through postures at given times, on a smooth path, slower where limits require it",
-        "",
-        {
-            "through": list_of(reference("posture"), 2, MAX_POSTURES),
-            "file": any_of(
-                "A .csv file beside the script: t [s], theta1 and so on [rad]",
-                TEXT,
-                {"type": "object"},
-            ),
-        },
-    )
-
-    times: FloatArray
-    postures: FloatArray
-
-    @classmethod
-    def read(cls, value: YamlValue, setting: ScriptContext) -> Self:  # noqa: ARG003
-        """Read {through: rows of a time [s] and angles [deg]}, or {file}. Raises ScriptError."""
-        fields = Fields(value, "a trajectory")
-        rows = fields.take("through", _rows, None)
-        if rows is None:
-            rows = fields.need("file", _rows_of_file, ())
-        fields.done()
-        table = np.array(rows)
-        return cls(frozen(table[:, 0]), frozen(table[:, 1:]))
-
-    def build(self, builder: PlanBuilder) -> None:
-        """Plan the way to the start, and the trajectory.
-
-        Raises BlockedError with the time at which two parts would meet, and InputError for a
-        posture beyond the limits, or of another number of joints.
-        """
-        joints, given = builder.chain.n, self.postures.shape[1]
-        if given != joints:
-            raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
-        path = TrajectoryPath(builder.chain, self.times, self.postures)
-        builder.move_to(path.start, f"{TRAJECTORY}: approach")
-        _check_clear(builder, path)
-        arm, world = builder.plan_context.arm, builder.world
-        builder.note(
-            TRAJECTORY,
-            UntimedTrajectory(arm, world, builder.state, (path,)),
-            builder.standing(path.end),
+def _row(value: YamlValue, _context: ScriptContext) -> tuple[float, ...]:
+    """Read a time [s] and the angles of all joints [deg]; the angles are returned in rad."""
+    if value.kind != "list" or not LEAST_JOINTS <= len(value.items) - 1 <= MAX_JOINTS:
+        raise value.wrong(
+            "Expected a time and the angles of all joints, such as [0.5, 0, -65, 85, 8, 0]."
         )
+    time, *angles = value.items
+    return TIME(time), *map(JOINT, angles)
 
 
-def _rows(value: YamlValue) -> Sequence[tuple[float, ...]]:
+POSTURE = defined(
+    "posture",
+    Kind(
+        _row,
+        list_of(
+            number(-MAX_TIME, MAX_TIME, about="A time, s, then the angles, deg").schema,
+            1 + LEAST_JOINTS,
+            1 + MAX_JOINTS,
+        ),
+    ),
+)
+POSTURES = listed(POSTURE, 2, MAX_POSTURES)
+
+
+def _rows(value: YamlValue, _context: ScriptContext) -> FloatArray:
     """Read rows of one length."""
-    rows = read.listed(_row, 2, MAX_POSTURES)(value)
+    rows = POSTURES(value)
     joints = len(rows[0]) - 1
     for item, row in zip(value.items, rows, strict=True):
         if len(row) != 1 + joints:
             raise item.wrong(f"Expected a time and {joints} angles, as in the first row.")
-    return rows
+    return np.array(rows)
 
 
-def _rows_of_file(value: YamlValue) -> Sequence[tuple[float, ...]]:
+def _rows_of_file(value: YamlValue, _context: ScriptContext) -> FloatArray:
     """Read the times [s] and angles [rad] of a .csv file. Raises ScriptError with its row."""
     file = attached_file(value, CSV)
     lines = csv.DictReader(file.text.splitlines())
@@ -153,28 +121,66 @@ def _rows_of_file(value: YamlValue) -> Sequence[tuple[float, ...]]:
             "so on, in rad, as `katana450 record export` writes them."
         )
     rows = []
-    for number, line in enumerate(lines, start=2):
+    for row_number, line in enumerate(lines, start=2):
         try:
             row = tuple(float(line[name]) for name in ("t", *joints))
         except (TypeError, ValueError):
             row = (math.nan,)
         if not all(map(math.isfinite, row)):
-            raise file.at.wrong(f"Line {number} of {file.name} is not a number in each column.")
+            raise file.at.wrong(f"Line {row_number} of {file.name} is not a number in each column.")
         rows.append(row)
     if not 2 <= len(rows) <= MAX_POSTURES:
         raise file.at.wrong(f"{file.name} has {len(rows)} rows, not 2 to {MAX_POSTURES}.")
-    return rows
+    return np.array(rows)
 
 
-def _row(value: YamlValue) -> tuple[float, ...]:
-    """Read a time [s] and the angles of all joints [deg]; the angles are returned in rad."""
-    if value.kind != "list" or not LEAST_JOINTS <= len(value.items) - 1 <= MAX_JOINTS:
-        raise value.wrong(
-            "Expected a time and the angles of all joints, such as [0.5, 0, -65, 85, 8, 0]."
+@dataclass(frozen=True, eq=False)
+class FollowTrajectory(Step, word="trajectory"):
+    """Move through postures at given times, on a smooth path, slower where limits require it.
+
+    The arm first moves to the first posture, on any path round obstacles.
+
+    Attributes:
+        through: (m, 1 + n) rows of a time [s], from any zero, and a posture [rad].
+        file: the same of a file.
+    """
+
+    needs = excludes = ("through", "file")
+
+    through: Annotated[FloatArray | None, Kind(_rows, POSTURES.schema)] = None
+    file: Annotated[
+        FloatArray | None,
+        Kind(
+            _rows_of_file,
+            any_of(
+                "A .csv file beside the script: t [s], theta1 and so on [rad]",
+                {"type": "string"},
+                {"type": "object"},
+            ),
+        ),
+    ] = None
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the way to the start, and the trajectory.
+
+        Raises BlockedError with the time at which two parts would meet, and InputError for a
+        posture beyond the limits, or of another number of joints.
+        """
+        rows = self.file if self.through is None else self.through
+        assert rows is not None
+        times, postures = frozen(rows[:, 0]), frozen(rows[:, 1:])
+        joints, given = builder.chain.n, postures.shape[1]
+        if given != joints:
+            raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
+        path = TrajectoryPath(builder.chain, times, postures)
+        builder.move_to(path.start, f"{TRAJECTORY}: approach")
+        _check_clear(builder, path)
+        arm, world = builder.plan_context.arm, builder.world
+        builder.note(
+            TRAJECTORY,
+            UntimedTrajectory(arm, world, builder.state, (path,)),
+            builder.standing(path.end),
         )
-    time, *angles = value.items
-    angle = read.degrees()
-    return read.number(0.0, MAX_TIME, "s")(time), *map(angle, angles)
 
 
 def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
@@ -196,7 +202,3 @@ def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
         forward(path.chain, x[: path.chain.n])[:3, 3].tolist(),
         parts=worst.parts,
     )
-
-
-STEPS: dict[str, type[Step]] = {TRAJECTORY: FollowTrajectory}
-"""Program steps of this module, by their names in a script."""

@@ -33,7 +33,6 @@ from katana450.extensions.programs.server.program_participant import (
 )
 from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.server.run_progress import run_progress
 from katana450.extensions.programs.server.state_line import RunNews
 from katana450.server.api import answers
 from katana450.server.api import program_requests as requests
@@ -264,7 +263,7 @@ class ProgramRunner(Runner):
             found = planning.progress(owner.person.name)
         else:
             allowed = 1.0 if self._runs_as is None else self._runs_as.allowed
-            found = run_progress(program, run, arm.state, owner.person.name, allowed)
+            found = runner.progress(program, run, arm.state, owner.person.name, allowed)
         began = self._owner.began
         return msgspec.structs.replace(
             found,

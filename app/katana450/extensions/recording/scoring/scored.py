@@ -19,8 +19,11 @@ from katana450.extensions.programs.measured_run import (
     path_of,
 )
 from katana450.extensions.programs.measures import MEASURES as REPORTED
-from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
-from katana450.extensions.programs.motion_measures import motion_measures, water_measures
+from katana450.extensions.programs.measures import (
+    OF_A_MEASURED_ARM,
+    motion_measures,
+    water_measures,
+)
 from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recorded_states import recorded_states
