@@ -13,7 +13,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.messages import sentence
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.links import links_of
-from katana450.extensions.general_arms.tool_motion import tool_and_jacobian
+from katana450.extensions.general_arms.numerical import tool_and_jacobian
 from katana450.maths.geometry import screws, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward

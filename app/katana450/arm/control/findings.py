@@ -18,7 +18,7 @@ from katana450.maths.kinematics.projection import (
     Projection,
 )
 from katana450.maths.kinematics.tracker import Tracked
-from katana450.maths.kinematics.velocity import Task, limit_distances, limited_jog
+from katana450.maths.kinematics.velocity import limit_distances, limited_jog
 from katana450.maths.motion.limiter import Limits
 
 MIN_JOG_FRACTION = 0.05
@@ -86,18 +86,16 @@ def of_projection(
     return tuple(findings)
 
 
-def of_jog(
-    chain: Chain, q: FloatArray, V: FloatArray, task: Task | None = None
-) -> tuple[Finding, ...]:
+def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
     """Return the findings on what stops a jog at ``q`` (n,) [rad].
 
-    V: twist (6,) of the jog in {S} [rad/s, m/s]. task: see ``velocity.jog``.
+    V: twist (6,) of the jog in {S} [rad/s, m/s].
     """
-    if limited_jog(chain, q, V, task=task) < MIN_JOG_FRACTION:
+    if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
         return (Finding(Reason.SINGULAR),)
     near = limit_distances(chain, q) <= LIMIT_DISTANCE
     # Computed only near a limit, to keep the tick short.
-    if not near.any() or limited_jog(chain, q, V, LIMIT_DISTANCE, task) > FULL_JOG_FRACTION:
+    if not near.any() or limited_jog(chain, q, V, LIMIT_DISTANCE) > FULL_JOG_FRACTION:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(

@@ -21,7 +21,7 @@ from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import DragTarget, ToolTarget
-from katana450.maths.kinematics.turns import in_limits_turn
+from katana450.maths.kinematics.turns import in_limits_turns
 from katana450.maths.motion.limiter import Limits
 
 ELBOW = 2
@@ -40,7 +40,6 @@ class FiveAxisTool(FiveAxisKinematics):
     }
     freedoms: ClassVar[int] = 5
     turn: ClassVar[type[TurnCommand]] = Turn
-    task: ClassVar[None] = None
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return `branch.branch_of`."""
@@ -134,7 +133,7 @@ class FiveAxisTool(FiveAxisKinematics):
     def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return the joint angles (5,) [rad] inside limits, nearest to a canonical posture."""
         chain = self.chain
-        q = in_limits_turn(chain, arm_of(chain).joints(posture))
+        q = in_limits_turns(chain, arm_of(chain).joints(posture))
         room = READY_ROOM * (chain.upper - chain.lower)
         return np.clip(q, chain.lower + room, chain.upper - room)
 

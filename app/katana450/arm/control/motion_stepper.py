@@ -7,6 +7,7 @@ the arm comes to rest before an obstacle, with the same brake that a stop uses.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from katana450.arm.control.contact_rule import (
 from katana450.arm.control.five_axis_tool import ELBOW
 from katana450.arm.control.following import Following
 from katana450.arm.control.goals import with_place
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.modes import Leaving
 from katana450.arm.control.plan_follower import PlanFollower
 from katana450.arm.control.state import State
@@ -55,25 +57,41 @@ COARSE_SAMPLING, FINE_SAMPLING = 0.02, 0.005
 many; the fine one is for the one decision to leave a plan."""
 
 
+Travel = Callable[[FloatArray, FloatArray], float]
+"""The distance [m] that the links travel between two joint vectors (n,)."""
+
+
+def no_travel(_q: FloatArray, _to: FloatArray) -> float:
+    """Return 0 m, the travel of links whose lengths are unknown."""
+    return 0.0
+
+
 class MotionStepper:
-    """Moves the setpoints of one arm, tick by tick. Its methods are pure."""
+    """Moves the setpoints of one robot, tick by tick. Its methods are pure.
+
+    Joints without a tool move under the same rules, but for those about the tool.
+    """
 
     def __init__(
         self,
-        arm: ArmModel,
+        robot: ArmModel | JointSet,
         world: CollisionWorld | None,
         tool_speed: float,
         touch: FloatArray | None = None,
+        travel: Travel = no_travel,
     ) -> None:
         """Create the stepper.
 
         Args:
-            arm: the arm.
+            robot: the arm, or the joints of a robot that is none.
             world: the collision world; None to check no contacts.
             tool_speed: maximum speed of the tool point [m/s].
             touch: (p,) minimum distance of each pair of bodies while the fingers move [m].
+            travel: of the links of joints without a tool.
         """
-        self._arm = arm
+        self._arm = robot if isinstance(robot, ArmModel) else None
+        self._travel = travel
+        self._gripper = robot.gripper
         self._world = world
         self._touch = touch
         # Pairs that the fingers may touch: such a contact makes no finding.
@@ -86,9 +104,9 @@ class MotionStepper:
             )
         self._maximum = tool_speed
         self._tool_speed = PLANNED_SPEED_FRACTION * tool_speed
-        self._follower = PlanFollower(world, slides=arm.gripper.slides)
-        self._any = Limiter(arm.limits)
-        kept = arm.kinematics.branch_limits(arm.limits)
+        self._follower = PlanFollower(world, slides=robot.gripper.slides)
+        self._any = Limiter(robot.limits)
+        kept = {} if self._arm is None else self._arm.kinematics.branch_limits(robot.limits)
         self._elbow = {branch: Limiter(limits) for branch, limits in kept.items()}
 
     def step(self, state: State, dt: float) -> State:
@@ -163,31 +181,35 @@ class MotionStepper:
         return lower - LIMIT_TOLERANCE <= end <= upper + LIMIT_TOLERANCE
 
     def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
-        """Return the end of a brake begun now (n,) [rad], the tool's travel [m], the time [s]."""
-        motion, chain = state.motion, self._arm.chain_to(state.tool)
+        """Return the end of a brake begun now (n,) [rad or m], the travel [m], the time [s]."""
+        motion, limits = state.motion, self._any.limits
         if state.following is not None:
             end = self._follower.stopping_point(state.following).motion().q
             time = self._follower.stopping_time(state.following)
         else:
             # A plan that ends at a limit may exceed it by rounding; such a goal is unreachable.
-            end, time = (
-                chain.clamp(self._any.stopping_point(motion)),
-                self._any.stopping_time(motion),
-            )
+            end = np.clip(self._any.stopping_point(motion), limits.lower, limits.upper)
+            time = self._any.stopping_time(motion)
+        if self._arm is None:
+            return frozen(end), self._travel(motion.q, end), time
+        chain = self._arm.chain_to(state.tool)
         travel = math.dist(forward(chain, end)[:3, 3], forward(chain, motion.q)[:3, 3])
         return frozen(end), travel, time
 
     def may_leave(self, state: State) -> bool:
-        """Return whether the arm may leave its plan and brake as hard as it can."""
-        if state.motion.at_rest:
+        """Return whether the robot may leave its plan and brake as hard as it can."""
+        tool = self._tool(state)
+        if state.motion.at_rest or tool is None:
             return True
-        tool = self._arm.kinematics_to(state.tool)
         if not self._below(self._maximum, tool, state.motion, FINE_SAMPLING):
             return False
         return (
             self._world is None
             or self._met(state, state.motion, None, state.gripper_setpoint) is None
         )
+
+    def _tool(self, state: State) -> ToolKinematics | None:
+        return None if self._arm is None else self._arm.kinematics_to(state.tool)
 
     def _free_to_leave(self, state: State) -> bool:
         # The distance of a stop has been reported, so the stop ends as it began.
@@ -212,10 +234,12 @@ class MotionStepper:
         limiter, motion = self.limiter(state), state.motion
         if state.stopped is not None:
             return self._any.stop(motion, dt)
-        tool = self._arm.kinematics_to(state.tool)
+        tool = self._tool(state)
         if state.paused and state.jogging is None:
             pause = limiter.pause(motion, state.goal, dt)
-            return self._slow_or_braking(tool, motion, pause, dt)
+            return pause if tool is None else self._slow_or_braking(tool, motion, pause, dt)
+        if tool is None:
+            return self._towards(limiter, state, dt, state.speed)
         fraction = min(state.speed, self._fraction(tool, state))
         rates = None
         if state.jogging is not None:
@@ -223,8 +247,8 @@ class MotionStepper:
             q = chain.clamp(motion.q + dt * motion.qd)
             V = tool.jog_twist(q, jogging.rates, jogging.frame) * (not state.paused)
             low, high = self._any.stoppable(q)
-            rates = jog(chain, q, V, JogFrame.BASE, dt, bounds=(low, high), task=tool.task)
-            steady = coasted(chain, motion.q, motion.qd, dt, tool.task)
+            rates = jog(chain, q, V, JogFrame.BASE, dt, bounds=(low, high))
+            steady = coasted(chain, motion.q, motion.qd, dt)
             # Joints that their limits slow move one by one.
             free = (rates > low) & (rates < high) | (np.abs(steady) < STILL)
         for _ in range(MAX_SLOWDOWNS):
@@ -232,16 +256,21 @@ class MotionStepper:
                 wanted = fraction * rates
                 straight = free.all() and in_proportion(self._any, motion, steady, wanted, dt)
                 ahead = straight or self._any.at_rate(motion, wanted, dt)
-            elif state.servo is not None:
-                ahead = stream_step(limiter, motion, state.servo, state.t, dt, fraction)
             else:
-                ahead = limiter.towards(motion, state.goal, dt, fraction)
+                ahead = self._towards(limiter, state, dt, fraction)
             speed = tool.tool_speed(ahead.q, ahead.qd)
             enough = max(self._tool_speed, tool.tool_speed(motion.q, motion.qd))
             if speed <= enough and self._slow_to_rest(tool, ahead):
                 return ahead
             fraction *= 0.9 * min(1.0, self._tool_speed / speed)
         return self._slow_or_braking(tool, motion, ahead, dt)
+
+    @staticmethod
+    def _towards(limiter: Limiter, state: State, dt: float, fraction: float) -> JointMotion:
+        """Return the next motion to the goal or along the stream, at a fraction of the speeds."""
+        if state.servo is not None:
+            return stream_step(limiter, state.motion, state.servo, state.t, dt, fraction)
+        return limiter.towards(state.motion, state.goal, dt, fraction)
 
     def _slow_or_braking(
         self, tool: ToolKinematics, now: JointMotion, ahead: JointMotion, dt: float
@@ -298,7 +327,7 @@ class MotionStepper:
         return min(1.0, self._tool_speed / speed) if speed > 0.0 else 1.0
 
     def _fingers(self, state: State, dt: float) -> float:
-        reach = self._arm.gripper.speed * dt
+        reach = self._gripper.speed * dt
         if state.stopped is not None or state.paused:
             return state.gripper_setpoint
         return state.gripper_setpoint + min(

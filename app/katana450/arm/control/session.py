@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -37,7 +36,6 @@ from katana450.arm.control.goals import (
     without_finding,
 )
 from katana450.arm.control.grip import gripped
-from katana450.arm.control.joint_stepper import JointStepper, Travel, no_travel
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.modes import (
     IDLE,
@@ -47,7 +45,7 @@ from katana450.arm.control.modes import (
     Positioning,
     Tracking,
 )
-from katana450.arm.control.motion_stepper import MotionStepper
+from katana450.arm.control.motion_stepper import MotionStepper, Travel, no_travel
 from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_changes import with_scene_change
@@ -72,20 +70,7 @@ NO_BRANCH = BRANCHES[0]
 """The branch in the state of a robot that has none; nothing reads it."""
 
 
-class Stepper(Protocol):
-    """Moves the setpoints of a state towards its goal, under every limit."""
-
-    def step(self, state: State, dt: float) -> State:
-        """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
-        ...
-
-    def stopping_point(self, state: State) -> tuple[FloatArray, float, float]:
-        """Return the end of a brake begun now (n,) [rad or m], the travel [m] and the time [s]."""
-        ...
-
-    def may_leave(self, state: State) -> bool:
-        """Return whether the joints may leave their plan and brake as hard as they can."""
-        ...
+_Cache = tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper]
 
 
 class Session:
@@ -134,7 +119,9 @@ class Session:
         self._tool_speed = tool_speed
         self._travel = travel
         # Cache for the objects of the newest state.
-        self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper] | None = None
+        self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper] | None = (
+            None
+        )
         self.check(cmd.Joints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
@@ -161,19 +148,19 @@ class Session:
         """Return the collision world with the objects of ``state``; None without checks."""
         return self._for(state)[1]
 
-    def _for(self, state: State) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, Stepper]:
+    def _for(
+        self, state: State
+    ) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper]:
         if self._cache is None or self._cache[0] is not state.objects:
             world = self.environment.world(state.objects)
-            stepper: Stepper
-            if isinstance(self._robot, JointSet):
-                stepper = JointStepper(self._robot, self._travel, world)
-            else:
-                touch = None if world is None else self.environment.touch(world, state.objects)
-                stepper = MotionStepper(self.require_arm(), world, self._tool_speed, touch)
+            touch = None
+            if world is not None and self.arm is not None:
+                touch = self.environment.touch(world, state.objects)
+            stepper = MotionStepper(self._robot, world, self._tool_speed, touch, self._travel)
             self._cache = (state.objects, world, stepper)
         return self._cache
 
-    def _stepper(self, state: State) -> Stepper:
+    def _stepper(self, state: State) -> MotionStepper:
         return self._for(state)[2]
 
     def check(self, command: cmd.Command) -> None:

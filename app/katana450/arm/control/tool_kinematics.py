@@ -14,7 +14,7 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.tracker import Tracked
-from katana450.maths.kinematics.velocity import JogFrame, Task
+from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
 
 
@@ -29,7 +29,6 @@ class ToolKinematics(Kinematics, Protocol):
         freedoms: number of numbers in a jog and in a step: 5 (x, y, z, pitch, roll), or 6 (x, y, z
             and a rotation about each axis of the frame).
         turn: the command that turns the tool.
-        task: the components of a twist that the arm follows; None for those of five axes.
     """
 
     @property
@@ -38,8 +37,6 @@ class ToolKinematics(Kinematics, Protocol):
     def freedoms(self) -> int: ...  # noqa: D102
     @property
     def turn(self) -> type[TurnCommand]: ...  # noqa: D102
-    @property
-    def task(self) -> Task | None: ...  # noqa: D102
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the branch of the joint angles `q` (n,) [rad]."""

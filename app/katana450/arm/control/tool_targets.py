@@ -128,7 +128,7 @@ def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> S
     kinematics, q = arm.kinematics_to(state.tool), state.setpoint
     kept = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
     V = kinematics.jog_twist(q, jogging.rates, jogging.frame)
-    held = of_jog(kinematics.chain, q, V, kinematics.task)
+    held = of_jog(kinematics.chain, q, V)
     branch = kinematics.branch_of(rest)
     aimed = replace(state, goal=rest, branch=branch, findings=kept + held)
     if state.t < jogging.until:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,17 +14,90 @@ import numpy.typing as npt
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding
-from katana450.extensions.general_arms.form import Form, form_of
-from katana450.extensions.general_arms.functions import ARRAYS, FLOATS
+from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
-from katana450.extensions.general_arms.parallel_axes import LOOSE, six_axes
-from katana450.extensions.general_arms.spherical_wrist import Solve
+from katana450.extensions.general_arms.parallel_axes import (
+    LOOSE,
+    four_axes,
+    pointed,
+    six_axes,
+    why_not_parallel,
+)
+from katana450.extensions.general_arms.spherical_wrist import (
+    Solve,
+    crossing_shoulder,
+    is_crossing_shoulder,
+    is_parallel_shoulder,
+    parallel_shoulder,
+    why_not_spherical,
+)
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse_batch import validated_poses
 from katana450.maths.kinematics.solution import Angles, Solutions
-from katana450.maths.kinematics.turns import another_turn_helps, in_turn, nearest_turn
+from katana450.maths.kinematics.turns import (
+    another_turn_helps,
+    in_limits_turns,
+    in_turn,
+    nearest_turn,
+)
+
+
+class Form(NamedTuple):
+    """A closed form that solves certain links.
+
+    Attributes:
+        method: in words.
+        links: the links as the formulas read them.
+        build: makes the function solve(rows, free) of the module of the formulas.
+        keeps_tool_point: whether rows hold the place of the tool point, not of the last frame.
+    """
+
+    method: str
+    links: DHLinks
+    build: Callable[[DHLinks, Operations], Solve]
+    keeps_tool_point: bool = False
+
+    @property
+    def T_after(self) -> FloatArray:
+        """The rows of a pose `T` = T_S_tool are those of T_1_S T T_after."""
+        T = self.links.T_tool_n
+        return se3.from_rotation_translation(T[:3, :3], np.zeros(3)) if self.keeps_tool_point else T
+
+
+def form_of(links: DHLinks) -> Form | str:
+    """Return the closed form of four or six axes, or the condition that these links miss."""
+    if links.n == 4:
+        missing = why_not_parallel(links)
+        return missing or Form(
+            "closed form for four axes: pan and three parallel axes",
+            pointed(links),
+            four_axes,
+            keeps_tool_point=True,
+        )
+    if links.n != 6:
+        return f"it has {links.n} axes"
+    if is_parallel_shoulder(links):
+        return Form(
+            "closed form for six axes with a spherical wrist",
+            links,
+            parallel_shoulder,
+        )
+    if is_crossing_shoulder(links):
+        return Form(
+            "closed form for six axes with a spherical wrist and a shoulder whose axes meet",
+            links,
+            crossing_shoulder,
+        )
+    parallel = why_not_parallel(links)
+    if not parallel:
+        return Form(
+            "closed form for six axes, three of them parallel",
+            links,
+            six_axes,
+        )
+    return f"{why_not_spherical(links)}, and {parallel}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,17 +266,6 @@ class ClosedForm:
             for number in np.flatnonzero(in_line).tolist():
                 q[number] = list(map(self._joints, self._canonical(poses[number], shift)))
         return q
-
-
-def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return `q` (..., n) [rad], each angle in the turn inside its limits, else in [-pi, pi]."""
-    q = q - math.tau * np.round(q / math.tau)
-    for turn in (math.tau, -math.tau):
-        other = q + turn
-        outside = (q < chain.lower) | (q > chain.upper)
-        fits = outside & (other >= chain.lower) & (other <= chain.upper)
-        q = np.where(fits, other, q)
-    return q
 
 
 def inverses(T: FloatArray) -> FloatArray:

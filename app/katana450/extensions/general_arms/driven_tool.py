@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar, Final
 
 import numpy as np
@@ -19,15 +20,13 @@ from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.descent import Descent
 from katana450.extensions.general_arms.links import links_of
-from katana450.extensions.general_arms.losses import losses_of
-from katana450.extensions.general_arms.nearest import nearest_posture, projected
+from katana450.extensions.general_arms.nearest import losses_of, nearest_posture, projected
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.extensions.general_arms.ready_posture import ready_posture
 from katana450.extensions.general_arms.regularity import WALL, Regularity
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.general_arms.twist_task import twist_task
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -38,7 +37,7 @@ from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projec
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.tool import DragTarget
 from katana450.maths.kinematics.tracker import Tracked
-from katana450.maths.kinematics.velocity import JogFrame, Task
+from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
 
 SEARCH_EFFORT: Final = 60
@@ -87,11 +86,6 @@ class DrivenTool:
         return PoseTracker(Descent(search, regularity), self._branches)
 
     @property
-    def task(self) -> Task:
-        """`twist_task`."""
-        return twist_task
-
-    @property
     def method(self) -> str:
         """The method in words."""
         return self._branches.solver.method
@@ -115,8 +109,7 @@ class DrivenTool:
 
     def target_at(self, q: FloatArray) -> ToolPose:
         """Return the pose of the tool at `q` (n,) [rad]."""
-        T = forward(self.chain, q)
-        return ToolPose(frozen(T[:3, 3]), frozen(self._pan(q).T @ T[:3, :3]))
+        return self._seen(forward(self.chain, q), q)
 
     def turned(self, state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
         """Return ``target`` with the rotation of ``command``."""
@@ -163,25 +156,35 @@ class DrivenTool:
         An arm without a closed form searches from the goal, and from other postures if that does
         not lead there.
         """
+        return self._nearest(state, T, branch, partial(self._seen, T))
+
+    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
+        """Return the posture on ``branch`` nearest to ``target``."""
+        pose = _pose(target)
+        T = np.array(pose.T)
+        T[:3, :3] = self._pan(state.goal) @ T[:3, :3]
+        return self._nearest(state, T, branch, lambda _q: pose)
+
+    def _nearest(
+        self,
+        state: State,
+        T: FloatArray,
+        branch: AnyBranch,
+        target_at: Callable[[FloatArray], ToolPose],
+    ) -> Projection:
+        """Return the posture on ``branch`` nearest to the target, which `q` (n,) may turn.
+
+        The pose `T` (4, 4) is that of the target with axis 1 as in the goal.
+        """
         found = []
         for start in self._starts(state, T, branch):
             q = start
             for _ in range(SETTLINGS if self.chain.n < 6 else 1):
-                before, q = q, self._descended(q, self._seen(T, q), state.priority)
+                before, q = q, self._descended(q, target_at(q), state.priority)
                 if abs(q[0] - before[0]) < SETTLED:
                     break
-            branch_there = str(self.branch_of(q))
-            found.append(projected(self.chain, q, T, branch_there, state.priority))
-        return self._best(found, state, T, branch)
-
-    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
-        """Return the posture on ``branch`` nearest to ``target``."""
-        pose, priority, found = _pose(target), state.priority, []
-        T = np.array(pose.T)
-        T[:3, :3] = self._pan(state.goal) @ T[:3, :3]
-        for start in self._starts(state, T, branch):
-            q = self._descended(start, pose, priority)
-            found.append(self._projected(q, pose, str(self.branch_of(q)), priority))
+            name = str(self.branch_of(q))
+            found.append(self._projected(q, target_at(q), name, state.priority))
         return self._best(found, state, T, branch)
 
     def _best(

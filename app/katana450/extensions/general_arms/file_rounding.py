@@ -21,7 +21,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.turns import in_limits_turn
+from katana450.maths.kinematics.turns import in_limits_turns
 
 CORRECTIONS: Final = 2
 
@@ -102,7 +102,7 @@ class FileRounding:
         for k in np.flatnonzero((missed > EXACT) & (missed <= BESIDE * self.offset)).tolist():
             found, _ = self._search.descend(self._search.goal(T[k]), q[k].tolist(), STEPS)
             if np.abs(forward(chain, found) - T[k]).max() < missed[k]:
-                q[k] = in_limits_turn(chain, np.array(found))
+                q[k] = in_limits_turns(chain, np.array(found))
         return q
 
     @cached_property

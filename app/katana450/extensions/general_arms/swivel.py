@@ -25,7 +25,7 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
-from katana450.extensions.general_arms.closed_form import in_limits_turns, inverses
+from katana450.extensions.general_arms.closed_form import inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
@@ -44,6 +44,7 @@ from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import inverse_one_by_one
 from katana450.maths.kinematics.solution import Solutions
+from katana450.maths.kinematics.turns import in_limits_turns
 
 SWIVELS: Final = 64
 """Number of swivels of the first round."""

@@ -26,7 +26,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.turns import in_limits_turn, nearest_turn, wrapped
+from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn, wrapped
 
 POSITION_WORTH_TELLING: Final = 5e-5
 """Smallest position error [m] that is reported: half of the arm's stated precision of 0.1 mm."""
@@ -110,7 +110,7 @@ def project(
     q = arm.joints(found_posture.alpha)
     if within_limits:
         return measured(chain, T, canonical, found_posture)
-    q = nearest_turn(chain, in_limits_turn(chain, q), hint)
+    q = nearest_turn(chain, in_limits_turns(chain, q), hint)
     return measured(chain, T, canonical, found_posture, q)
 
 

@@ -31,10 +31,17 @@ def in_turn(theta: float, lower: float, upper: float) -> float:
     return turned if lower <= turned <= upper else theta
 
 
-def in_limits_turn(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return `q` (n,), each angle in the turn inside its limits if there is one, else wrapped."""
-    limits = zip(q.tolist(), chain.lower.tolist(), chain.upper.tolist(), strict=True)
-    return np.array([in_turn(theta, lower, upper) for theta, lower, upper in limits])
+def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return `q` (..., n) [rad], each angle in the turn inside its limits, else in [-pi, pi]."""
+    q = q - math.tau * np.round(q / math.tau)
+    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
+    if max(-lower.min(), upper.max()) <= math.pi:
+        return q
+    # The first turn that is not beyond the violated limit.
+    turns = np.where(q < lower, np.ceil((lower - q) / math.tau), 0.0)
+    turns = np.where(q > upper, np.floor((upper - q) / math.tau), turns)
+    other = q + math.tau * turns
+    return np.where((other >= lower) & (other <= upper), other, q)
 
 
 def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:

@@ -10,7 +10,6 @@ and 5.4.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from enum import Enum
 from functools import lru_cache
 from typing import Final
@@ -23,7 +22,7 @@ from katana450.maths.geometry import screws
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward, jacobian_body, joint_frames
+from katana450.maths.kinematics.forward import forward, jacobian_body
 
 WELL_CONDITIONED: Final = 0.05
 """Singular value [1] from which on joint rates are not damped."""
@@ -40,15 +39,15 @@ duration [s].
 """
 
 
+ALL_FREEDOMS: Final = 6
+"""Number of axes from which on an arm can follow every twist."""
+
+
 class JogFrame(Enum):
     """The frame of a jog's axes; the linear velocity is that of the tool point in both frames."""
 
     BASE = "base"
     TOOL = "tool"
-
-
-Task = Callable[[Chain, FloatArray, FloatArray, JogFrame], tuple[FloatArray, FloatArray]]
-"""Returns Jacobian (k, n) and task (k,) of a twist (6,) at joint angles (n,) [rad]."""
 
 
 @lru_cache(maxsize=16)
@@ -86,25 +85,24 @@ def jog(
     dt: float,
     *,
     bounds: tuple[FloatArray, FloatArray] | None = None,
-    task: Task | None = None,
 ) -> FloatArray:
     """Return the joint rates (n,) [rad/s] that move the tool with the twist `V` (6,).
 
-    The unit of `V` is [rad/s, m/s]. The arm can follow two components of a rotation, about the axes
-    of pitch and of roll; the third follows from the path of the tool. Damped least squares keep the
+    The unit of `V` is [rad/s, m/s]. Fewer than six axes follow only the rotation about their axes
+    from the fourth on, such as those of pitch and of roll; the rest follows from the path of the
+    tool. Damped least squares keep the
     rates bounded near a singularity, where only motion along the lost direction is lost. A joint
     that would pass its limit within `dt` [s] stops there, and the others compensate as far as they
     can. If a joint would be too fast, all are slowed by the same factor, so the direction is kept.
 
     Args:
         chain: the arm.
-        q: joint angles (5,) [rad].
+        q: joint angles (n,) [rad].
         V: twist (6,) in `frame`.
         frame: the frame of the twist.
         dt: duration of the jog [s].
         bounds: additional minimum and maximum rate (n,) [rad/s] of each joint, around 0. They bound
             a joint with inertia that approaches its limit.
-        task: the components that count; those of a five-axis arm if not given.
 
     Raises:
         InputError: `q` or `V` is invalid, or `dt` is not above 0.
@@ -113,7 +111,7 @@ def jog(
         raise InputError(f"The duration of a jog must be finite and above 0 s, not {dt:g} s.")
     q = chain.check_q(q)
     V = finite_array(V, (6,), "The twist")
-    J, wanted = (task or _task)(chain, q, V, frame)
+    J, wanted = _task(chain, q, V, frame)
     # Slowed before the limits are checked: motion that the arm is too slow for reaches no limit.
     wanted /= _excess(chain, _damped(J, wanted))
     # A joint beyond its limit may return, but need not.
@@ -134,24 +132,19 @@ def jog(
     return qd / _excess(chain, qd)
 
 
-def coasted(
-    chain: Chain, q: FloatArray, qd: FloatArray, dt: float, task: Task | None = None
-) -> FloatArray:
+def coasted(chain: Chain, q: FloatArray, qd: FloatArray, dt: float) -> FloatArray:
     """Return the joint rates (n,) [rad/s] after `dt` [s] with which the tool keeps its twist.
 
     The twist is that of the rates `qd` (n,) [rad/s] at `q` (n,) [rad]: the velocity of the tool
-    point in {S}, and the rotation that counts in `task`, see `jog`: for five axes that about the
-    axes of pitch and of roll. Near a singularity it is kept as far as the damping allows.
+    point in {S}, and the rotation that the arm can follow, see `jog`: of fewer than six axes that
+    about their own. Near a singularity it is kept as far as the damping allows.
     """
     after = q + dt * qd
-    if task is None:
-        (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, after))
-        wanted = J @ qd
-        wanted[2:] = R_after.T @ R @ wanted[2:]
-    else:
-        R, twist = forward(chain, q)[:3, :3], jacobian_body(chain, q) @ qd
-        V = np.concatenate((R @ twist[:3], R @ twist[3:]))
-        J_after, wanted = task(chain, after, V, JogFrame.BASE)
+    (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, after))
+    wanted = J @ qd
+    wanted[-3:] = R_after.T @ R @ wanted[-3:]
+    if chain.n >= ALL_FREEDOMS:
+        wanted[:3] = R_after.T @ R @ wanted[:3]
     return qd + _damped(J_after, wanted - J_after @ qd)
 
 
@@ -160,14 +153,13 @@ def limited_jog(
     q: FloatArray,
     V: FloatArray,
     edge: float | None = None,
-    task: Task | None = None,
 ) -> float:
     """Return the fraction, from 0 to 1, of the twist `V` (6,) in {S} that a jog can follow.
 
     The speed of the twist does not count; `q` (n,) are joint angles [rad]. A joint nearer than
     `edge` [rad] to a limit does not move towards it; None ignores limits.
     """
-    J, wanted = (task or _task)(chain, q, V, JogFrame.BASE)
+    J, wanted = _task(chain, q, V, JogFrame.BASE)
     size = float(wanted @ wanted)
     if size == 0.0:
         return 1.0
@@ -176,7 +168,7 @@ def limited_jog(
     minimum = np.where(q - chain.lower > edge, -chain.speed, 0.0)
     maximum = np.where(chain.upper - q > edge, chain.speed, 0.0)
     slow = SLOW / math.sqrt(size)
-    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(minimum, maximum), task=task)
+    qd = jog(chain, q, slow * V, JogFrame.BASE, SLOW, bounds=(minimum, maximum))
     return float(wanted @ (J @ qd)) / (slow * size)
 
 
@@ -225,22 +217,25 @@ def _excess(chain: Chain, qd: FloatArray) -> float:
 def _task(
     chain: Chain, q: FloatArray, V: FloatArray, frame: JogFrame
 ) -> tuple[FloatArray, FloatArray]:
-    """Return Jacobian (5, n) and task (5,): pitch and roll rate, and v over a length.
+    """Return Jacobian (k, n) and task (k,): the rotation that counts, and v over a length.
 
     All components are in the tool frame, at the tool point.
     """
     J, R, axes = _freedoms(chain, q)
     omega, v = (V[:3], V[3:]) if frame is JogFrame.TOOL else (R.T @ V[:3], R.T @ V[3:])
-    return J, np.array((*(axes @ omega), *(v / characteristic_length(chain))))
+    return J, np.concatenate((axes @ omega, v / characteristic_length(chain)))
 
 
 def _freedoms(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the Jacobian (5, n) of a task, R (3, 3) of the tool, and its two axes (2, 3) in it."""
-    R, frames = forward(chain, q)[:3, :3], joint_frames(chain, q)
-    # Parallel axes stay parallel: axis 2 is the pitch axis. The last axis is the roll axis.
-    axes = np.array([R.T @ frames[k][:3, :3] @ chain.S[:3, k] for k in (1, -1)])
+    """Return the Jacobian (k, n) of a task, R (3, 3) of the tool, and the axes (k - 3, 3) in it.
+
+    About these axes the arm can turn its tool: all three from six axes on, else those from the
+    fourth on.
+    """
     J = jacobian_body(chain, q)
-    return np.vstack((axes @ J[:3], J[3:] / characteristic_length(chain))), R, axes
+    J[3:] /= characteristic_length(chain)
+    axes = np.eye(3) if chain.n >= ALL_FREEDOMS else J[:3, 3:].T
+    return np.concatenate((axes @ J[:3], J[3:])), forward(chain, q)[:3, :3], axes
 
 
 def _damped(J: FloatArray, wanted: FloatArray) -> FloatArray:
