@@ -134,7 +134,6 @@ class Extension:
             RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
             None; see ``FindArm``. Called when a robot is read for ``serve``.
-        gizmo: Returns the class of the gizmo of a tool with so many freedoms, or None.
         joint_view: View of a robot that is driven joint by joint, called as `MachineView`, and then
             its ``add_panel``.
         serve_options: Adds options to the parser of ``serve``.
@@ -170,7 +169,6 @@ class Extension:
     hand: Target | None = None
     expand: Target | None = None
     find_arm: Target | None = None
-    gizmo: Target | None = None
     joint_view: Target | None = None
     serve_options: Target | None = None
     initial_scene: Target | None = None

@@ -22,7 +22,6 @@ from katana450.extension import provided
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.nodes import Nodes
 from katana450.server.service.runner import guarded
-from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.panel_tabs import PanelTabs
@@ -69,8 +68,7 @@ class Frontend:
                     raise ConfigurationError(f"{layer.what} {robot.why}")
             make, options = _joint_view(), ViewOptions(meshes=meshes)
         else:
-            gizmo = find_gizmo(robot.arm.kinematics.freedoms)
-            make, options = View, ViewOptions(added, meshes, gizmo)
+            make, options = View, ViewOptions(added, meshes)
         self.view: ViewUpdater = make(
             gateway.viser,
             robot,
@@ -110,11 +108,6 @@ class Frontend:
         self.view.stop()
         if self._detours is not None:
             self._detours.stop()
-
-
-def find_gizmo(freedoms: int) -> type[Gizmo] | None:
-    """Return the class of the gizmo that an extension has for a tool of so many freedoms."""
-    return next((gizmo(freedoms) for gizmo in provided("gizmo")), None)
 
 
 def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:

@@ -1,28 +1,29 @@
-"""The handle at the tool that a person drags. It has five degrees of freedom, as the arm has.
+"""The handle at the tool that a person drags. It has the degrees of freedom that the arm has.
 
-Arrows move the tool point. Two rings turn the tool: pitch about the horizontal that is square to
-the arm's plane, and roll about the tool's own axis. There is no third ring, because the position
-determines the sideways direction of the tool.
+Arrows move the tool point, and rings turn the tool. Those of five axes are pitch about the
+horizontal that is square to the arm's plane, and roll about the tool's own axis. There is no third
+ring, because the position determines the sideways direction of the tool. Other arms have three
+rings in the frame of the tool, and an arm of four axes has one, which pitches its tool.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, EndDrag, Position, Turn
+from katana450.arm.control.commands import Command, EndDrag, Orient, Position, Turn
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.server.view.controls import GestureGate
@@ -34,6 +35,9 @@ SIZE = 0.13
 
 RINGS = 1.6
 """Ratio of ring size to arrow size: the arcs end just outside the arrow heads."""
+
+PITCHING = 4
+"""Number of axes of an arm that can only pitch its tool."""
 
 DISTANCE_WORTH_SENDING = 1e-6
 """Smallest change of position [m] that is sent."""
@@ -57,18 +61,11 @@ class Aim:
     """The poses of the gizmo's parts while they are not held, in the types of viser."""
 
     point: Point
-    pitched: Quaternion
-    rolled: Quaternion
+    rings: Mapping[str, Quaternion]
 
 
 class Gizmo:
-    """The gizmo: sends the pose to which it is dragged, and follows the goal while not held.
-
-    That of another arm overrides the methods about rings.
-    """
-
-    parts: ClassVar[tuple[str, ...]] = ("move", "pitch", "roll")
-    """Parts of the gizmo that can be held."""
+    """The gizmo: sends the pose to which it is dragged, and follows the goal while not held."""
 
     def __init__(
         self,
@@ -91,7 +88,9 @@ class Gizmo:
         self._held: dict[str, Actor] = {}
         self._turns: dict[str, _Turn] = {}
         self._sent: tuple[float, ...] = ()
-        self._aim = Aim((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+        self._aim = Aim((0.0, 0.0, 0.0), {})
+        # The rotation of the tool in the frame of the rings while they are held.
+        self._R_ring_tool = np.eye(3)
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
         self._move = server.scene.add_transform_controls(
             "/target/move",
@@ -103,14 +102,23 @@ class Gizmo:
             translation_limits=bounds,
         )
         self._move.on_update(self._moved)
-        self._add_rings(server)
-
-    def _add_rings(self, server: viser.ViserServer) -> None:
         # A ring is drawn where both axes that span it are active.
-        self._pitch = self._ring(server, "/target/move/pitch", (True, False, True))
-        self._roll = self._ring(server, "/target/move/roll", (False, True, True))
-        self._pitch.on_update(self._pitched)
-        self._roll.on_update(self._rolled)
+        if self.is_five_axis:
+            self._rings = {
+                "pitch": self._ring(server, "/target/move/pitch", (True, False, True)),
+                "roll": self._ring(server, "/target/move/roll", (False, True, True)),
+            }
+            self._rings["pitch"].on_update(self._pitched)
+            self._rings["roll"].on_update(self._rolled)
+        else:
+            several = arm.chain.n != PITCHING
+            self._rings = {"turn": self._ring(server, "/target/move/turn", (True, several, True))}
+            self._rings["turn"].on_update(self._turned)
+
+    @property
+    def is_five_axis(self) -> bool:
+        """True if the rings are pitch and roll."""
+        return self._arm.kinematics.turn is Turn
 
     @staticmethod
     def _ring(
@@ -128,26 +136,39 @@ class Gizmo:
 
     def aim(self, state: State, T: FloatArray) -> None:
         """Store the pose of the goal of ``state``; its ``T`` (4, 4) is in the base frame."""
-        chain = self._arm.chain_to(state.tool)
-        pitched = self._arm.T_base_shoulder[:3, :3] @ pitched_frame(chain, state.goal)
-        _, roll = pitch_and_roll(chain, state.goal)
         x, y, z = T[:3, 3].tolist()
-        rolled = pitched @ so3.rotation_x(roll)
-        self._aim = Aim((x, y, z), quaternion(pitched), quaternion(rolled))
+        frame = self._ring_frame(state)
+        rings = {"turn": quaternion(frame)}
+        if self.is_five_axis:
+            _, roll = pitch_and_roll(self._arm.chain_to(state.tool), state.goal)
+            rings = {"pitch": rings["turn"], "roll": quaternion(frame @ so3.rotation_x(roll))}
+        self._aim = Aim((x, y, z), rings)
+
+    def _ring_frame(self, state: State) -> FloatArray:
+        """Return the frame of the rings (3, 3) in the base frame.
+
+        Of four and five axes its y axis is that about which the tool pitches.
+        """
+        chain = self._arm.chain_to(state.tool)
+        if self.is_five_axis:
+            R = pitched_frame(chain, state.goal)
+        else:
+            R = forward(chain, state.goal)[:3, :3]
+            if chain.n == PITCHING:
+                y = joint_frames(chain, state.goal)[3][:3, :3] @ chain.S[:3, 3]
+                x = np.cross(y, chain.S[:3, 0])
+                R = np.column_stack((x, y, np.cross(x, y)))
+        return np.asarray(self._arm.T_base_shoulder[:3, :3] @ R)
 
     def follow(self) -> None:
         """Move the parts that are not held to the goal."""
         aim = self._aim
         apart = _apart(self._move.position, aim.point) > DISTANCE_WORTH_SENDING
-        if apart and not any(map(self._holds, self.parts)):
+        if apart and not any(map(self._holds, ("move", *self._rings))):
             place(self._move, aim.point)
-        self._turn_rings(aim)
-
-    def _turn_rings(self, aim: Aim) -> None:
-        if not self._holds("pitch"):
-            turn_ring(self._pitch, aim.pitched)
-        if not self._holds("roll"):
-            turn_ring(self._roll, aim.rolled)
+        for name, wxyz in aim.rings.items():
+            if not self._holds(name):
+                turn_ring(self._rings[name], wxyz)
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
@@ -197,6 +218,23 @@ class Gizmo:
         if turn is not None:
             command = Turn(turn.pitch, turn.roll + turn.turned)
             self._submit(event, actor, command, (command.pitch, command.roll))
+
+    async def _turned(self, event: viser.TransformControlsEvent) -> None:
+        actor = self._gestures.actor(event.client_id)
+        if event.phase == "start":
+            state = self._current()
+            T = forward(self._arm.chain_to(state.tool), state.goal)
+            R_base_tool = self._arm.T_base_shoulder[:3, :3] @ T[:3, :3]
+            self._R_ring_tool = self._ring_frame(state).T @ R_base_tool
+            self._held["turn"] = actor
+            return
+        if self._held.get("turn") != actor:
+            return
+        if event.phase == "end":
+            del self._held["turn"]
+        wxyz = np.asarray(event.target.wxyz, dtype=float)
+        R = self._arm.T_base_shoulder[:3, :3].T @ so3.from_quaternion(wxyz) @ self._R_ring_tool
+        self._submit(event, actor, Orient(R), tuple(wxyz.tolist()))
 
     def _turning(
         self, event: viser.TransformControlsEvent, actor: Actor, ring: str

@@ -65,12 +65,10 @@ class ViewOptions:
     Attributes:
         layers: layers of extensions.
         meshes: the meshes of scene objects.
-        gizmo: the class of the gizmo of an arm outside the five-axis family.
     """
 
     layers: tuple[ViewLayer, ...] = ()
     meshes: Meshes = field(default_factory=Meshes)
-    gizmo: type[Gizmo] | None = None
 
 
 class View(ViewUpdater):
@@ -116,11 +114,9 @@ class View(ViewUpdater):
         self._tint = Tint(server, robot, self._scenery.arm.path, props)
         self._ghosts: dict[str, GhostNodes] = {}
         self._gap = Gap(server)
-        self._gizmo = (view_options.gizmo or Gizmo)(
-            server, self._arm, gestures, lambda: state_publisher.snapshot.state
-        )
+        self._gizmo = Gizmo(server, self._arm, gestures, lambda: state_publisher.snapshot.state)
         self._cameras = Cameras(server, robot)
-        if view_options.gizmo is not None:
+        if not self._gizmo.is_five_axis:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         self._goal: FloatArray | None = None

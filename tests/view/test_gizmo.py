@@ -1,0 +1,69 @@
+"""The gizmo has the rings of its arm, and each ring gives the command of its arm."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from katana450.arm.control.commands import EndDrag, Orient, Turn
+from katana450.assembly.robot_session import find_robot
+from katana450.maths.geometry import so3
+from katana450.maths.kinematics.forward import forward
+from katana450.resources import URDF_PATH
+from katana450.server.view.gizmo import Gizmo
+from katana450.settings import Settings
+from tests.general_arms.chain_urdf import chain_urdf
+from tests.general_arms.published_arms import PINCHERX_100, UR5E
+from tests.view.gestures import RecordedGestures
+
+OTHERS = {"UR5e": UR5E, "PincherX-100": PINCHERX_100}
+RINGS = {"katana": ("pitch", "roll"), "UR5e": ("turn",), "PincherX-100": ("turn",)}
+
+
+@dataclass
+class Drag:
+    """An event of viser."""
+
+    target: Any
+    phase: str
+    client_id: int = 1
+
+
+@pytest.mark.parametrize("name", RINGS)
+def test_rings_turn_the_tool_of_their_arm(
+    name: str, server: viser.ViserServer, tmp_path: Path
+) -> None:
+    path = URDF_PATH
+    if name in OTHERS:
+        path = tmp_path / "arm.urdf"
+        path.write_text(chain_urdf(name, OTHERS[name]), encoding="utf-8")
+    robot, session, _ = find_robot(Settings(), path, None)
+    arm, state = robot.require_arm(), session.begin(session.ready, 0.0, 0.0)
+    chain, gestures = arm.chain_to(state.tool), RecordedGestures()
+    gizmo = Gizmo(server, arm, gestures, lambda: state)
+    T = forward(chain, state.goal)
+    gizmo.aim(state, arm.T_base_shoulder @ T)
+    gizmo.follow()
+    assert tuple(gizmo._rings) == RINGS[name]
+    for ring, handle in gizmo._rings.items():
+        turned = {"pitch": gizmo._pitched, "roll": gizmo._rolled, "turn": gizmo._turned}[ring]
+        start, axis = np.array(handle.wxyz), (1.0, 0.0, 0.0) if ring == "roll" else (0.0, 1.0, 0.0)
+        asyncio.run(turned(Drag(handle, "start")))  # type: ignore[arg-type]
+        handle.wxyz = so3.to_quaternion(so3.from_quaternion(start) @ so3.exp(0.1 * np.array(axis)))
+        asyncio.run(turned(Drag(handle, "end")))  # type: ignore[arg-type]
+        command, end = gestures.commands[-2:]
+        assert isinstance(end, EndDrag)
+        assert isinstance(command, Turn if gizmo.is_five_axis else Orient)
+        if isinstance(command, Orient):
+            assert so3.angle(command.R, T[:3, :3]) == pytest.approx(0.1, abs=1e-9)
+        else:
+            now = arm.kinematics.target_at(state.goal)
+            turns = {"pitch": (0.1, 0.0), "roll": (0.0, 0.1)}[ring]
+            after = (command.pitch - now.pitch, command.roll - now.roll)  # type: ignore[attr-defined]
+            assert after == pytest.approx(turns, abs=1e-9)
