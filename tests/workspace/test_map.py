@@ -7,9 +7,9 @@ import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.reachability import map as map_module
-from katana450.extensions.reachability.colors import fraction_colors
 from katana450.extensions.reachability.map import Survey
 from katana450.extensions.reachability.reachability import Reachability
+from katana450.extensions.reachability.view import fraction_colors
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.reachability.grid import IntArray, VoxelGrid
 from katana450.extensions.reachability.pose_reachability import PoseReachability
-from katana450.extensions.reachability.reachability import BoolArray, Reachability
+from katana450.extensions.reachability.reachability import (
+    BoolArray,
+    IntArray,
+    Reachability,
+    VoxelGrid,
+)
 from katana450.maths.geometry.arrays import FloatArray
 
 POSES = 65536
