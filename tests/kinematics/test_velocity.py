@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from katana450.arm.control.branch_options import BranchMetrics
 from katana450.errors import InputError
-from katana450.extensions.ellipsoid.velocity_ellipsoid import velocity_ellipsoid
+from katana450.extensions.ellipsoid.layer import velocity_ellipsoid
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES
-from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.inverse import inverse

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.branch_options import BranchMetrics, BranchOption
 from katana450.arm.control.messages import (
     AXIS_NAMES,
     PRIORITIES,
@@ -29,7 +29,6 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
-from katana450.maths.kinematics.branch_metrics import BranchMetrics
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.view.branches import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS

@@ -17,10 +17,9 @@ from katana450.assembly.robot_session import find_arm
 from katana450.atomic import check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
-from katana450.extensions.reachability.map import ReachabilityMap, Survey
+from katana450.extensions.reachability.map import MapOptions, ReachabilityMap, Survey, survey_of
 from katana450.extensions.reachability.reachability import IntArray
 from katana450.extensions.reachability.reachability_file import write_npz
-from katana450.extensions.reachability.survey_of import MapOptions, survey_of
 from katana450.settings import Settings
 
 MIN_SHARED_CHUNKS = 8
