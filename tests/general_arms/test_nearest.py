@@ -13,8 +13,7 @@ import pytest
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.nearest import nearest_pose
-from katana450.extensions.general_arms.numerical import Numerical
-from katana450.extensions.general_arms.tool_motion import tool_and_jacobian
+from katana450.extensions.general_arms.numerical import Numerical, tool_and_jacobian
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
