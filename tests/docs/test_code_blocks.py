@@ -12,12 +12,13 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from types import CodeType
 
 import pytest
 import yaml
 
 from katana450.cli.main import _parser
-from katana450.client import connect
+from katana450.client import RefusedError, connect
 from katana450.extension import Extension
 from katana450.server.api import requests
 from katana450.server.api.program_requests import Program, Steer
@@ -146,10 +147,27 @@ def test_every_block_names_a_language_that_is_checked_or_has_a_reason() -> None:
     assert not unknown, f"name the language behind the fence; one of {sorted(CHECKED)} if it can be"
 
 
+def executed(code: CodeType) -> dict[str, object]:
+    """Run ``code`` until no sample of a plan is late, and return its names.
+
+    On a busy machine a sample may leave late, and the server then refuses it and those after it.
+    """
+    for _ in range(3):
+        namespace: dict[str, object] = {"__name__": "printed"}
+        try:
+            exec(code, namespace)
+        except RefusedError as error:
+            if " s late: " not in str(error):
+                raise
+        else:
+            return namespace
+    raise AssertionError("samples were late in each of three runs")
+
+
 @pytest.mark.parametrize("block", code_blocks("python"), ids=identifier)
 def test_python_runs(block: CodeBlock, folder: Path, server: AppServer) -> None:
-    namespace: dict[str, object] = {"__name__": "printed"}
-    exec(compile(block.text.replace(PRINTED_URL, server.url), str(block), "exec"), namespace)
+    code = compile(block.text.replace(PRINTED_URL, server.url), str(block), "exec")
+    namespace = executed(code)
     if "savefig" in block.text:
         assert (folder / "circle.png").read_bytes().startswith(b"\x89PNG")
     if isinstance(extension := namespace.get("EXTENSION"), Extension):
