@@ -66,6 +66,7 @@ def test_posture_in_a_line_of_ik_chooses_what_the_pose_leaves_free() -> None:
     assert all(each["singular"] for each in answer["solutions"])
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("decimals", [6, 5, 4])
 def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
     """Check that all 500 poses are answered within the error that the rounding implies.

@@ -40,7 +40,7 @@ COMMAND = (sys.executable, "-m", "katana450", "serve", "--no-record", "--port")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends Ctrl-C to a group of processes")
-@pytest.mark.parametrize("delay", [0.15, 0.4])
+@pytest.mark.parametrize("delay", [pytest.param(0.15, marks=pytest.mark.long), 0.4])
 def test_interrupt_during_the_start_leaves_no_traceback(delay: float) -> None:
     with subprocess.Popen(
         (*COMMAND, str(free_port())),

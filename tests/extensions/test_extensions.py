@@ -92,6 +92,7 @@ def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> No
     assert "map.npz is a map of the points that a tool reaches. " in output
 
 
+@pytest.mark.long
 def test_another_distribution_extends_the_server(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,8 +117,15 @@ def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
     ("entry", "module", "message"),
     [
         ("station:EXTENSION", "raise ValueError('no wind')", "weather cannot be loaded"),
-        ("station:EXTENSION", "import no_such_thing", "No module named 'no_such_thing'"),
-        ("station:EXTENSION", "EXTENSION = 7", "is not an Extension"),
+        pytest.param(
+            "station:EXTENSION",
+            "import no_such_thing",
+            "No module named 'no_such_thing'",
+            marks=pytest.mark.long,
+        ),
+        pytest.param(
+            "station:EXTENSION", "EXTENSION = 7", "is not an Extension", marks=pytest.mark.long
+        ),
         ("station:EXTENSION", STATION.replace("NAME", "'fk'"), "two commands fk"),
     ],
 )

@@ -86,6 +86,7 @@ def test_half_requests_are_closed_and_slow_bodies_refused(server: AppServer) -> 
         assert closed(everybody, 3.0 * WAITING_TIMEOUT) == len(everybody)
 
 
+@pytest.mark.long
 def test_flood_of_questions_is_refused_and_does_not_delay_stop(
     guarded: AppServer, tokens: dict[str, str]
 ) -> None:
