@@ -338,10 +338,10 @@ TARGET = (0.008, 0.025, 0.443)
 
 
 @pytest.fixture
-def local(described: DescribedRobot) -> Iterator[VirtualServer]:
-    """Return a server that offers detours."""
-    with VirtualServer(described, detours=True) as server:
-        yield server
+def offered(described: DescribedRobot) -> Iterator[Client]:
+    """Connect a program to a server that offers detours."""
+    with VirtualServer(described, detours=True) as server, server.connect("Test") as program:
+        yield program
 
 
 def wait_for(program: Client, holds: Callable[[answers.State], bool]) -> answers.State:
@@ -364,17 +364,17 @@ def distance(state: answers.State) -> float:
     return math.dist([row[3] for row in state.T[:3]], TARGET)
 
 
-def test_offered_detour_is_taken_by_go(program: Client) -> None:
-    state = held_at_the_gap(program)
+def test_offered_detour_is_taken_by_go(offered: Client) -> None:
+    state = held_at_the_gap(offered)
     assert state.detour is not None
     assert state.status == "gap"
     assert f"Reachable by a {state.detour:.1f} s detour: press Enter or Go" in state.why
     assert not state.moving
     assert distance(state) > 0.01
-    program.ask(requests.EndDrag())
-    rested = program.query(answers.State)
+    offered.ask(requests.EndDrag())
+    rested = offered.query(answers.State)
     assert rested.q == state.q
-    arrived = program.go(requests.Go())
+    arrived = offered.go(requests.Go())
     assert distance(arrived) < 1e-6
     assert arrived.branch == state.branch
     assert arrived.detour is None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -134,9 +134,16 @@ def on_table(tmp_path_factory: pytest.TempPathFactory) -> DescribedRobot:
 
 
 @pytest.fixture
-def column_arm(program: Client) -> Client:
-    place(program, "crate", (0.0, 0.2), [0.06, 0.06, 0.08])
-    return program
+def column_server(on_table: DescribedRobot) -> Iterator[VirtualServer]:
+    with VirtualServer(on_table) as server:
+        yield server
+
+
+@pytest.fixture
+def column_arm(column_server: VirtualServer) -> Iterator[Client]:
+    with column_server.connect("Test") as program:
+        place(program, "crate", (0.0, 0.2), [0.06, 0.06, 0.08])
+        yield program
 
 
 def height(client: Client) -> float:
@@ -172,7 +179,7 @@ def test_table_is_named_at_the_start_and_stops_a_joint(
 
 
 def test_object_is_attached_undone_and_saved_with_the_scene(
-    local: VirtualServer, column_arm: Client
+    column_server: VirtualServer, column_arm: Client
 ) -> None:
     place(column_arm, at=(0.2, -0.2))
     column_arm.ask(requests.Attach(name="block", to=requests.Attachment.TABLE))
@@ -180,7 +187,7 @@ def test_object_is_attached_undone_and_saved_with_the_scene(
         column_arm.ask(requests.Attach(name="block", to=requests.Attachment.HAND))
     with pytest.raises(RefusedError, match="no cup"):
         column_arm.ask(requests.Fill(ml=10.0))
-    status, _, body = local.ask("/api/v1/scene")
+    status, _, body = column_server.ask("/api/v1/scene")
     assert (status, body[:2]) == (200, b"PK")
     column_arm.ask(requests.Remove(name="block"))
     column_arm.ask(requests.Undo())

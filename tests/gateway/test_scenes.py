@@ -8,20 +8,16 @@ import time
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 import pytest
 import trimesh
-from msgspec import structs
 
 from katana450.arm.control.lease import Role
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_text import HEADER
 from katana450.extensions.importers.archive import SCENE
 from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
@@ -31,7 +27,6 @@ from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
-from tests.exchange.test_several_files import ARTICULATED, PARTS, written, zipped
 from tests.gateway.virtual import VirtualServer
 
 
@@ -238,45 +233,3 @@ def test_invalid_scene_is_refused_before_the_server_starts(scene: Path) -> None:
     for option in ("/nowhere/it.stl", f"{scene}@1,2,x"):
         with pytest.raises(InputError, match=r"it\.stl cannot be read|unknown format"):
             load_initial_scene(robot.session, None, [option])
-
-
-def upload(local: VirtualServer, data: bytes, **query: str) -> tuple[int, dict[str, Any]]:
-    words = "&".join(f"{key}={quote(value)}" for key, value in query.items())
-    status, _, body = local.ask(f"/api/v1/mesh?{words}", data=data)
-    return status, json.loads(body)
-
-
-def test_serve_reads_the_files_of_a_folder(described: DescribedRobot, tmp_path: Path) -> None:
-    path = written(tmp_path, ARTICULATED)
-    stored, _ = load_initial_scene(described.session, None, [f"{path}@400,300,0@0.5"])
-    (robot,) = (each for each in stored.scene.objects if each.name == "robot")
-    assert robot.scale == 0.5
-
-
-def test_a_zip_is_one_object_and_its_file_is_chosen(local: VirtualServer) -> None:
-    status, answer = upload(local, zipped(ARTICULATED), name="robot.zip")
-    assert (status, answer["triangles"], answer["scale"]) == (200, 36, 1.0)
-    pair = zipped({"a.wrl": PARTS["parts/x.wrl"], "b.wrl": PARTS["parts/x.wrl"]})
-    status, answer = upload(local, pair, name="pair.zip")
-    assert (status, answer["choices"]) == (422, ["a.wrl", "b.wrl"])
-    status, answer = upload(local, pair, name="pair.zip", main="b.wrl")
-    assert (status, answer["name"]) == (200, "b")
-    status, answer = upload(local, pair, name="pair.zip", main="../b.wrl")
-    assert status == 422
-    assert "no file '../b.wrl'" in str(answer["why"])
-
-
-def test_a_large_object_is_placed_with_its_scale(local: VirtualServer, program: Client) -> None:
-    house = f"{HEADER}\nShape {{ geometry Box {{ size 5000 1 1 }} }}".encode()
-    _, mesh = upload(local, house, name="house.wrl")
-    assert mesh["scale"] == 0.2
-    place = requests.Place(name="house", shape=requests.Shape.MESH, mesh=mesh["key"])
-    with pytest.raises(RefusedError, match=r"must be from 0.001 to 2 m.*Change its scale"):
-        program.ask(place)
-    program.ask(structs.replace(place, scale=mesh["scale"]))
-
-
-def test_a_missing_file_is_named(local: VirtualServer) -> None:
-    status, answer = upload(local, ARTICULATED["robot.wrl"].encode(), name="robot.wrl")
-    assert status == 422
-    assert "not there: parts/arm.wrl, parts/tool/grip.wrl. Add them" in str(answer["why"])
