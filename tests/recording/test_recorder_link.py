@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Listener
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,6 @@ from katana450.extensions.recording.episodes.episode_requests import StartEpisod
 from katana450.extensions.recording.live import recorder_link
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
-    NotReadyError,
     RecorderLink,
     RecorderListener,
     recorder_file,
@@ -45,16 +44,20 @@ def linked(page: Page, file: Path) -> RecorderLink:
 
 
 @pytest.fixture
-def listen(bench: Bench, tmp_path: Path) -> Callable[..., RunningScripts]:
+def listen(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., RunningScripts]]:
     """Return a function that listens in this process, and returns the scripts that it hears of."""
+    listeners: list[RecorderListener] = []
 
     def begin(keeper: object = None) -> RunningScripts:
         scripts, address = RunningScripts(), pipe_address(tmp_path, "test")
         file = recorder_file(tmp_path, 8080)
-        RecorderListener(keeper or bench.keeper, scripts, file, address, b"salt")  # type: ignore[arg-type]
+        given = keeper or bench.keeper
+        listeners.append(RecorderListener(given, scripts, file, address, b"salt"))  # type: ignore[arg-type]
         return scripts
 
-    return begin
+    yield begin
+    for listener in listeners:
+        listener.close()
 
 
 def test_requests_are_answered_and_the_state_is_shown(
@@ -75,12 +78,13 @@ def test_requests_are_answered_and_the_state_is_shown(
     monkeypatch.setattr(Listener, "accept", accept_later)
     page = Page()
     link = linked(page, recorder_file(tmp_path, 8080))
-    with pytest.raises(NotReadyError):
+    with pytest.raises(InputError, match="is not ready"):
         link.ask(StartEpisode(), ADA)
     listen()
+    # It waits for the process that records.
+    begun = link.ask(StartEpisode(task="pour"), ADA, 5.0)
     waited_for(lambda: page.shown.get(ENTRY), "the state")
     assert caplog.text.count("Too many open files") == 1
-    begun = link.ask(StartEpisode(task="pour"), ADA)
     assert begun["number"] == 1
     # People are named by pseudonyms in a recording.
     assert begun["by"]["key"] not in ("", ADA.key)

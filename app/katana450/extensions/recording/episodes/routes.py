@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import time
 from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
@@ -30,7 +29,6 @@ from katana450.extensions.recording.episodes.episode_requests import (
 )
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
-    NotReadyError,
     RecorderLink,
 )
 from katana450.server.api import answers
@@ -49,9 +47,6 @@ Each has one of the few threads of the event loop, which others need too.
 
 READY_SECONDS = 15.0
 """[s] Maximum time for which the first episode waits for the process that records."""
-
-READY_CHECK_SECONDS = 0.1
-"""[s] Time between two attempts to reach the process that records."""
 
 
 class EpisodeRoutes:
@@ -123,17 +118,10 @@ class EpisodeRoutes:
         if self._waiting >= MAX_WAITING:
             raise HTTPException(TOO_MANY, "Too many requests at once. Wait a moment.")
         self._waiting += 1
-        waits = isinstance(decoded, StartEpisode)
-        ready_by = time.monotonic() + READY_SECONDS
+        # The first episode waits for the process that records.
+        wait = READY_SECONDS if isinstance(decoded, StartEpisode) else 0.0
         try:
-            while True:
-                try:
-                    done = await asyncio.to_thread(self._link.ask, decoded, giver_of(actor))
-                    break
-                except NotReadyError:
-                    if not waits or time.monotonic() >= ready_by:
-                        raise
-                    await asyncio.sleep(READY_CHECK_SECONDS)
+            done = await asyncio.to_thread(self._link.ask, decoded, giver_of(actor), wait)
         except InputError as error:
             self._context.hub.recorder.refuse("episode", actor, error)
             return as_json(answers.Refused(why=str(error)), NOT_NOW)

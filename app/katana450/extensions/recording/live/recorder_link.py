@@ -76,10 +76,6 @@ SILENT = (
 log = logging.getLogger(__name__)
 
 
-class NotReadyError(InputError):
-    """Raised while no process records episodes."""
-
-
 class GivenRequest(msgspec.Struct, frozen=True, tag="request"):
     """A request about episodes. The ``key`` of its giver becomes a pseudonym."""
 
@@ -248,7 +244,7 @@ class RecorderLink:
         """
         # The threads wait when this process ends, and must not keep the hub then.
         self._hub, self._file, self._delay = weakref.ref(hub), file, delay
-        self._lock = threading.Lock()
+        self._lock = threading.Condition()
         self._numbers = count(1)
         self._connection: Any = None
         self._pending: dict[int, SimpleQueue[RequestAnswer]] = {}
@@ -266,15 +262,17 @@ class RecorderLink:
                 del self._runs[next(iter(self._runs))]
         self._sent.put(run)
 
-    def ask(self, request: AnyEpisodeRequest, by: EpisodeGiver) -> dict[str, Any]:
+    def ask(
+        self, request: AnyEpisodeRequest, by: EpisodeGiver, wait: float = 0.0
+    ) -> dict[str, Any]:
         """Send ``request`` of ``by`` to the process that records; return the episode.
 
-        Raises NotReadyError while no process records, and InputError if the request is refused.
+        Raises InputError if the request is refused, or if no process records within ``wait`` [s].
         """
         answers: SimpleQueue[RequestAnswer] = SimpleQueue()
         with self._lock:
-            if self._connection is None:
-                raise NotReadyError(NOT_READY)
+            if not self._lock.wait_for(lambda: self._connection is not None, wait):
+                raise InputError(NOT_READY)
             number = next(self._numbers)
             self._pending[number] = answers
         self._sent.put(GivenRequest(number, request, by))
@@ -306,6 +304,7 @@ class RecorderLink:
                 connection = self._connected()
                 with self._lock:
                     self._connection = connection
+                    self._lock.notify_all()
                     for run in self._runs.values():
                         self._sent.put(run)
                 while True:
