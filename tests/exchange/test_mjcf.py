@@ -14,8 +14,7 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.mjcf import keyframes
-from katana450.extensions.export.physics import SAG
+from katana450.extensions.export.mjcf import SAG, keyframes
 from katana450.extensions.export.playback import of_script
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
