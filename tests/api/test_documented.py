@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from docs.api import PAGE, added_requests, page
-from katana450.arm.control.act import Request, classes_of, tag_of
+from katana450.arm.control.act import Command, Request, classes_of, tag_of
+from katana450.errors import InputError
 from katana450.extensions.api_description import openapi_json, summary
 from katana450.server.api import answers, requests
 
@@ -60,3 +63,28 @@ def test_lease_requests_and_heartbeats_cost_no_budget() -> None:
 def test_requests_for_admins_alone() -> None:
     kinds = [kind for kind in EVERY_REQUEST if kind.traits.admin]
     assert {kind.__name__ for kind in kinds} == {"ListPeople", "Kick"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"do": "hold", "finding": {"reason": "loop late"}}',
+        '{"do": "hold_for", "finding": {"reason": "loop late"}}',
+        '{"do": "pause_for", "finding": {"reason": "loop late"}}',
+        '{"do": "servo", "q": [0.1], "t": 1.0}',
+        '{"do": "timed_servo", "q": [0.1], "t": 1.0}',
+        '{"do": "stop", "cause": {"why": "Somebody else."}}',
+        '{"do": "clear_stop", "known": 1e9}',
+        '{"do": "batch", "commands": []}',
+        '{"do": "set_axes", "values": []}',
+    ],
+)
+def test_what_only_the_server_gives_is_no_request(text: str) -> None:
+    with pytest.raises(InputError, match=r"no request|unknown field"):
+        requests.RequestDecoder(ADDED).decoded(text)
+
+
+def test_acts_are_named_once() -> None:
+    """A person presses STOP, and the gate makes the command with its cause."""
+    names = [kind.__name__ for kind in {*classes_of(Command), *EVERY_REQUEST}]
+    assert {name for name in names if names.count(name) > 1} == {"Stop", "ClearStop"}

@@ -7,8 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.session import Session
 from katana450.errors import InputError
 
 NAN = math.nan
@@ -59,3 +61,13 @@ def test_command_copies_its_array() -> None:
     assert command.q[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         command.q[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    "target", [cmd.Position(np.array((0.3, 0.1, 0.2))), cmd.Pose(np.eye(4)), cmd.Orient(np.eye(3))]
+)
+def test_session_refuses_a_target_in_the_base_frame(
+    session: Session, target: cmd.Position | cmd.Pose | cmd.Orient
+) -> None:
+    with pytest.raises(InputError, match="in_shoulder"):
+        session.check(replace(target, frame=cmd.Frame.BASE))

@@ -78,6 +78,8 @@ def check(
 def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
     kinematics = arm.kinematics
     match command:
+        case cmd.Position() | cmd.Pose() | cmd.Orient() if command.frame is cmd.Frame.BASE:
+            raise InputError("The session takes targets in {S}: call `in_shoulder` first.")
         case cmd.Position(p=position):
             _check_size("The position", position)
         case cmd.Pose(T=T):

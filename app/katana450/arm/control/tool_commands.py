@@ -145,9 +145,6 @@ class Orient(Command, MotionRequest, frozen=True, eq=False):
 TurnCommand = Turn | Orient
 """A command that turns the tool; which one depends on the arm."""
 
-TARGETS_IN_FRAMES = (Position, Pose, Orient)
-"""The commands whose target can be given in the base frame. The session takes them in {S}."""
-
 
 class StepTool(Command, MotionRequest, frozen=True, eq=False):
     """Move the target of the tool by one step. Steps in a row add up.
