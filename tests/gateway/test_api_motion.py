@@ -251,7 +251,7 @@ def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("rates", [False, True])
+@pytest.mark.parametrize("rates", [pytest.param(False, marks=pytest.mark.long), True])
 def test_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
     """The stream uses 0.7 of the acceleration."""
     program.go(requests.Home())

@@ -19,27 +19,13 @@ BOUND = 5.0
 
 TIMEOUT = 0.3
 
+Handler = Callable[[ServerConnection], Awaitable[None]]
+Act = Callable[[AsyncClient], Awaitable[None]]
+
 
 @pytest.fixture(autouse=True)
 def _short_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(asynchronous, "ANSWER_TIMEOUT", TIMEOUT)
-
-
-def _talk(handler: Callable[[ServerConnection], Awaitable[None]], act: str) -> None:
-    """Run ``act`` of a client with a server that runs ``handler``; expect a LostError."""
-
-    async def run() -> None:
-        async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
-            port = server.sockets[0].getsockname()[1]
-            async with asyncio.timeout(BOUND):
-                with pytest.raises(LostError):
-                    async with aconnect(f"http://127.0.0.1:{port}") as client:
-                        await ACTS[act](client)
-            server.close(close_connections=False)
-            for connection in server.connections:
-                connection.transport.abort()
-
-    asyncio.run(run())
 
 
 async def _ask(client: AsyncClient) -> None:
@@ -55,8 +41,6 @@ async def _send(client: AsyncClient) -> None:
     while True:
         await client.send(requests.Servo(q=np.full(1000, 0.1)))
 
-
-ACTS = {"ask": _ask, "states": _states, "send": _send}
 
 WELCOME = msgspec.json.encode(
     answers.Welcome(name="x", number=1, role="admin", heartbeat=10.0)
@@ -94,22 +78,26 @@ async def _babbling(connection: ServerConnection) -> None:
     await connection.wait_closed()
 
 
-def test_missing_welcome_raises_an_error() -> None:
-    _talk(_mute, "ask")
+@pytest.mark.parametrize(
+    ("handler", "act"),
+    [
+        pytest.param(_mute, _ask, id="no welcome"),
+        pytest.param(_welcoming, _ask, id="no answer"),
+        pytest.param(_silent_watch, _states, id="no states"),
+        pytest.param(_deaf, _send, id="nothing is read", marks=pytest.mark.long),
+        pytest.param(_babbling, _states, id="another protocol"),
+    ],
+)
+def test_call_that_a_server_leaves_open_raises_an_error(handler: Handler, act: Act) -> None:
+    async def run() -> None:
+        async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
+            port = server.sockets[0].getsockname()[1]
+            async with asyncio.timeout(BOUND):
+                with pytest.raises(LostError):
+                    async with aconnect(f"http://127.0.0.1:{port}") as client:
+                        await act(client)
+            server.close(close_connections=False)
+            for connection in server.connections:
+                connection.transport.abort()
 
-
-def test_missing_answer_raises_an_error() -> None:
-    _talk(_welcoming, "ask")
-
-
-def test_missing_states_raise_an_error() -> None:
-    _talk(_silent_watch, "states")
-
-
-@pytest.mark.long
-def test_server_that_reads_nothing_raises_an_error() -> None:
-    _talk(_deaf, "send")
-
-
-def test_server_with_another_protocol_raises_an_error() -> None:
-    _talk(_babbling, "states")
+    asyncio.run(run())
