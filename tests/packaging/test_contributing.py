@@ -75,9 +75,9 @@ def test_path_of_a_drag_names_files_that_exist_and_their_number() -> None:
 
 def test_every_part_of_the_extensions_folder_is_described() -> None:
     listed = (ROOT / "docs" / "extensions.md").read_text(encoding="utf-8")
-    used = listed.partition("The packages `batch`")[2].partition("add nothing by themselves")[0]
+    used = listed.partition("The package `scene`")[2].partition("add nothing by themselves")[0]
     parts = {path.stem for path in (PACKAGE / "extensions").iterdir() if path.name[0] != "_"}
     parts -= {"built_in"}
     registered = {extension.name for extension in extensions()}
-    assert {"batch", *re.findall(r"`(\w+)`", used)} == parts - registered
+    assert {"scene", *re.findall(r"`(\w+)`", used)} == parts - registered
     assert all(f"| `{name}` |" in listed for name in registered)

@@ -41,7 +41,7 @@ MAX_COMPANIONS = 500
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class ShapeReading:
     """The answer of the subprocess.
 
     Attributes:
@@ -105,7 +105,7 @@ def read_shape_guarded(
 
 
 def _companions(
-    answer: Answer, beside: Beside | None, known: set[str], file: str, left: int
+    answer: ShapeReading, beside: Beside | None, known: set[str], file: str, left: int
 ) -> dict[str, bytes]:
     """Return those files beside a file that it names and that are not ``known`` yet.
 
@@ -130,7 +130,7 @@ def _companions(
     return contents
 
 
-def _parsed(data: bytes, words: list[str], file: str) -> Answer:
+def _parsed(data: bytes, words: list[str], file: str) -> ShapeReading:
     """Return the answer of a new subprocess that reads ``data``."""
     # One thread, because a pool for every core would take address space, which is limited.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -153,7 +153,7 @@ def _parsed(data: bytes, words: list[str], file: str) -> Answer:
             f"{file} cannot be read: it needs more than {SECONDS:g} s of processor time or "
             f"{MAX_MEMORY_BYTES >> 20} MiB, or the file is corrupt. Try a simpler export."
         )
-    return decoded(output, Answer)
+    return decoded(output, ShapeReading)
 
 
 def _output(process: subprocess.Popen[bytes], data: bytes, file: str) -> bytes:

@@ -1,4 +1,4 @@
-"""The subprocess that reads one shape from standard input and writes an ``Answer``.
+"""The subprocess that reads one shape from standard input and writes a ``ShapeReading``.
 
 `read_shape_guarded` starts it as ``python -m katana450.extensions.importers.reading FORMAT NAME
 UNIT UP MAIN``. It limits its memory and time before it reads its input.
@@ -13,7 +13,7 @@ from katana450.disk_cache import encoded
 from katana450.errors import KatanaError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.importers.archive import ChoiceError
-from katana450.extensions.importers.guarded_reading import Answer
+from katana450.extensions.importers.guarded_reading import ShapeReading
 from katana450.extensions.importers.shape_file import (
     MAX_MEMORY_BYTES,
     SECONDS,
@@ -44,7 +44,7 @@ def main(arguments: list[str]) -> None:
 
 def answer(
     data: bytes, format: Format, name: str, unit: float | None, up: Up | None, main: str
-) -> Answer:
+) -> ShapeReading:
     """Return the answer for a file; arguments as those of `read_shape`."""
     missing: list[str] = []
     try:
@@ -52,8 +52,8 @@ def answer(
         body = convex_body(shape.vertices * shape.scale).scaled(1.0 / shape.scale)
     except KatanaError as error:
         choices = error.choices if isinstance(error, ChoiceError) else ()
-        return Answer(error=str(error), choices=choices, missing=tuple(missing))
-    return Answer(drawn(shape), body, missing=tuple(missing))
+        return ShapeReading(error=str(error), choices=choices, missing=tuple(missing))
+    return ShapeReading(drawn(shape), body, missing=tuple(missing))
 
 
 def drawn(shape: ShapeFile) -> ShapeFile:
