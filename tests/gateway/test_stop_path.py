@@ -10,26 +10,21 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
+from contextlib import suppress
 
 import pytest
 
-from katana450.arm.control.lease import Role
 from katana450.arm.control.stopping import HOLD_OFF
 from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
-from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer, ServerError
-from tests.gateway.client import HOUR, ask, controlling, enter, page_name
+from tests.gateway.client import ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
 from tests.gateway.test_frozen_arm import under_way
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
 )
-
-SILENT = 1100
 
 
 @pytest.fixture
@@ -59,18 +54,6 @@ def stop_processes(server: AppServer) -> list[int]:
     with suppress(ServerError, OSError):
         return [server.stop_process]
     return []
-
-
-@contextmanager
-def silent_connections(url: str, number: int = SILENT) -> Iterator[None]:
-    """Hold ``number`` connections open that send nothing."""
-    port = int(url.rpartition(":")[2])
-    with ExitStack() as stack:
-        for _ in range(number):
-            each = stack.enter_context(socket.socket())
-            each.setblocking(False)
-            each.connect_ex(("127.0.0.1", port))
-        yield
 
 
 def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: AppServer) -> None:
@@ -179,19 +162,6 @@ def test_stop_with_a_body_or_without_reading_the_answer_counts(
     until(lambda: program.query(answers.State).stop == "confirmed")
 
 
-@pytest.mark.parametrize("port", ["main", pytest.param("stop", marks=pytest.mark.long)])
-def test_stop_is_confirmed_among_silent_connections(
-    server: AppServer, program: Client, port: str
-) -> None:
-    attacked = server.url if port == "main" else server.stop_url
-    with silent_connections(attacked):
-        under_way(program)
-        assert stop(server.stop_url, X_Name="Vera") == (
-            200,
-            {"stop": "confirmed", "why": "Vera pressed STOP."},
-        )
-
-
 def test_stop_is_confirmed_while_the_front_end_is_frozen() -> None:
     with AppServer(APP) as server, connect(server.url, "Driver") as program:
         # The timeout of the front end is long, so that only STOP can stop the arm.
@@ -247,23 +217,6 @@ def test_page_behind_a_proxy_sends_stop_to_its_own_address() -> None:
         stop_url = f"http://127.0.0.1:{server.stop_url.rpartition(':')[2]}"
         status, answer = stop(stop_url, path="/stop", Cookie=cookie, **of_page)
         assert (status, answer["stop"]) == (200, "confirmed")
-
-
-@pytest.mark.long
-def test_stop_needs_a_link_and_survives_a_broken_access_file(tmp_path: Path) -> None:
-    path = tmp_path / "access.json"
-    links = AccessFile.create(path)
-    expires = time.time() + HOUR
-    viewer, other = (links.give(name, Role.VIEWER, expires) for name in ("Vera", "Otto"))
-    with AppServer((*APP, "--access", str(path))) as server:
-        assert stop(server.stop_url)[0] == 401
-        assert stop(server.stop_url, Authorization="Bearer wrong")[0] == 401
-        assert stop(server.stop_url, Authorization=f"Bearer {other}")[0] == 200
-        path.write_text("{")
-        status, answer = stop(server.stop_url, Authorization=f"Bearer {viewer}", X_Name="script")
-        assert (status, answer["stop"]) == (200, "confirmed")
-        cookie = enter(server.url, viewer)
-        assert stop(server.stop_url, path="/stop", Cookie=cookie, Origin=server.url)[0] == 200
 
 
 def test_client_stops_on_all_paths_and_clears_when_possible(

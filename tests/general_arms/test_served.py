@@ -25,10 +25,8 @@ from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.settings import Settings
 from tests.gateway.virtual import VirtualServer
 from tests.general_arms.chain_urdf import chain_urdf
-from tests.general_arms.gripping_arms import gripping_urdf
 from tests.general_arms.links_of_arms import openmanipulator_x, ur5e
 from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
-from tests.general_arms.published_hands import ROBOTIQ_2F_85, hand_urdf
 
 STOP = 0.005
 """[m] Distance that every part keeps from a wall."""
@@ -190,39 +188,3 @@ def test_drag_slider_jog_and_script_keep_clear_of_a_wall(chain: Chain, tmp_path:
                 break
         assert status(now) == "done"
         assert abs(now.q[0] - pan) < 1e-6
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "text",
-    [gripping_urdf("Panda"), hand_urdf("UR5e", ROBOTIQ_2F_85)],
-    ids=["Panda", "Robotiq 2F-85"],
-)
-def test_stop_keeps_a_box_in_the_hand_and_the_program_places_it(text: str, tmp_path: Path) -> None:
-    with served(tmp_path, text) as (arm, _):
-        T = se3.from_rotation_translation(so3.rotation_z(0.3), (0.5, 0.1, 0.0))
-        arm.ask(
-            requests.Place(
-                name="box",
-                shape=requests.Shape.BOX,
-                size=[0.04, 0.05, 0.06],
-                T=T,
-                can_be_held=True,
-            )
-        )
-        place = "place: {at: {x: 400, y: -200, yaw: 40}}"
-        started(arm, f"frame: base\nsteps:\n  - pick: box\n  - {place}\n  - home\n")
-        until(
-            arm, lambda now: now.held == "box" and now.program is not None and now.program.step == 2
-        )
-        arm.stop()
-        stopped = until(arm, lambda now: status(now) == "stopped" and not now.moving)
-        assert (bool(stopped.stopped), stopped.held) == (True, "box")
-        arm.clear_stop()
-        arm.ask(Steer(order=ProgramOrder.CONTINUE))
-        end = until(arm, lambda now: status(now) in ("done", "failed"))
-        assert (status(end), end.held) == ("done", None)
-        box = next(thing for thing in arm.query(answers.Objects).objects if thing.name == "box")
-        np.testing.assert_allclose(np.array(box.T)[:3, 3], (0.4, -0.2, 0.0), atol=1e-9)
-        yaw = np.degrees(np.arctan2(box.T[1][0], box.T[0][0])) % 180.0
-        assert yaw == pytest.approx(40.0, abs=1e-6)
