@@ -1,4 +1,4 @@
-"""Test that silent connections delay neither STOP nor programs, and that questions have a budget."""
+"""Test that silent connections delay neither STOP nor programs; questions have a budget."""
 
 from __future__ import annotations
 
