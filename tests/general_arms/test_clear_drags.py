@@ -1,4 +1,4 @@
-"""Drags with a clear way arrive although limits or the edge of a branch are beside it."""
+"""Drags and jogs of other arms: they arrive, settle, and keep their direction."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
-from tests.general_arms.published_arms import SEVEN
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from tests.general_arms.driven import begun, pose, run, session_of, settled
+from tests.general_arms.published_arms import FOUR, KR_6, PANDA, SEVEN, UR5E
 from tests.general_arms.test_random_drags import is_clear
 
 MAX_TICKS = 20
@@ -76,3 +80,92 @@ def test_drag_with_a_clear_way_arrives(name: str) -> None:
     assert found.since is None
     assert found.beyond_gap is None
     assert max(found.best.position_error, found.best.rotation_error) < 1e-9
+
+
+SETTLING_TICKS = 8
+"""[1] The drags below take 2 or 3 ticks. While free joints moved to the middle of their limits by
+themselves, they took 12 to 110."""
+
+
+def ticks_of(name: str, seed: int) -> tuple[int, State, FloatArray, float]:
+    """Return the ticks of a drag by 0.1 m until its goal settles, and the end of it."""
+    chain = SEVEN[name]
+    session, rng = session_of(chain), np.random.default_rng(seed)
+    turned = chain.clamp(session.ready + 0.2 * rng.normal(size=7))
+    state = settled(session, begun(session), [cmd.Joints(turned)])
+    T, by = pose(session, state), rng.normal(size=3)
+    goal = T[:3, 3] + 0.1 * by / np.linalg.norm(by)
+    state, ticks = run(session, state, [cmd.Position(goal)]), 1
+    while state.since is not None:
+        state, ticks = run(session, state), ticks + 1
+        assert ticks < 1000
+    end = settled(session, state)
+    turn = so3.angle(pose(session, end)[:3, :3], T[:3, :3])
+    return ticks, end, pose(session, end)[:3, 3] - goal, turn
+
+
+@pytest.mark.parametrize("name", SEVEN)
+@pytest.mark.parametrize("seed", range(3))
+def test_goal_of_a_drag_settles_when_the_pose_is_reached(name: str, seed: int) -> None:
+    ticks, end, off, turn = ticks_of(name, seed)
+    assert ticks <= SETTLING_TICKS
+    assert not end.findings
+    np.testing.assert_allclose(off, 0.0, atol=1e-7)
+    assert turn < 1e-7
+
+
+SPEED, TICKS = 0.05, 80
+ARMS = {**FOUR, "UR5e": UR5E, "Panda": PANDA}
+
+
+@pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.0, 0.0, -1.0)], ids=["y", "down"])
+@pytest.mark.parametrize("chain", [pytest.param(c, id=name) for name, c in ARMS.items()])
+def test_tool_stays_on_its_line_and_keeps_its_orientation(
+    chain: Chain, direction: tuple[float, float, float]
+) -> None:
+    session = session_of(chain)
+    state = begun(session)
+    start, line = pose(session, state), np.array(direction)
+    rates = np.append(SPEED * line, np.zeros(3))
+    deviation = turn = 0.0
+    jogs = 0
+    while state.moving or not jogs:
+        commands = [cmd.Jog(rates)] if jogs < TICKS else []
+        state = run(session, state, commands)
+        jogs += 1
+        T = pose(session, state)
+        moved = T[:3, 3] - start[:3, 3]
+        deviation = max(deviation, float(np.linalg.norm(moved - (moved @ line) * line)))
+        turn = max(turn, so3.angle(T[:3, :3], start[:3, :3]))
+    assert moved @ line > 0.5 * SPEED * TICKS * 0.01
+    assert deviation < 1e-4
+    if chain.n >= 6:
+        assert turn < np.radians(0.05)
+
+
+@pytest.mark.parametrize(
+    ("chain", "q", "rates"),
+    [
+        pytest.param(
+            PANDA,
+            (0.0, -0.785, 0.785, -2.356, 0.0, 1.8675, 0.0),
+            (0.3, 0.0, -0.4, 1.1, 2.2, -1.6),
+            id="Panda",
+        ),
+        pytest.param(
+            KR_6,
+            (0.0, -1.265, 1.885, -0.785, 0.785, 0.0),
+            (0.0, 0.0, -0.5, 0.0, 0.0, 0.0),
+            id="KR 6",
+        ),
+    ],
+)
+def test_no_joint_is_too_fast_where_the_twist_needs_more_and_more_speed(
+    chain: Chain, q: tuple[float, ...], rates: tuple[float, ...]
+) -> None:
+    session = session_of(chain)
+    state, fastest = session.begin(np.array(q), 0.0, 0.0), 0.0
+    for _ in range(120):
+        state = run(session, state, [cmd.Jog(np.array(rates))])
+        fastest = max(fastest, float(np.max(np.abs(state.motion.qd) / chain.speed)))
+    assert 0.99 < fastest <= 1.0 + 1e-9

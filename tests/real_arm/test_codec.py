@@ -1,4 +1,4 @@
-"""The codec survives every split of the stream, garbage and truncation."""
+"""Worked bytes of every request and reply, read at every split, with errors and garbage."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies, requests
 from katana450.extensions.real_arm.codec.axis_status import AxisStatus, status_words
-from katana450.extensions.real_arm.codec.crc import with_crc
+from katana450.extensions.real_arm.codec.crc import crc16, with_crc
 from katana450.extensions.real_arm.codec.error_codes import CRC_ERROR, INVALID_ARGUMENT
 from katana450.extensions.real_arm.codec.firmware_codec import (
     FirmwareCodec,
@@ -31,7 +31,196 @@ from katana450.extensions.real_arm.codec.host_codec import (
     request_bytes,
 )
 from tests.conftest import LONG
-from tests.real_arm.test_worked_bytes import PAIRS
+
+IDENTITY = replies.ArmIdentity(b"Katana450".ljust(81))
+HOLD = requests.AxisSegment(10, 30500, 30500, 0, 0, 0)
+SENSORS = replies.SensorBytes(15, tuple(range(16)))
+
+# (request, its bytes, reply, its bytes); None where the source gives none.
+WORKED = [
+    (requests.EchoRequest(), "01 18 01 5A 3B 80", replies.EchoReply(), "7A E3 81"),
+    (
+        requests.ReadMasterVersion(),
+        "01 18 01 42 31 80",
+        replies.MasterVersion(2, 1),
+        "62 02 01 7E 61",
+    ),
+    (requests.ReadArmIdentity(), "01 18 01 59 3A C0", IDENTITY, None),
+    (
+        requests.ReadSlaveVersion(1),
+        "01 18 03 56 01 20 58 E0",
+        replies.SlaveVersion(1, 32, 2, 1, 0, 0, 0),
+        "76 01 20 02 01 00 00 00 00 00 00 00 00 AF 4C",
+    ),
+    (
+        requests.ReadAxis(1),
+        "01 18 02 44 01 C0 F2",
+        replies.AxisReading(1, 4, 0, 0, 70),
+        "64 01 04 00 00 00 00 46 6D 97",
+    ),
+    (
+        requests.ReadPositions(),
+        "01 18 03 4E 03 00 E7 60",
+        replies.AxisPositions((30500, -30500, -30500, 30500, 30500, 30500)),
+        "6E 77 24 88 DC 88 DC 77 24 77 24 77 24 72 C1",
+    ),
+    (
+        requests.ReadStates(),
+        "01 18 03 4E 01 00 87 61",
+        replies.AxisStates((8, 8, 8, 8, 8, 8)),
+        "6E 08 08 08 08 08 08 00 00 00 00 00 00 DD 32",
+    ),
+    (
+        requests.CommandMotor(requests.ALL_AXES, requests.MotorFlag.FLUSH, 0),
+        "01 18 05 43 00 20 00 00 05 44",
+        replies.MotorCommanded(0, 32),
+        "63 00 20 C6 F1",
+    ),
+    (
+        requests.CommandMotor(requests.ALL_AXES, requests.MotorFlag.CALIBRATE, 32000),
+        "01 18 05 43 00 04 7D 00 5E 25",
+        replies.MotorCommanded(0, 4),
+        "63 00 04 DD F1",
+    ),
+    (
+        requests.CommandMotor(2, requests.MotorFlag.MOVE, -10000),
+        "01 18 05 43 02 18 D8 F0 34 9E",
+        replies.MotorCommanded(2, 24),
+        None,
+    ),
+    (
+        requests.CommandMotor(1, requests.MotorFlag.FREEZE, 30500),
+        "01 18 05 43 01 08 77 24 1A E2",
+        replies.MotorCommanded(1, 8),
+        "63 01 08 48 F0",
+    ),
+    (
+        requests.SetAxisParameter(1, 3, 180, 180),
+        "01 18 06 53 01 03 B4 B4 00 C1 06",
+        replies.AxisParameters(1, 3, 180, 180, 0),
+        "73 01 03 B4 B4 00 A1 01",
+    ),
+    (
+        requests.SetCollisionDetection(1),
+        "01 18 03 41 00 01 D4 91",
+        replies.CollisionDetectionSet(),
+        "61 00 90 29",
+    ),
+    (
+        requests.SetCollisionDetection(0),
+        "01 18 03 41 00 00 14 50",
+        replies.CollisionDetectionSet(),
+        "61 00 90 29",
+    ),
+    (requests.ReadSensors(), "01 18 02 45 0F 94 72", SENSORS, None),
+    (
+        requests.ReadInputs(),
+        "01 18 05 54 72 00 00 00 B4 2A",
+        replies.DigitalBits(0xFD),
+        "74 FD 81 E6",
+    ),
+    (
+        requests.SendSplines((HOLD,) * 6, requests.More.STORE),
+        None,
+        replies.SplinesSent(),
+        "68 02 01 7C 41",
+    ),
+]
+
+# Replies without worked bytes, so that every class is written and read.
+OTHERS = [
+    (requests.ReadCommandTable(), replies.CommandTable(bytes(180))),
+    (
+        requests.ErrorQuery(),
+        replies.FirmwareError(ord("H"), -1, 1, "move buffer error"),
+    ),
+]
+
+PAIRS = [(request, reply) for request, _, reply, _ in WORKED] + OTHERS
+
+
+def test_checksum_has_its_published_check_value() -> None:
+    assert crc16(b"123456789") == 0xBB3D
+
+
+@pytest.mark.parametrize(("request_", "sent", "reply", "received"), WORKED)
+def test_worked_bytes_are_written(
+    request_: requests.ArmRequest, sent: str | None, reply: replies.ArmReply, received: str | None
+) -> None:
+    if sent is not None:
+        assert request_bytes(request_) == bytes.fromhex(sent)
+    if received is not None:
+        assert reply_bytes(reply) == bytes.fromhex(received)
+
+
+def test_error_flag_has_its_worked_bytes() -> None:
+    assert refusal_bytes() == bytes.fromhex("C0 50 00")
+
+
+def test_every_request_and_reply_is_tested() -> None:
+    asked = {type(request) for request, _ in PAIRS}
+    assert asked == {*requests.REQUESTS, requests.ErrorQuery}
+    assert {request.REPLY for request in asked} == {type(reply) for _, reply in PAIRS}
+
+
+def test_lengths_are_those_of_the_protocol() -> None:
+    lengths = {
+        (request.HEAD[:1], len(request.payload), len(reply.payload))
+        for request, reply in PAIRS
+        if not isinstance(request, requests.ErrorQuery)
+    }
+    assert lengths == {
+        (b"B", 1, 3), (b"Y", 1, 84), (b"X", 1, 181), (b"Z", 1, 1), (b"V", 3, 13), (b"D", 2, 8),
+        (b"N", 3, 13), (b"C", 5, 3), (b"S", 6, 6), (b"A", 3, 2), (b"E", 2, 18),
+        (b"H", 75, 3), (b"T", 5, 2),
+    }  # fmt: skip
+
+
+def test_error_is_flagged_then_fetched_by_four_raw_bytes() -> None:
+    host, arm = HostCodec(), FirmwareCodec()
+    packet = requests.SendSplines((HOLD,) * 6, requests.More.LAST)
+    arm.receive(host.send(packet))
+    assert host.receive(refusal_bytes()) == [RequestRefused(packet)]
+    query = host.send(requests.ErrorQuery())
+    assert query == bytes.fromhex("00 00 00 C1")
+    assert arm.receive(query) == [RequestReceived(requests.ErrorQuery(), 0)]
+    error = replies.FirmwareError(ord("H"), -10, 30, "StopperThread: collision on axis: 1")
+    assert len(reply_bytes(error)) == 57
+    assert host.receive(reply_bytes(error)) == [ReplyReceived(requests.ErrorQuery(), error)]
+    assert error.sentence == (
+        "The arm refused a request (polynomials): the axis collided "
+        "('StopperThread: collision on axis: 1')."
+    )
+
+
+@pytest.mark.parametrize("length", [1, 18, 50, 51])
+def test_error_texts_of_all_lengths_are_read(length: int) -> None:
+    text = b"move buffer error"[: length - 1].ljust(length, b"\0")
+    payload = b"\xc1" + b"H\xff\x01" + text
+    host = HostCodec()
+    host.send(requests.ErrorQuery())
+    reply = payload + crc16(payload).to_bytes(2, "big")
+    (event,) = host.receive(reply)
+    assert isinstance(event, ReplyReceived)
+    assert event.reply == replies.FirmwareError(ord("H"), -1, 1, text.rstrip(b"\0").decode())
+
+
+@pytest.mark.parametrize(
+    ("request_", "reply", "confirmed"),
+    [
+        (requests.ReadAxis(2), replies.AxisReading(0, 0, 0, 0, 0), False),
+        (requests.ReadAxis(2), replies.AxisReading(2, 8, 0, 0, 0), True),
+        (requests.CommandMotor(0, 32, 0), replies.MotorCommanded(0, 32), True),
+        (requests.CommandMotor(3, 8, 0), replies.MotorCommanded(0, 8), False),
+        (requests.ReadSensors(), replies.SensorBytes(0, (0,) * 16), False),
+        (requests.ReadPositions(), replies.AxisPositions((0,) * 6), True),
+    ],
+)
+def test_axis_0_in_a_reply_means_failure(
+    request_: requests.ArmRequest, reply: replies.ArmReply, confirmed: bool
+) -> None:
+    assert request_.is_confirmed_by(reply) is confirmed
+
 
 EXAMPLES = 300 if LONG else 25
 STREAM = b"".join(request_bytes(request) for request, _ in PAIRS)
