@@ -72,21 +72,23 @@ class PanelAccess:
 
     def plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
         """Plan ``text`` for ``actor``, then carry out ``then``. Raises KatanaError."""
-        self._call(lambda: self._plan(text, then, actor))
+
+        def act() -> None:
+            participant = self._participant_of(actor)
+            if then is not None:
+                self._hub.gate.check_not_stopped()
+            self._runner.script(participant, text, more=False, speed=1.0)
+            self._runner.planner.then = then
+
+        self._call(act)
 
     def steer(self, order: ProgramOrder, actor: Actor) -> None:
         """Give the program an order of ``actor``. Raises LeaseError if it is refused."""
-        self._call(lambda: self._steer(order, actor))
 
-    def _steer(self, order: ProgramOrder, actor: Actor) -> None:
-        self._runner.steer(self._participant_of(actor), order)
+        def act() -> None:
+            self._runner.steer(self._participant_of(actor), order)
 
-    def _plan(self, text: str, then: ProgramOrder | None, actor: Actor) -> None:
-        participant = self._participant_of(actor)
-        if then is not None:
-            self._hub.gate.check_not_stopped()
-        self._runner.script(participant, text, more=False, speed=1.0)
-        self._runner.planner.then = then
+        self._call(act)
 
     def _participant_of(self, actor: Actor) -> Participant:
         self._hub.gate.check_current(actor)
