@@ -6,7 +6,7 @@ import pytest
 
 from katana450.extensions.programs.blocks import MAX_STEPS
 from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.pick import Pick
+from katana450.extensions.programs.place import Pick
 from katana450.extensions.programs.script import Script, parse
 from katana450.extensions.programs.settings_steps import TimedPause
 from katana450.extensions.programs.source import ScriptError

@@ -14,8 +14,8 @@ from katana450.extensions.programs.out_of_reach import unreached
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.program import compiled
 from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.step_target import ScriptFrame
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain

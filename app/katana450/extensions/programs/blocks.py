@@ -12,7 +12,7 @@ from katana450.extensions.programs.declaration import Declared, Kind, Schema, re
 from katana450.extensions.programs.fields import Fields, or_known
 from katana450.extensions.programs.kinds import RAW, TEXT, any_of, bound, listed, reference, whole
 from katana450.extensions.programs.located_step import Conditional, LocatedStep, count
-from katana450.extensions.programs.pick import Stack
+from katana450.extensions.programs.place import Stack
 from katana450.extensions.programs.scope import Definition, ScriptContext
 from katana450.extensions.programs.source import Problem, ScriptError, YamlValue
 from katana450.extensions.programs.step import Step

@@ -13,7 +13,7 @@ import numpy as np
 from katana450.arm.control.messages import axis_names
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.kinds import XYZ
-from katana450.extensions.programs.script_frame import ScriptFrame
+from katana450.extensions.programs.step_target import ScriptFrame
 from katana450.extensions.programs.tool_planning import EXACT, AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

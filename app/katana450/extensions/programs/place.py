@@ -1,4 +1,4 @@
-"""The steps that put the held object somewhere: ``place``, ``set_down``, ``release``."""
+"""The steps that lift an object and put it somewhere: ``pick``, ``place``, ``stack`` and others."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from katana450.errors import InputError
 from katana450.extensions.programs.actions import MoveFingers
 from katana450.extensions.programs.approach import UP
 from katana450.extensions.programs.carry import APPROACHES, carry
+from katana450.extensions.programs.declaration import Declared
 from katana450.extensions.programs.finger_planning import with_fingers
-from katana450.extensions.programs.kinds import NAME
+from katana450.extensions.programs.grasp import Grasp
+from katana450.extensions.programs.kinds import NAME, Object, ObjectName
 from katana450.extensions.programs.places import SPOT, Spot
 from katana450.extensions.programs.plan_builder import PlanBuilder
 from katana450.extensions.programs.step import Step
@@ -31,6 +33,9 @@ RELEASE_HEIGHT = MARGIN + 2e-4
 
 MAX_FALL = 0.01
 """[m] Maximum height from which ``release`` lets an object fall."""
+
+LIFTS = (0.06, 0.04, 0.025, 0.015)
+"""[m] Heights to which an object is lifted, tried from the highest."""
 
 CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
 """[m] Heights over its new place at which an object is brought there, tried from the highest."""
@@ -221,3 +226,44 @@ def _over(
     T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
     goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
     return builder.hand.over(held, T_base_object, builder.q, goal, yaw)
+
+
+@dataclass(frozen=True)
+class Pick(Grasp, word="pick"):
+    """Grasp an object, and lift it."""
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan grasp and lifting. Raises InputError if it is not possible."""
+        super().build(builder)
+        at = builder.target
+
+        def lift(height: float) -> None:
+            raised = at.moved(at.position + height * UP)
+            builder.lead([builder.planning.line(at, raised)], f"lift {self.name}")
+
+        try:
+            builder.first(LIFTS, lift)
+        except InputError as error:
+            raise error.after(f"{self.name} cannot be lifted") from error
+
+
+@dataclass(frozen=True)
+class Stack(Declared):
+    """Pick an object and place it on the middle of another."""
+
+    noun = "a stack"
+
+    name: Object
+    on: ObjectName
+    in_base: bool = False
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of an object on itself."""
+        if given.get("name") is not None and given["name"] == given.get("on"):
+            yield "", f"{given['name']} cannot stand on itself."
+
+    @property
+    def steps(self) -> tuple[Step, Step]:
+        """Two steps, so that the object is picked in another way if it cannot be placed."""
+        return Pick(self.name), PlaceHeld(on=self.on, in_base=self.in_base)

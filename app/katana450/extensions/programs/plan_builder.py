@@ -21,8 +21,7 @@ from katana450.extensions.programs.actions import Action, FollowPlan, MoveFinger
 from katana450.extensions.programs.approach import Approach
 from katana450.extensions.programs.hand_planning import HandPlanning, hand_of
 from katana450.extensions.programs.out_of_reach import unreached
-from katana450.extensions.programs.script_frame import ScriptFrame
-from katana450.extensions.programs.step_target import StepTarget
+from katana450.extensions.programs.step_target import ScriptFrame, StepTarget
 from katana450.extensions.programs.tool_planning import AnyCurve, ToolPlanning, planning_of
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3

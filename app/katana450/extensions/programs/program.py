@@ -20,8 +20,8 @@ from katana450.extensions.programs.located_step import (
 )
 from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
 from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.script_frame import ScriptFrame
 from katana450.extensions.programs.settings_steps import WaitUntil
+from katana450.extensions.programs.step_target import ScriptFrame
 from katana450.extensions.programs.task_list import ConditionalJump
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from katana450.extensions.programs.blocks import BLOCKS, STEP_LIST
 from katana450.extensions.programs.declaration import Schema
 from katana450.extensions.programs.kinds import DEFINITIONS, any_of
-from katana450.extensions.programs.pick import Stack
+from katana450.extensions.programs.place import Stack
 from katana450.extensions.programs.script import Script
 from katana450.extensions.programs.steps import STEPS
 

@@ -9,7 +9,6 @@ from katana450.extensions.programs import (
     grasp,
     grip_until,
     moves,
-    pick,
     place,
     pouring,
     settings_steps,
@@ -20,7 +19,7 @@ from katana450.extensions.programs import (
 from katana450.extensions.programs.step import STEPS
 
 MODULES = (
-    moves, tool_moves, settings_steps, table, grasp, grip_until, pouring, pick, place,
+    moves, tool_moves, settings_steps, table, grasp, grip_until, pouring, place,
     trajectory,
 )  # fmt: skip
 """The modules with steps."""
