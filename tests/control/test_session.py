@@ -184,6 +184,9 @@ def test_joint_stops_at_its_limit_and_reports_it(
     (finding,) = state.findings
     assert (finding.reason, finding.axis) == (Reason.AXIS_LIMIT, axis)
     assert finding.amount == limit
+    # The target stays, so that another limit would be kept from the same target.
+    assert isinstance(state.target, JointTarget)
+    assert state.target.q[axis] == side * 4.0
 
 
 def test_zero_posture_hold_and_home(session: Session, state: State) -> None:

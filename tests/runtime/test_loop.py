@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import Status
+from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.state import Finding, Reason, Status
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
@@ -201,6 +204,20 @@ def test_copy_of_a_press_names_who_pressed_and_stops_nothing(parts: LoopParts) -
     assert [each for record in records for each in events.of(record)][-1] == (
         "stop", {"why": "Anna pressed STOP.", "by": "Anna", "named": True}
     )  # fmt: skip
+
+
+def test_only_after_a_silent_server_a_program_resumes_by_itself(parts: LoopParts) -> None:
+    program = Actor(Person("a key", "Anna", Role.OPERATOR), CommandChannel.PROGRAM)
+    parts.loop.profile = SilenceProfile.SIMULATION
+    for reason, goal in ((Reason.LOOP_LATE, None), (Reason.SERVER_SILENT, 2.0)):
+        parts.mailbox.put(cmd.Joint(1, 2.0), program)
+        parts.tick(30)
+        parts.loop.brake(Finding(reason, 0.3), 0.3)
+        parts.tick(200)
+        state = parts.loop.state_publisher.snapshot.state
+        assert not state.moving
+        # A hold drops the goal; a pause keeps it until the program goes on.
+        assert state.goal[0] == (state.q[0] if goal is None else goal) != 0.0
 
 
 def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:
