@@ -39,7 +39,8 @@ def test_braked_agrees_with_the_limiter() -> None:
 def test_limits_hold_for_any_stream(seed: int) -> None:
     """Also test ticks of uneven length."""
     rng, limiter = np.random.default_rng(seed), Limiter(LIMITS)
-    now, bounds = JointMotion.rest(np.zeros(3)), (np.full(3, -0.4), np.full(3, 0.3))
+    now, bounds = JointMotion.rest(np.zeros(3)), (np.full(3, -0.7), np.full(3, 0.3))
+    lowest = np.maximum(bounds[0], LIMITS.lower)
     for number in range(3000):
         if number % 20 == 0:
             wanted = JointMotion(*(rng.normal(scale=scale, size=3) for scale in (0.6, 2.0, 5.0)))
@@ -49,7 +50,7 @@ def test_limits_hold_for_any_stream(seed: int) -> None:
         assert (np.abs(after.qdd) <= LIMITS.acceleration + 1e-9).all()
         assert (np.abs(after.qdd - now.qdd) <= LIMITS.jerk * dt + 1e-9).all()
         rest = limiter.stopping_point(after)
-        assert (rest >= bounds[0] - 1e-9).all()
+        assert (rest >= lowest - 1e-9).all()
         assert (rest <= bounds[1] + 1e-9).all()
         now = after
 
@@ -82,3 +83,12 @@ def test_uneven_arrival_adds_no_noise_to_the_rates() -> None:
     assert stream.jitter == pytest.approx(0.003, rel=0.6)
     assert np.mean(off) < 0.06
     assert len(stream.times) < 20
+
+
+def test_of_two_samples_at_one_time_the_second_counts() -> None:
+    a = np.array([2.5])
+    stream = Stream.begin(0.0, np.zeros(1), None).followed_by(0.02, np.array([0.01]), None, a)
+    again = stream.followed_by(0.02, np.array([0.012]), None, a)
+    assert (again.times == stream.times).all()
+    assert again.q[:, 0].tolist() == [0.0, 0.012]
+    assert (again.period, again.jitter) == (stream.period, stream.jitter)
