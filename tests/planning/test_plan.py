@@ -17,13 +17,12 @@ from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import SweptClearance
+from katana450.maths.planning.clearance import Sweep, SweptClearance
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, check_clear, plan
 from katana450.maths.planning.sampling import collision_free_path
 from katana450.maths.planning.scaling import Bounds
-from katana450.maths.planning.sweep import Sweep
 
 
 @pytest.fixture(scope="module")

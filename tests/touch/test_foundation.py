@@ -9,8 +9,15 @@ import pytest
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.solid import Solid
-from katana450.extensions.touch.foundation import STIFFNESS, THICKNESS, pressed
-from katana450.extensions.touch.pad import COLUMNS, ROWS, Pad, surface_pad
+from katana450.extensions.touch.pad import (
+    COLUMNS,
+    ROWS,
+    STIFFNESS,
+    THICKNESS,
+    Pad,
+    pressed,
+    surface_pad,
+)
 from katana450.extensions.touch.solid_body import SolidBody, body_of
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -20,7 +20,6 @@ from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.jet_posture import facing
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -30,6 +29,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, atan2, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
+from katana450.maths.planning.posture import facing
 
 TURN_LENGTH = 0.25
 """Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""

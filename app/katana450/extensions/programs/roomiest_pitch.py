@@ -11,12 +11,12 @@ import numpy as np
 
 from katana450.errors import InputError
 from katana450.extensions.programs.curves import Swing, ToolArc
-from katana450.extensions.programs.jet_posture import posture
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.posture import posture
 
 ARC_SAMPLES: Final = 48
 """Number of intervals of the arc that are checked."""

@@ -13,7 +13,6 @@ from katana450.arm.control.messages import axis_names
 from katana450.caching import cached_property
 from katana450.errors import PathError
 from katana450.extensions.programs.curves import Curve, ToolCoordinates
-from katana450.extensions.programs.jet_posture import posture
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
@@ -24,7 +23,7 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Coefficient, Jet
 from katana450.maths.planning.path import CurvePath
-from katana450.maths.planning.posture import FiveJets
+from katana450.maths.planning.posture import FiveJets, posture
 
 KNOTS = 400
 """Number of intervals in which a path is checked when it is built."""

@@ -34,10 +34,9 @@ from katana450.extensions.programs.trajectory_path import TrajectoryPath, record
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import SweptClearance
+from katana450.maths.planning.clearance import Sweep, SweptClearance
 from katana450.maths.planning.plan import apart, plan
 from katana450.maths.planning.scaling import Bounds
-from katana450.maths.planning.sweep import Sweep
 
 CLEARANCE = STOP - 2e-4
 """[m] Distance that a trajectory keeps. A moving arm keeps STOP by itself, and the spline through

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.extensions.touch.foundation import MODULUS, PadPressure
-from katana450.extensions.touch.pad import COLUMNS, ROWS, Pad
+from katana450.extensions.touch.pad import COLUMNS, MODULUS, ROWS, Pad, PadPressure
 from katana450.extensions.touch.squeeze import Squeeze
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import so3

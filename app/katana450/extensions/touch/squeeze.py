@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.extensions.touch.foundation import (
+from katana450.extensions.touch.pad import (
     STIFFNESS,
     THICKNESS,
+    Pad,
     PadPressure,
     pressed,
     pressure_at,
 )
-from katana450.extensions.touch.pad import Pad
 from katana450.extensions.touch.solid_body import SolidBody
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen

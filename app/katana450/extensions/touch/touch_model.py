@@ -13,7 +13,6 @@ from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
-from katana450.extensions.touch.foundation import PadPressure
 from katana450.extensions.touch.held_load import (
     FRICTION,
     acceleration,
@@ -22,7 +21,7 @@ from katana450.extensions.touch.held_load import (
     mass,
     sliding_speed,
 )
-from katana450.extensions.touch.pad import Pad, pads_of
+from katana450.extensions.touch.pad import Pad, PadPressure, pads_of
 from katana450.extensions.touch.solid_body import body_of
 from katana450.extensions.touch.squeeze import FORCE_LIMIT, Squeeze, SqueezedBody
 from katana450.maths.collision.world import CollisionWorld

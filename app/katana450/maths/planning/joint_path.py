@@ -9,7 +9,6 @@ import numpy as np
 
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.arm import family_arm
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.polyline import PiecewisePolynomial, Polyline
@@ -17,7 +16,6 @@ from katana450.maths.planning.posture import (
     JointJets,
     ThreeJets,
     point_by_exponentials,
-    tool_point,
 )
 
 VIA_TOLERANCE = 1e-9
@@ -40,15 +38,8 @@ class PolynomialPath:
         return tuple(self._line.at(sigma))
 
     def point(self, sigma: Jet) -> ThreeJets:
-        """Return the tool point [m], in {C}; in {S} for an arm outside the five-axis family."""
-        arm = family_arm(self.chain)
-        if arm is None:
-            return point_by_exponentials(self.chain, self.joints(sigma))
-        one, two, three, four, five = (
-            sign * q + shift
-            for q, sign, shift in zip(self.joints(sigma), arm.signs, arm.shifts, strict=True)
-        )
-        return tool_point(arm, (one, two, three, four, five))
+        """Return the tool point [m] in {S}."""
+        return point_by_exponentials(self.chain, self.joints(sigma))
 
 
 @dataclass(frozen=True, eq=False)

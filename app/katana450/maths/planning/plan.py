@@ -16,12 +16,11 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld, Fingerprint
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.clearance import Clearance, SweptClearance
+from katana450.maths.planning.clearance import Clearance, Sweep, SweptClearance
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.path import Path, point_derivatives
 from katana450.maths.planning.scaling import Bounds, Scaling
-from katana450.maths.planning.sweep import Sweep
 
 MARGIN = STOP + 1e-3
 """Distance [m] that a plan keeps: more than the distance at which the arm stops, so that rounding

@@ -1,29 +1,20 @@
-"""Forward kinematics on jets: the tool point with its derivatives. Lengths in m, angles in rad."""
+"""Kinematics on jets: the tool point, and the joints of one branch, with their derivatives.
+
+The closed form of maths/kinematics/closed_form.py runs on Taylor series: exact, with derivatives.
+Lengths in m, angles in rad.
+"""
 
 from __future__ import annotations
 
 from katana450.maths.kinematics.arm import FiveAxisArm
+from katana450.maths.kinematics.branch import Branch, Shoulder
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.planning.jet import Jet, sin_cos
+from katana450.maths.kinematics.closed_form import closed_form
+from katana450.maths.planning.jet import JETS, Jet, atan2, sin_cos, sqrt
 
 FiveJets = tuple[Jet, Jet, Jet, Jet, Jet]
 JointJets = tuple[Jet, ...]
 ThreeJets = tuple[Jet, Jet, Jet]
-
-
-def tool_point(arm: FiveAxisArm, alpha: FiveJets) -> ThreeJets:
-    """Return the tool point in {C} at the canonical angles `alpha`."""
-    one, two, three, four, five = alpha
-    b = two + three
-    phi = b + four
-    (s1, c1), (s2, c2), (sb, cb), (sf, cf) = map(sin_cos, (one, two, b, phi))
-    u = arm.a + arm.l1 * c2 + arm.l2 * cb + arm.l3 * cf
-    v: Jet | float = arm.d
-    z = -(arm.l1 * s2 + arm.l2 * sb + arm.l3 * sf)
-    if arm.off_axis:
-        outward, sideways, up = beside(arm, *sin_cos(phi - arm.tilt), *sin_cos(five))
-        u, v, z = u + outward, sideways + arm.d, z + up
-    return c1 * u - s1 * v, s1 * u + c1 * v, z
 
 
 def point_by_exponentials(chain: Chain, q: JointJets) -> ThreeJets:
@@ -47,3 +38,50 @@ def beside(arm: FiveAxisArm, sp: Jet, cp: Jet, sr: Jet, cr: Jet) -> ThreeJets:
     x, y, z = arm.T_K_tool[:3, 3].tolist()
     y, z = cr * y - sr * z, sr * y + cr * z
     return cp * x + sp * z, y, cp * z - sp * x
+
+
+def facing(
+    arm: FiveAxisArm, shoulder: Shoulder, x: Jet, y: Jet, z: Jet, aside: Jet | float = 0.0
+) -> ThreeJets:
+    """Return (alpha1, u, height) of the arm's plane that holds the point (x, y, z) of {S}.
+
+    `aside` is the sideways offset of the point from {K} in the plane [m]. u is the distance of the
+    point outward from axis 1 [m], NaN where no plane holds it. height is its distance above the
+    shoulder [m].
+    """
+    (r11, r12, r13, p1), (r21, r22, r23, p2), (r31, r32, r33, p3), _ = arm.T_C_S.tolist()
+    if not arm.is_canonical:
+        x, y, z = (
+            r11 * x + r12 * y + r13 * z + p1,
+            r21 * x + r22 * y + r23 * z + p2,
+            r31 * x + r32 * y + r33 * z + p3,
+        )
+    side = arm.d + aside
+    outward = sqrt(x * x + y * y - side * side)
+    u = outward if shoulder == "front" else -outward
+    return atan2(y * u - x * side, x * u + y * side), u, z
+
+
+def posture(
+    arm: FiveAxisArm, branch: Branch, x: Jet, y: Jet, z: Jet, pitch: Jet, roll: Jet
+) -> FiveJets:
+    """Return the canonical angles on `branch` with the tool point at (x, y, z) of {S}.
+
+    The angles may differ by whole turns from those inside limits. Out of reach they are NaN.
+    """
+    sp, cp = sin_cos(pitch)
+    sr, cr = sin_cos(roll)
+    outward: Jet | float
+    outward, sideways, up = beside(arm, sp, cp, sr, cr) if arm.off_axis else (0.0, 0.0, 0.0)
+    alpha1, u, height = facing(arm, branch.shoulder, x, y, z, sideways)
+    # {K} in its own plane: there alpha1 is 0.
+    rows = (
+        (cp, sp * sr, sp * cr, u - outward),
+        (Jet.constant(0.0), cr, -sr, Jet.constant(arm.d)),
+        (-sp, cp * sr, cp * cr, height - up),
+        (0.0, 0.0, 0.0, 1.0),
+    )
+    _, elbow_up, elbow_down, bend, _ = closed_form(arm, JETS)(1.0, 0.0, u - outward, rows)
+    two, three = (elbow_up, bend) if branch.elbow == "up" else (elbow_down, -bend)
+    # The given pitch and roll have kept their turns.
+    return alpha1, two, three, (pitch + arm.tilt) - two - three, roll
