@@ -1,4 +1,4 @@
-"""Jog, stream and drag replace each other, and nothing of the earlier mode remains."""
+"""Jog, stream, drag and steps of the tool replace each other; nothing of the earlier remains."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.velocity import JogFrame
+from tests.control.test_session import run
 
 TICK = 0.01
 
@@ -23,7 +25,7 @@ FAR_DRAG = cmd.Position(np.array([-0.2, 0.35, 0.1]))
 """A target farther than one tick can track."""
 
 
-def run(session: Session, state: State, command: cmd.Command | None, ticks: int = 1) -> State:
+def driven(session: Session, state: State, command: cmd.Command | None, ticks: int = 1) -> State:
     """Run ``ticks`` ticks with ``command`` in each of them."""
     for _ in range(ticks):
         commands = [] if command is None else [command]
@@ -37,7 +39,7 @@ def streamed(session: Session, state: State, ticks: int) -> State:
     q = np.array(state.goal)
     for _ in range(ticks):
         q[0] += 0.2 * TICK
-        state = run(session, state, cmd.Servo(q.copy()))
+        state = driven(session, state, cmd.Servo(q.copy()))
     return state
 
 
@@ -46,25 +48,25 @@ def point(session: Session, q: FloatArray) -> FloatArray:
 
 
 def test_drag_replaces_a_jog_completely(session: Session, state: State) -> None:
-    state = run(session, state, JOG, 30)
-    dragged = run(session, state, FAR_DRAG)
+    state = driven(session, state, JOG, 30)
+    dragged = driven(session, state, FAR_DRAG)
     assert dragged.jogging is None
-    dragged = run(session, dragged, None, 300)
+    dragged = driven(session, dragged, None, 300)
     desired = FAR_DRAG.p
     np.testing.assert_allclose(point(session, dragged.setpoint), desired, rtol=0, atol=1e-9)
     # The next drag moves the goal along its own line.
-    settled = run(session, dragged, cmd.EndDrag())
+    settled = driven(session, dragged, cmd.EndDrag())
     start, way = point(session, settled.goal), np.array((0.02, 0.12, -0.03))
     for fraction in np.linspace(0.05, 1.0, 20):
-        settled = run(session, settled, cmd.Position(start + fraction * way))
+        settled = driven(session, settled, cmd.Position(start + fraction * way))
         off = point(session, settled.goal) - start
         assert np.linalg.norm(np.cross(off, way)) / np.linalg.norm(way) < 1e-6
 
 
 BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
-    Jogging: lambda session, state: run(session, state, JOG),
+    Jogging: lambda session, state: driven(session, state, JOG),
     Servoing: lambda session, state: streamed(session, state, 1),
-    Tracking: lambda session, state: run(session, state, FAR_DRAG),
+    Tracking: lambda session, state: driven(session, state, FAR_DRAG),
 }
 
 
@@ -83,9 +85,76 @@ def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(
     random = np.random.default_rng(450)
     for _ in range(20):
         away = cmd.Joints(session.ready + random.uniform(-0.5, 0.5, 5))
-        braking = run(session, run(session, state, away), None, int(random.integers(5, 40)))
-        braking = run(session, run(session, braking, cmd.Hold()), None, int(random.integers(1, 8)))
-        rested = run(session, run(session, braking, cmd.Pause()), None, 150)
+        braking = driven(session, driven(session, state, away), None, int(random.integers(5, 40)))
+        braking = driven(
+            session, driven(session, braking, cmd.Hold()), None, int(random.integers(1, 8))
+        )
+        rested = driven(session, driven(session, braking, cmd.Pause()), None, 150)
         assert rested.motion.at_rest
-        resumed = run(session, run(session, rested, cmd.Resume()), None, 5)
+        resumed = driven(session, driven(session, rested, cmd.Resume()), None, 5)
         assert resumed.setpoint.tobytes() == rested.setpoint.tobytes()
+
+
+EXACT = 1e-6
+"""[m] Tolerance of the tracker."""
+
+
+def pose(session: Session, state: State) -> FloatArray:
+    """Return the pose (4, 4) of the tool at the setpoint."""
+    return forward(session.require_arm().chain_to(state.tool), state.setpoint)
+
+
+def at_rest(session: Session, state: State) -> State:
+    for _ in range(40):
+        state = run(session, state, [], 25)
+        if not state.moving:
+            return state
+    raise AssertionError("the arm does not come to rest")
+
+
+def step(
+    x: float = 0.0, y: float = 0.0, z: float = 0.0, frame: JogFrame = JogFrame.BASE
+) -> cmd.StepTool:
+    return cmd.StepTool(np.array([x, y, z, 0.0, 0.0]), frame)
+
+
+@pytest.mark.parametrize("length", [1e-4, 1e-3, 1e-2])
+def test_step_moves_the_tool_by_its_length(session: Session, state: State, length: float) -> None:
+    before = pose(session, state)
+    after = pose(session, at_rest(session, run(session, state, [step(z=-length)])))
+    np.testing.assert_allclose(after[:3, 3] - before[:3, 3], (0.0, 0.0, -length), atol=EXACT)
+    np.testing.assert_allclose(after[:3, :3], before[:3, :3], atol=1e-5)
+
+
+def test_steps_given_at_once_add_up(session: Session, state: State) -> None:
+    before = pose(session, state)
+    steps: list[cmd.Command] = [step(x=-0.001), step(x=-0.001), step(z=0.001)]
+    state = run(session, state, steps)
+    state = at_rest(session, run(session, run(session, state, [], 2), [step(x=-0.001)]))
+    moved = pose(session, state)[:3, 3] - before[:3, 3]
+    np.testing.assert_allclose(moved, (-0.003, 0.0, 0.001), atol=EXACT)
+
+
+def test_step_along_the_tool_follows_its_direction(session: Session, state: State) -> None:
+    before = pose(session, state)
+    state = at_rest(session, run(session, state, [step(x=-0.01, frame=JogFrame.TOOL)]))
+    moved = pose(session, state)[:3, 3] - before[:3, 3]
+    np.testing.assert_allclose(moved, before[:3, :3] @ (-0.01, 0.0, 0.0), atol=EXACT)
+
+
+def test_step_turns_pitch_and_roll(session: Session, state: State) -> None:
+    before = state.setpoint
+    turned = cmd.StepTool(np.array([0.0, 0.0, 0.0, 0.0, 0.02]))
+    state = at_rest(session, run(session, state, [turned]))
+    np.testing.assert_allclose(state.setpoint[4] - before[4], 0.02, atol=EXACT)
+    turned = cmd.StepTool(np.array([0.0, 0.0, 0.0, 0.02, 0.0]))
+    state = at_rest(session, run(session, state, [turned]))
+    np.testing.assert_allclose(sum(state.setpoint[1:4] - before[1:4]), 0.02, atol=EXACT)
+
+
+def test_steps_beyond_the_reach_do_not_pile_up(session: Session, state: State) -> None:
+    for _ in range(20):
+        state = at_rest(session, run(session, state, [step(x=0.1)]))
+    farthest = pose(session, state)[:3, 3]
+    state = at_rest(session, run(session, state, [step(x=-0.02)]))
+    assert pose(session, state)[0, 3] < farthest[0] - 0.01
