@@ -11,9 +11,9 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.cli.lines import ask
 from tests.cli.test_lines import random_postures
 

@@ -17,9 +17,8 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 
 TICK = 0.01
 SPLIT = np.array([0.4353, 0.0, 0.0323])

@@ -24,10 +24,9 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from tests.kinematics.family import random_member, random_pose
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"

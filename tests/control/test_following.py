@@ -24,8 +24,7 @@ from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan

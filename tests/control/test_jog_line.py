@@ -14,7 +14,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward, jacobian_body
-from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.tool import pitch_and_roll
 
 TICK = 0.01
 DISTANCE = 0.1

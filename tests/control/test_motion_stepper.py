@@ -16,7 +16,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
-from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.tool import pitch_and_roll
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import JointMotion, Limiter
 

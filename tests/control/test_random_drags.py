@@ -27,7 +27,7 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.tool import pitch_and_roll
 from katana450.maths.kinematics.velocity import tool_speed
 from katana450.resources import URDF_PATH
 from tests.conftest import LONG, MANY_DRAGS

@@ -17,7 +17,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
+from katana450.maths.kinematics.tool import pitch_and_roll
 
 TICK = 0.01
 

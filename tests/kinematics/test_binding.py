@@ -15,9 +15,9 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.kinematics.conftest import katana
 from tests.kinematics.family import Offsets, member, random_member
 

@@ -13,9 +13,9 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member
 

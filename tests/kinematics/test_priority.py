@@ -12,10 +12,9 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from tests.kinematics.brute_force import tool_points
 from tests.kinematics.targets import FRONT_UP, targets
 

@@ -13,11 +13,10 @@ from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.inverse_batch import inverse_batch
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import Projection, project
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.kinematics.tracker import leap
 from tests.kinematics.family import random_pose
 from tests.kinematics.test_projection_family import limited_member, nearest_point, random_targets

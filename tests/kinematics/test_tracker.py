@@ -15,11 +15,10 @@ from katana450.maths.kinematics import tracker
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.kinematics.tracker import HOP, MAX_POSES, Tracked, leap, track
 from tests.kinematics.family import random_member, random_pose
 

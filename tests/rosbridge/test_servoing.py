@@ -24,7 +24,7 @@ from katana450.extensions.rosbridge.servoing import (
 )
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.freedoms import pitched_frame
+from katana450.maths.kinematics.tool import pitched_frame
 
 Q = np.array([0.6, -1.1, 1.3, 0.2, 0.4])
 

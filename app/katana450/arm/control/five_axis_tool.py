@@ -17,10 +17,9 @@ from katana450.maths.kinematics import projection, tracker, velocity
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitched_frame
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget, pitched_frame
 from katana450.maths.kinematics.turns import in_limits_turns
 from katana450.maths.motion.limiter import Limits
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from katana450.arm.control.grip_model import FixedJawModel, GripModel
 from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.solid import PLAIN, ObjectAppearance, Solid
 from katana450.caching import cached_property
@@ -20,6 +20,41 @@ from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.water.environment import TableTop
+
+if TYPE_CHECKING:
+    from katana450.arm.control.state import State
+    from katana450.maths.collision.world import CollisionWorld
+
+
+class GripModel(Protocol):
+    """Forces between the fingers and the object that they hold. All methods are pure."""
+
+    def overload(self, state: State) -> float | None:
+        """Return the load [N] under which the held object slides; None if the fingers hold it."""
+
+    def slid(self, state: State, dt: float) -> SceneObject | None:
+        """Return the held object after it has slid for ``dt`` [s]; None if it leaves the fingers.
+
+        ``state`` has an overload.
+        """
+
+    def report(self, state: State) -> Mapping[str, Any]:
+        """Return forces, pressures and sensor values of ``state`` for the answer to a query."""
+
+
+class FixedJawModel(Protocol):
+    """A fixed jaw, against which the moving jaw pushes objects. Its method is pure."""
+
+    def met(
+        self, world: CollisionWorld, state: State, item: SceneObject
+    ) -> tuple[str, float, SceneObject | None]:
+        """Return the name of the fixed jaw, its distance [m] from ``item``, and the pushed object.
+
+        ``item`` touches the moving jaw. The pushed object is in the base frame, nearer to the fixed
+        jaw. It is None if it touches the jaw already, is not before its face, or cannot be pushed:
+        uphill, or into another object.
+        """
+
 
 MAX_OBJECTS = 64
 """Maximum number of objects at a time."""

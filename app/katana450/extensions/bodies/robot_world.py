@@ -11,11 +11,9 @@ import numpy as np
 from katana450.arm.robot.collision import as_modelled, table, world_of
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
-from katana450.extensions.bodies.cautions import cautions
 from katana450.extensions.bodies.estimated_shapes import with_estimates
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
 from katana450.extensions.bodies.pieces import pieces
-from katana450.extensions.bodies.table import standing
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
@@ -23,6 +21,20 @@ from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.extension import RobotWorld
+
+
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+from katana450.arm.control.joints import JointSet
+from katana450.arm.control.messages import UNCHECKED, short
+from katana450.extensions.bodies.estimated_shapes import drawn
+from katana450.extensions.bodies.pairs_at_rest import TOUCH_DISTANCE, RestPairs, judged_at_rest
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.linkage import GROUND
+from katana450.maths.collision.shape import half_space
+from katana450.maths.collision.world import obstacle
+from katana450.maths.geometry import se3
 
 
 def robot_world(robot: Robot) -> RobotWorld:
@@ -74,3 +86,157 @@ def _at_home(robot: Robot) -> FloatArray | None:
     if robot.arm is None:
         return None
     return np.append(robot.arm.ready(Settings.ready), robot.arm.gripper.clamp(0.0))
+
+
+MAX_LENGTH = 10.0
+"""[m] Parts that are longer, and links that are farther from their parent, look wrong."""
+
+
+def cautions(
+    robot: Robot, unknown: Collection[str], world: CollisionWorld | None, x: FloatArray
+) -> Iterator[str]:
+    """Return what the driver of ``robot`` must know of its ``world``.
+
+    Args:
+        robot: the robot as in its file.
+        unknown: names of the links of which shapes are unknown.
+        world: its bodies and the table; None without shapes.
+        x: (k,) joint values [rad or m] of the world where the robot starts.
+    """
+    for link in robot.links:
+        distance = float(np.linalg.norm(link.T_parent_link[:3, 3]))
+        if distance > MAX_LENGTH:
+            yield (
+                f"{link.name} is {short(distance)} m from its parent {link.parent}: check the "
+                "origin of its joint."
+            )
+    if world is None:
+        yield UNCHECKED
+        return
+    checked = {part.name for part in world.parts}
+    shaped = [link.name for link in robot.links if drawn(link) or link.name in unknown]
+    unchecked = [name for name in shaped if name not in checked]
+    if unchecked:
+        yield f"Not checked for contacts: {', '.join(unchecked)}."
+    estimated = [part.name for part in world.parts if part.name in unknown]
+    if estimated:
+        yield f"Contacts are estimated, because shapes cannot be read: {', '.join(estimated)}."
+    yield from _implausible(robot, world, x)
+
+
+def _implausible(robot: Robot, world: CollisionWorld, x: FloatArray) -> Iterator[str]:
+    own = {link.name for link in robot.links}
+    sizes = np.array([_size(part) if part.name in own else np.inf for part in world.parts])
+    for part, size in zip(world.parts, sizes.tolist(), strict=True):
+        if MAX_LENGTH < size < np.inf:
+            yield f"{part.name} is {short(size)} m long: check the unit of its shapes."
+    placed, owners = world.at(x), (world.part_of[world.first], world.part_of[world.second])
+    limits = -np.minimum(sizes[owners[0]], sizes[owners[1]])
+    for pair in placed.nearer_than(limits)[0].tolist():
+        depth = -placed.distance(pair)
+        if depth > -limits[pair]:
+            one, other = (world.parts[owner[pair]].name for owner in owners)
+            yield (
+                f"{one} and {other} overlap by {short(1e3 * depth)} mm where the robot starts, "
+                "more than one of them is long: check the units and origins of their shapes."
+            )
+            return
+
+
+def _size(part: Part) -> float:
+    """Return the longest side [m] of the boxes round the shapes of ``part``."""
+    return max(float((shape.high - shape.low).max()) for shape in part.shapes)
+
+
+DEEP = -10.0
+"""[m] Height of a plane below every robot, from which heights are measured."""
+
+MAX_NAMED = 4
+"""Maximum number of parts that a note names."""
+
+
+class Standing(NamedTuple):
+    """The table under a robot.
+
+    Attributes:
+        table: the table, or nothing under a robot that hangs.
+        pairs: the pairs of a part with the table, whose index is the one after all parts.
+        notes: sentences for a person.
+    """
+
+    table: tuple[Part, ...]
+    pairs: RestPairs
+    notes: tuple[str, ...]
+
+
+def standing(linkage: Linkage, parts: Sequence[Part], joints: JointSet) -> Standing:
+    """Return the table of a robot whose x (k,) is that of ``joints`` and an unused number.
+
+    The table is as high as the lowest point at rest, or z = 0 of the base if that is lower. If a
+    joint can move this point farther down, the robot hangs, and no table is known. Parts that touch
+    the table at rest are not checked against it.
+    """
+    rest = np.append(joints.ready, 0.0)
+    heights = _heights(linkage, parts, rest)
+    lowest = min(float(heights.min()), 0.0)
+    if lowest > -TOUCH_DISTANCE:
+        lowest = 0.0
+    feet = [part for part, height in zip(parts, heights, strict=True) if height < lowest + STOP]
+    if lowest < 0.0:
+        lower = _lowered(linkage, feet, joints, lowest - STOP)
+        if lower:
+            why = f"{lower} is its lowest part at rest and can move farther down"
+            return Standing(
+                (),
+                RestPairs([], {}, []),
+                (f"No table is checked, because nothing says where the robot stands: {why}.",),
+            )
+    table = _table_at(lowest)
+    moving = [number for number, part in enumerate(parts) if part.mover != GROUND]
+    pairs = judged_at_rest(
+        linkage, (*parts, table), [(number, len(parts)) for number in moving], rest
+    )
+    notes = []
+    if lowest < 0.0:
+        under = _listed([part.name for part in feet])
+        notes.append(f"The table is {-1e3 * lowest:.0f} mm below the base, under {under}.")
+    touching = [parts[number].name for number, _ in pairs.touching]
+    if touching:
+        notes.append(f"Not checked against the table, which they touch: {_listed(touching)}.")
+    return Standing((table,), pairs, tuple(notes))
+
+
+def _table_at(height: float) -> Part:
+    """Return the table as a half-space up to ``height`` [m]."""
+    T = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, height))
+    return obstacle("table", T, half_space())
+
+
+def _lowered(linkage: Linkage, feet: Sequence[Part], joints: JointSet, height: float) -> str:
+    """Return the name of one of ``feet`` that one joint moves below ``height`` [m], or ""."""
+    for axis, (low, high) in enumerate(zip(joints.lower, joints.upper, strict=True)):
+        for value in (low, 0.5 * (low + high), high):
+            x = np.append(joints.ready, 0.0)
+            x[axis] = value
+            heights = _heights(linkage, feet, x)
+            if float(heights.min()) < height:
+                return feet[int(heights.argmin())].name
+    return ""
+
+
+def _heights(linkage: Linkage, parts: Sequence[Part], x: FloatArray) -> FloatArray:
+    """Return the heights (p,) [m] of the lowest points of ``parts`` at ``x`` (k,) [rad or m]."""
+    count = len(parts)
+    pairs = [(number, count) for number in range(count)]
+    world = CollisionWorld(linkage, (*parts, _table_at(DEEP)), pairs)
+    placed, heights = world.at(x), np.full(count, np.inf)
+    for pair, body in enumerate(world.first.tolist()):
+        part = int(world.part_of[body])
+        heights[part] = min(heights[part], DEEP + placed.distance(pair))
+    return heights
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the names as words, with a count of those beyond MAX_NAMED."""
+    more = len(names) - MAX_NAMED
+    return ", ".join(names[:MAX_NAMED]) + (f" and {more} more" if more > 0 else "")

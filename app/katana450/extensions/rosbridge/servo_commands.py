@@ -14,7 +14,7 @@ from katana450.extensions.rosbridge.servoing import (
     tool_rates,
 )
 from katana450.extensions.rosbridge.stream import ServoStream
-from katana450.maths.kinematics.freedoms import pitched_frame
+from katana450.maths.kinematics.tool import pitched_frame
 from katana450.server.service.hub import Hub
 
 

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+import numpy.typing as npt
+
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
@@ -13,9 +15,27 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.canonical_target import CanonicalTarget
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.freedoms import pitch_and_roll
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.turns import wrapped
+
+
+def pitch_and_roll(chain: Chain, q: npt.ArrayLike) -> tuple[float, float]:
+    """Return pitch and roll [rad] at the joint angles `q` (5,) [rad]."""
+    arm = arm_of(chain)
+    alpha = arm.angles(chain.check_q(q))
+    return arm.pitch(alpha), alpha[4]
+
+
+def pitched_frame(chain: Chain, q: npt.ArrayLike) -> FloatArray:
+    """Return the rotation (3, 3) in {S} of the frame that follows pan and pitch but not roll.
+
+    Its x axis is the roll axis and its y axis is the pitch axis. `q` (5,) are joint angles [rad].
+    """
+    arm = arm_of(chain)
+    pitch, _ = pitch_and_roll(chain, q)
+    alpha1 = arm.signs[0] * float(chain.check_q(q)[0])
+    R: FloatArray = arm.T_C_S[:3, :3].T @ so3.rotation_z(alpha1) @ so3.rotation_y(pitch)
+    return R
 
 
 class DragTarget(Protocol):

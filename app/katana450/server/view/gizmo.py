@@ -24,8 +24,7 @@ from katana450.errors import KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward, joint_frames
-from katana450.maths.kinematics.freedoms import pitch_and_roll, pitched_frame
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll, pitched_frame
 from katana450.server.view.controls import GestureGate
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
