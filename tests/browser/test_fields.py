@@ -7,11 +7,9 @@ import math
 import numpy as np
 from playwright.sync_api import Locator
 
-from katana450.settings import Settings
 from tests.browser.page import ViserPage
-from tests.browser.session import Truth, clear_stop
+from tests.browser.session import READY, Truth, clear_stop
 
-READY = Settings().ready
 BETWEEN_KEYS = 80.0  # ms; viser alone sends a keystroke after at most 50
 
 
@@ -149,24 +147,3 @@ def test_every_number_of_the_panel_waits(page: ViserPage) -> None:
         }"""
     )
     assert watch.sees(80)
-
-
-LONG_TABLE = """() => {
-    const table = document.querySelector(".k450 table:has(td.unit)");
-    const before = table.innerHTML;
-    table.querySelector("th").textContent = "tool_of_a_long_name_".repeat(3);
-    const cells = [...table.querySelectorAll("tbody td")].slice(0, 2);
-    for (const cell of cells) cell.textContent = "\u2212133.3";
-    const range = document.createRange();
-    const [now, goal] = cells.map((cell) => {
-        range.selectNodeContents(cell);
-        return range.getBoundingClientRect();
-    });
-    table.innerHTML = before;
-    return goal.left - now.right;
-}"""
-"""Function of the panel that shows a long name and numbers; it returns the gap between two [px]."""
-
-
-def test_numbers_beside_a_long_name_stay_apart(page: ViserPage) -> None:
-    assert page.frame.evaluate(LONG_TABLE) > 4.0

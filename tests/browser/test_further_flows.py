@@ -36,7 +36,6 @@ def test_further_flows_of_the_page(person: Person, reader: Client) -> None:
     taught_poses(person)
     link(person, reader)
     branch(person)
-    picture(person)
 
 
 def pour(person: Person) -> None:
@@ -133,11 +132,3 @@ def branch(person: Person) -> None:
     truth.wait(20.0, moving=False)
     person.press(page.frame.get_by_text("Branches", exact=True))
     person.fold_panel()
-
-
-def picture(person: Person) -> None:
-    page = person.page
-    person.press(page.page.locator("#more-button"))
-    with page.page.expect_download() as saved:
-        person.press(page.page.locator("#snapshot"))
-    assert saved.value.path().read_bytes().startswith(b"\x89PNG")

