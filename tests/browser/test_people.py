@@ -9,12 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
 from katana450.client import Client, connect
 from katana450.client.files import LostError
 from katana450.server.api import answers, requests
+from tests.browser.camera import Drawing
+from tests.browser.conftest import Windows
 from tests.gateway.site import Site, open_site
 
 
@@ -25,18 +27,11 @@ def site(tmp_path: Path) -> Iterator[Site]:
 
 
 @contextmanager
-def visiting(browser: Browser, url: str, *, scene: bool = False) -> Iterator[Page]:
-    """Open ``url`` in a browser of its own, by default without the scene, which takes long."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
-    try:
-        page = context.new_page()
-        if not scene:
-            page.route("**/viser/*", lambda route: route.abort())
-        page.goto(url)
-        page.locator("#name", has_text=re.compile(".")).wait_for()
-        yield page
-    finally:
-        context.close()
+def visiting(windows: Windows, url: str) -> Iterator[Page]:
+    """Open ``url`` in a browser of its own."""
+    with windows.open(url, drawing=Drawing.NONE) as window:
+        window.page.locator("#name", has_text=re.compile(".")).wait_for()
+        yield window.page
 
 
 def waits(page: Page, name: str, words: str) -> None:
@@ -44,11 +39,11 @@ def waits(page: Page, name: str, words: str) -> None:
 
 
 @pytest.mark.long
-def test_admin_lists_and_disconnects(site: Site, browser: Browser, artefacts: Path) -> None:
+def test_admin_lists_and_disconnects(site: Site, windows: Windows) -> None:
     url, token = site.server.url, site.link("Vera", Role.VIEWER)
     boss = site.link("Ada", Role.ADMIN)
     with (
-        visiting(browser, f"{url}/#{boss}", scene=True) as page,
+        visiting(windows, f"{url}/#{boss}") as page,
         connect(url, "Watch", token) as watch,
         connect(url, "Sorter of parts", site.link("Oda", Role.OPERATOR)) as sorter,
     ):
@@ -66,7 +61,6 @@ def test_admin_lists_and_disconnects(site: Site, browser: Browser, artefacts: Pa
         assert page.locator("#people-list li b").all_inner_texts() == ["Ada (you)", "Vera", "Oda"]
         for size in ((1280, 800), (390, 844), (844, 390)):
             page.set_viewport_size({"width": size[0], "height": size[1]})
-            page.screenshot(path=artefacts / f"people-{size[0]}.png")
             stop = page.locator("#stop").bounding_box()
             box = page.locator("#people").bounding_box()
             assert stop is not None
@@ -102,12 +96,12 @@ def poll(program: Client) -> None:
 
 
 @pytest.mark.long
-def test_disconnected_page_says_why_and_comes_back(site: Site, browser: Browser) -> None:
+def test_disconnected_page_says_why_and_comes_back(site: Site, windows: Windows) -> None:
     url = site.server.url
     boss, token = site.link("Ada", Role.ADMIN), site.link("Kai", Role.OPERATOR)
     with (
-        visiting(browser, f"{url}/#{boss}") as page,
-        visiting(browser, f"{url}/#{token}") as other,
+        visiting(windows, f"{url}/#{boss}") as page,
+        visiting(windows, f"{url}/#{token}") as other,
     ):
         page.locator("#name", has_text="2 connected").wait_for()
         # Only admins have the button.
@@ -125,14 +119,12 @@ def test_disconnected_page_says_why_and_comes_back(site: Site, browser: Browser)
 
 
 @pytest.mark.long
-def test_disconnected_person_stops_the_arm_on_a_phone(
-    site: Site, browser: Browser, artefacts: Path
-) -> None:
+def test_disconnected_person_stops_the_arm_on_a_phone(site: Site, windows: Windows) -> None:
     url = site.server.url
     boss, token = site.link("Ada", Role.ADMIN), site.link("Kai", Role.VIEWER)
     with (
         connect(url, "Guard", boss) as guard,
-        visiting(browser, f"{url}/#{token}") as phone,
+        visiting(windows, f"{url}/#{token}") as phone,
     ):
         phone.set_viewport_size({"width": 390, "height": 844})
         (kai,) = (each for each in guard.people() if each.name == "Kai")
@@ -143,17 +135,16 @@ def test_disconnected_person_stops_the_arm_on_a_phone(
                 # The page knows no state of the arm.
                 phone.reload()
                 phone.get_by_text("Your STOP still works").wait_for(timeout=10_000)
-            phone.screenshot(path=artefacts / f"disconnected-phone-{again}.png")
             phone.locator("#stop").click()
             phone.locator("#stop:not(.asked)").wait_for()
             assert guard.query(answers.State).stopped == "Kai pressed STOP."
 
 
 @pytest.mark.long
-def test_link_is_revoked_by_the_second_click(site: Site, browser: Browser) -> None:
+def test_link_is_revoked_by_the_second_click(site: Site, windows: Windows) -> None:
     url = site.server.url
     boss, token = site.link("Ada", Role.ADMIN), site.link("Rita", Role.VIEWER)
-    with visiting(browser, f"{url}/#{boss}") as page, connect(url, "Watch", token):
+    with visiting(windows, f"{url}/#{boss}") as page, connect(url, "Watch", token):
         page.click("#help-button")
         page.click("#people-button")
         page.select_option("#kick-for", "revoke")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -65,22 +64,12 @@ def server(recording_server: AppServer) -> AppServer:
     """Return a server whose arm has turned twice, and was stopped by Ada in between."""
     with connect(recording_server.url, "Ada") as arm:
         for angle in TURNS:
-            arm.ask(requests.Joints(q=np.array([angle, -1.0, 1.4, 0.3, 0.0])))
-            rest(arm)
+            arm.joints((angle, -1.0, 1.4, 0.3, 0.0))
             if angle is TURNS[0]:
                 arm.stop()
                 arm.clear_stop()
         arm.ask(requests.ReleaseLease())
     return recording_server
-
-
-def rest(arm: Any) -> None:
-    """Wait until the arm is at rest."""
-    deadline = time.monotonic() + 20.0
-    time.sleep(0.2)
-    while arm.query(answers.State).moving:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 @pytest.mark.long
