@@ -11,10 +11,9 @@ from playwright.sync_api import Frame, Page
 from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import take
+from tests.browser.session import MOVE, take
 from tests.browser.sizes import PHONE, PORTRAIT, WIDE
 
-MOVE = "/target/move"
 TABS = ("Drive", "Programs", "Scene")
 AXE = Path(__file__).parents[1] / "javascript" / "node_modules" / "axe-core" / "axe.min.js"
 

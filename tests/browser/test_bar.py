@@ -25,12 +25,7 @@ from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
 from tests.browser.session import Truth, bar, clear_stop, take
 from tests.browser.sight import overlap
-from tests.browser.sizes import (
-    LANDSCAPE,
-    PHONE,
-    PORTRAIT,
-    WIDE,
-)
+from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE
 
 SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 

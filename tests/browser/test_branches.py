@@ -17,11 +17,9 @@ from katana450.client import Client
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers
-from katana450.settings import Settings
 from tests.browser.page import ViserPage
-from tests.browser.session import AXES, Truth, bar
+from tests.browser.session import AXES, READY, Truth, bar
 
-READY = np.array(Settings().ready)
 GHOST = """(path) => {
     const ghost = katanaScene.viewer().scene.getObjectByName("branch");
     if (!ghost) return null;

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from tests.browser.conftest import OpenPage
@@ -39,7 +37,7 @@ def reset_by_key(page: ViserPage, truth: Truth) -> None:
 
 
 def test_arm_is_handed_over(
-    page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage, artefacts: Path
+    page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
     other = open_page(server.url, nodes=("/arm", MOVE))
     me, they = (bar(each, "name").partition(",")[0] for each in (page, other))
@@ -53,7 +51,6 @@ def test_arm_is_handed_over(
     )
     other.press_in_bar("Request")
     page.wait_until(lambda: f"{they} asks for it" in bar(page, "name"), "the request")
-    page.keep(artefacts / "gateway-request.png")
     page.press_in_bar(f"Give to {they}")
     other.wait_until(lambda: bar(other, "holder") == "You drive", "the arm")
     assert truth.status()["holder"] == they

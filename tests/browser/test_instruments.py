@@ -10,16 +10,7 @@ import pytest
 
 from katana450.client import connect
 from katana450.server.api import answers, requests
-from tests.browser.instruments import (
-    card,
-    dial,
-    goal,
-    middle,
-    show,
-    slowly,
-    table,
-    turn,
-)
+from tests.browser.instruments import card, dial, goal, middle, show, slowly, table, turn
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import Truth, bar, clear_stop

@@ -38,10 +38,6 @@ def arm(server: AppServer) -> Iterator[Client]:
         yield arm
 
 
-def headline(page: ViserPage) -> str:
-    return bar(page, "headline")
-
-
 def orders(page: ViserPage) -> list[str]:
     """Return the labels of the buttons in the bar that steer the program."""
     return page.page.locator("#orders button").all_inner_texts()
@@ -49,7 +45,9 @@ def orders(page: ViserPage) -> list[str]:
 
 def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
     """Wait until the bar's headline matches ``shown``."""
-    page.wait_until(lambda: re.fullmatch(shown, headline(page)) is not None, shown, seconds=seconds)
+    page.wait_until(
+        lambda: re.fullmatch(shown, bar(page, "headline")) is not None, shown, seconds=seconds
+    )
 
 
 def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.State:

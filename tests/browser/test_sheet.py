@@ -12,11 +12,9 @@ from tests.browser.conftest import Windows
 from tests.browser.finger import fingers, middle
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import Truth, clear_stop, take
+from tests.browser.session import MOVE, Truth, clear_stop, take
 from tests.browser.sight import overlap, wait_whole
 from tests.browser.sizes import PHONE, PORTRAIT
-
-MOVE = "/target/move"
 
 FINGER = 44.0
 """Minimum width and height of what a finger hits [px]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,13 +14,12 @@ from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
-from tests.browser.session import turn
+from tests.browser.session import MOVE, turn
 from tests.browser.sight import contrast, wait_whole, whole
 from tests.browser.sizes import LANDSCAPE, PHONE, PORTRAIT, WIDE, WIDER
 from tests.conftest import LONG
 from tests.gateway.slow_link import SlowLink
 
-MOVE = "/target/move"
 SIZES = (WIDE, WIDER, PORTRAIT, LANDSCAPE)
 
 MOODS = {*(status.value for status in Status), "moving", "program", "planning", "lost"}
@@ -170,7 +168,6 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
     server: AppServer, open_page: OpenPage, artefacts: Path
 ) -> None:
     with SlowLink(server.port, 1e6, delay=0.15) as line:
-        started = time.monotonic()
         page = open_page(
             f"http://127.0.0.1:{line.port}",
             nodes=("/arm", MOVE),
@@ -181,7 +178,6 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
             **PHONE,
         )
         wait_whole(page, "on a phone")
-        print(f"there after {time.monotonic() - started:.1f} s")
         shades = [each.evaluate("() => [...shades]") for each in (page.page.main_frame, page.frame)]
         assert set(shades[0]) == {NIGHT}
         assert {NIGHT, "viser dark"} <= set(shades[1]) <= {NIGHT, "viser dark", "bare dark"}
