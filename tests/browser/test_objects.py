@@ -253,6 +253,9 @@ def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
 @pytest.mark.long
 def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth) -> None:
     """An undo that waits on its way while the arm is stopped and cleared is refused."""
+    page.press_in_bar("STOP")
+    truth.wait(mood="stopped")
+    clear_stop(page, truth)
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)
     truth.wait(10.0, moving=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from pathlib import Path
@@ -60,7 +61,7 @@ def folder(recorded: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(recording_server: AppServer) -> AppServer:
+def server(recording_server: AppServer, folder: Path) -> AppServer:
     """Return a server whose arm has turned twice, and was stopped by Ada in between."""
     with connect(recording_server.url, "Ada") as arm:
         for angle in TURNS:
@@ -69,7 +70,19 @@ def server(recording_server: AppServer) -> AppServer:
                 arm.stop()
                 arm.clear_stop()
         arm.ask(requests.ReleaseLease())
+    run = PlaybackRun(lambda: recordings_in(folder))
+    deadline = time.monotonic() + 60.0
+    while abs(newest_turn(run) - TURNS[-1]) > 1e-6:
+        assert time.monotonic() < deadline, "the motion is not recorded"
+        time.sleep(0.1)
     return recording_server
+
+
+def newest_turn(run: PlaybackRun) -> float:
+    """Return the newest recorded angle of axis 1 [rad]; 0 before the first."""
+    run.update()
+    moment = run.at(math.inf) if run.spans else None
+    return 0.0 if moment is None else moment.row.joints[0]
 
 
 @pytest.mark.long
