@@ -230,6 +230,8 @@ def test_invalid_objects_are_refused(session: Session) -> None:
         lambda: Solid("k", (1.0, 1.0, 1.0), np.zeros((3, 3))),
         lambda: Solid("k", (1.0, 1.0, 1.0), np.full((5, 3), np.nan)),
         lambda: cmd.Attach("it", "hand"),  # type: ignore[arg-type]
+        lambda: cmd.Attach("it", Attachment.HAND, np.zeros(3)),
+        lambda: cmd.Attach("it", Attachment.HAND, np.full((4, 4), np.nan)),
         lambda: cmd.ReplaceScene((knot(T), knot(T))),
         lambda: cmd.ReplaceScene(tuple(knot(T, f"{i}") for i in range(MAX_OBJECTS + 1))),
         lambda: cmd.ReplaceScene((knot(T, held=True),)),

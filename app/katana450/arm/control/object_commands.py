@@ -14,7 +14,7 @@ from katana450.arm.control.appearance import AS_MADE, MAX_NAME_LENGTH, Appearanc
 from katana450.arm.control.checked import Transform, check_finite, vector
 from katana450.arm.control.scene_objects import MAX_COORDINATE, MAX_OBJECTS, Attachment, SceneObject
 from katana450.errors import InputError
-from katana450.maths.geometry import so3
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.units import ML
 
@@ -139,6 +139,9 @@ class Attach(Command, Request, frozen=True, eq=False):
     def __post_init__(self) -> None:
         if not isinstance(self.to, Attachment):
             raise InputError(f"`to` must be one of {list(Attachment)}, not {self.to!r}.")
+        if self.T is not None:
+            se3.validated(self.T)
+            force_setattr(self, "T", frozen(self.T))
 
 
 class ReplaceScene(Command, frozen=True, eq=False):
