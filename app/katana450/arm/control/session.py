@@ -71,6 +71,7 @@ NO_BRANCH = BRANCHES[0]
 
 
 _Cache = tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper]
+"""The objects of a state, their collision world, and the stepper among them."""
 
 
 class Session:
@@ -119,9 +120,7 @@ class Session:
         self._tool_speed = tool_speed
         self._travel = travel
         # Cache for the objects of the newest state.
-        self._cache: tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper] | None = (
-            None
-        )
+        self._cache: _Cache | None = None
         self.check(cmd.Joints(ready))
         self.ready = frozen(ready)
         if of_joints(self._limits, robot.slides, self.ready):
@@ -148,9 +147,7 @@ class Session:
         """Return the collision world with the objects of ``state``; None without checks."""
         return self._for(state)[1]
 
-    def _for(
-        self, state: State
-    ) -> tuple[tuple[SceneObject, ...], CollisionWorld | None, MotionStepper]:
+    def _for(self, state: State) -> _Cache:
         if self._cache is None or self._cache[0] is not state.objects:
             world = self.environment.world(state.objects)
             touch = None
