@@ -20,8 +20,10 @@ ROLLING_AXES, PLANAR_AXES = 5, 4
 """Numbers of axes with which a hand takes every place, pitch and roll, or every place and pitch."""
 
 STRAIGHT: Final = 1e-3
+"""[1] Sine of the angle up to which directions count as parallel."""
 
 MAX_BEND: Final = math.radians(10.0)
+"""[rad] Maximum angle between the fingers and the roll axis, along which the hand approaches."""
 
 NOT_IN_PLANE: Final = (
     "An arm with fewer than six axes grasps if axis 1 is upright, axes 2 to 4 are level, and its "

@@ -336,7 +336,7 @@ class ToolTurn(_OneFormula):
     Attributes:
         target: point and pitch; its roll is not used.
         rolls: coefficients (n,) of the roll [rad], of the powers of 2 sigma - 1.
-        offsets: coefficients (m, 3) of the way of the tool point from ``target`` [m]; None if it
+        offsets: coefficients (m, 3) of the path of the tool point from ``target`` [m]; None if it
             stays there.
     """
 
@@ -349,7 +349,7 @@ class ToolTurn(_OneFormula):
         object.__setattr__(self, "rolls", frozen(rolls))
         if self.offsets is not None:
             shape = (max(len(self.offsets), 1), 3)
-            offsets = finite_array(self.offsets, shape, "The coefficients of a way")
+            offsets = finite_array(self.offsets, shape, "The coefficients of a path")
             object.__setattr__(self, "offsets", frozen(offsets))
 
     def at(self, sigma: Jet) -> ToolCoordinates:

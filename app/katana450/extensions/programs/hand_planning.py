@@ -81,10 +81,6 @@ Beside the hand the wrist does most of the turn.
 TURNS: Final = tuple(np.radians((45.0, -45.0, 90.0, -90.0, 180.0)).tolist())
 """[rad] Further turns of an object over its new place, beside those with the arm and without."""
 
-"""[1] Sine of the angle up to which directions count as parallel."""
-
-"""[rad] Maximum angle between the fingers and the roll axis, along which the hand approaches."""
-
 MAX_SKEW: Final = math.radians(15.0)
 """[rad] Maximum angle between the fingers and the sides of a box: the pads yield by as much."""
 

@@ -125,7 +125,7 @@ class Rolling(VesselTurn):
     Attributes:
         at: the tool with the vessel upright.
         end: angle at the end of the pour.
-        offsets: coefficients (n, 3) of the way of the tool point [m] that keeps the lip in its
+        offsets: coefficients (n, 3) of the path of the tool point [m] that keeps the lip in its
             place, of the powers of 2 angle / end - 1; None to keep the tool point.
     """
 
