@@ -194,9 +194,23 @@ def load(target: Target) -> Any:
 
 
 def provided(part: str) -> Iterator[Any]:
-    """Yield what the extensions provide for ``part``, a field of Extension, loaded one by one."""
-    targets = (getattr(extension, part) for extension in extensions())
-    return (load(target) for target in targets if target is not None)
+    """Yield what the extensions provide for ``part``, a field of Extension, loaded one by one.
+
+    A part of another distribution that cannot be loaded is left out and logged.
+    """
+    for extension in extensions():
+        target = getattr(extension, part)
+        if target is None:
+            continue
+        try:
+            loaded = load(target)
+        except Exception as error:
+            if extension in load(BUILT_IN):
+                raise
+            # Third-party code, as in `_added`.
+            _report(extension.name, error)
+        else:
+            yield loaded
 
 
 @cache

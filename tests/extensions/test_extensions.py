@@ -32,6 +32,12 @@ def add_options(parser):
 EXTENSION = Extension("weather", (CliCommand(NAME, "tell the weather", add_options, run),))
 """
 
+UNKNOWN_PART = """
+from katana450.extension import Extension
+
+EXTENSION = Extension("weather", prepare="station:missing")
+"""
+
 SERVED = """
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
@@ -127,6 +133,7 @@ def test_another_distribution_adds_a_command(tmp_path: Path) -> None:
             "station:EXTENSION", "EXTENSION = 7", "is not an Extension", marks=pytest.mark.long
         ),
         ("station:EXTENSION", STATION.replace("NAME", "'fk'"), "two commands fk"),
+        ("station:EXTENSION", UNKNOWN_PART, "weather cannot be loaded"),
     ],
 )
 def test_broken_extension_of_another_distribution_is_reported_and_left_out(
