@@ -150,8 +150,9 @@ def test_past_is_shown_in_one_window_until_stop(
     slider.focus()
     page.page.keyboard.press("Home")
     page.page.keyboard.press("Shift+ArrowRight")
-    assert float(slider.input_value()) == pytest.approx(1.0, abs=0.01)
-    moment = run.at(run.spans[0].start + 1.0)
+    later = float(slider.input_value())
+    assert later == pytest.approx(1.0, abs=0.01)
+    moment = run.at(run.spans[0].start + later)
     assert moment is not None
     turned = moment.row.joints[0]
     page.wait_until(lambda: abs(shown_turn(page) - turned) < 1e-6, "the posture 1 s later")

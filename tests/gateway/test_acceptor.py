@@ -45,9 +45,12 @@ async def _accepting() -> AsyncIterator[tuple[Acceptor, tuple[str, int]]]:
             await acceptor.wait_closed()
 
 
-async def _connected(server: tuple[str, int], of: str = "127.0.0.1") -> socket.socket:
-    """Connect from the address ``of``, and give the server time to accept."""
+async def _connected(
+    server: tuple[str, int], of: str = "127.0.0.1", sent: bytes = b""
+) -> socket.socket:
+    """Connect from the address ``of``, send ``sent``, and give the server time to accept."""
     connection = socket.create_connection(server, timeout=2.0, source_address=(of, 0))
+    connection.sendall(sent)
     connection.setblocking(False)
     await asyncio.sleep(0.02)
     return connection
@@ -166,8 +169,7 @@ def test_connections_beyond_the_rate_are_opened_once_they_send(
     async def act() -> None:
         async with _accepting() as (acceptor, server):
             silent = [await _connected(server, of[n % len(of)]) for n in range(6)]
-            speaking = await _connected(server, of[-1])
-            speaking.send(b"x")
+            speaking = await _connected(server, of[-1], b"x")
             await asyncio.sleep(0.1)
             assert [_is_open(each) for each in silent] == [True] * 3 + [False] * 3
             assert _is_open(speaking)
