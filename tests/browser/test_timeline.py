@@ -152,10 +152,12 @@ def test_past_is_shown_in_one_window_until_stop(
     page.page.keyboard.press("Shift+ArrowRight")
     later = float(slider.input_value())
     assert later == pytest.approx(1.0, abs=0.01)
-    moment = run.at(run.spans[0].start + later)
-    assert moment is not None
-    turned = moment.row.joints[0]
-    page.wait_until(lambda: abs(shown_turn(page) - turned) < 1e-6, "the posture 1 s later")
+    # The arm may move at that moment, and the page asks for it to 10 ms.
+    moments = [run.at(run.spans[0].start + later + apart) for apart in (-0.02, 0.0, 0.02)]
+    turns = [moment.row.joints[0] for moment in moments if moment is not None]
+    page.wait_until(
+        lambda: min(turns) - 1e-6 <= shown_turn(page) <= max(turns) + 1e-6, "the posture 1 s later"
+    )
     titles = page.page.locator("#timeline .marks i").evaluate_all(
         "(all) => all.map((e) => e.title)"
     )
