@@ -233,7 +233,7 @@ class If(StepBlock):
 
 
 BLOCKS: dict[str, type[StepBlock]] = {"repeat": Repeat, "for_each": ForEach, "call": Call, "if": If}
-"""What stands for several steps, by its name in a script."""
+"""Class of each block, which stands for several steps, by its name in a script."""
 
 
 @dataclass(frozen=True)
