@@ -56,10 +56,10 @@ def kept(make: Callable[[], T], kind: type[T], *inputs: bytes | str | np.ndarray
     name = f"{make.__module__}.{make.__qualname__}"
     file = folder / _digest((_surroundings(), name, *inputs)).hex()
     with suppress(OSError, DamagedError):
-        found: T = _loaded(file.read_bytes(), kind)
+        stored: T = _loaded(file.read_bytes(), kind)
         with suppress(OSError):
             os.utime(file)
-        return found
+        return stored
     value = make()
     with suppress(OSError, InputError):
         _store(file, value)
@@ -88,15 +88,15 @@ def _surroundings() -> bytes:
     # By `os`, because `pathlib` takes four times as long for 700 files.
     package = os.path.dirname(__file__)
     known = sorted(
-        f"{folder.removeprefix(package)}/{name} {found.st_size} {found.st_mtime_ns}"
+        f"{folder.removeprefix(package)}/{name} {status.st_size} {status.st_mtime_ns}"
         for folder, _, names in os.walk(package)
         for name in names
         if name.endswith(".py")
-        for found in (os.stat(f"{folder}/{name}"),)
+        for status in (os.stat(f"{folder}/{name}"),)
     )
     # The folders that state the versions. `importlib.metadata` takes five times as long.
-    folders = {each.name for folder in sys.path for each in Path(folder).glob("*-info")}
-    versions = sorted(each for each in folders if each.partition("-")[0] in LIBRARIES)
+    folders = {entry.name for folder in sys.path for entry in Path(folder).glob("*-info")}
+    versions = sorted(entry for entry in folders if entry.partition("-")[0] in LIBRARIES)
     return _digest([sys.version, *versions, *known])
 
 
@@ -126,9 +126,9 @@ def _store(file: Path, value: object) -> None:
     """Write ``value`` whole or not at all. Raises InputError."""
     content = encoded(value)
     write_files({file: writer_of(hashlib.sha256(content).digest() + content)}, mode=0o600)
-    files = sorted(file.parent.iterdir(), key=lambda each: each.stat().st_mtime)
-    for each in files[:-MAX_FILES]:
-        each.unlink(missing_ok=True)
+    files = sorted(file.parent.iterdir(), key=lambda path: path.stat().st_mtime)
+    for old_file in files[:-MAX_FILES]:
+        old_file.unlink(missing_ok=True)
 
 
 def encoded(value: object) -> bytes:

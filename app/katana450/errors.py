@@ -43,7 +43,7 @@ class PathError(InputError):
     ) -> None:
         """Name ``point`` and ``parts`` in ``text``; ``frame``: name of the frame of the point."""
         self.text, self.point, self.frame, self.parts = text, point, frame, parts
-        shown = ", ".join(f"{1e3 * each:.1f}" for each in point)
+        shown = ", ".join(f"{1e3 * coordinate:.1f}" for coordinate in point)
         text = text.replace("{point}", f"({shown}) mm in {frame}")
         super().__init__(text.replace("{parts}", " and ".join(parts)))
 

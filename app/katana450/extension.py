@@ -224,7 +224,7 @@ def extensions() -> tuple[Extension, ...]:
 
 def _added() -> Iterator[Extension]:
     """Yield the extensions of other distributions."""
-    files = (file for each in sys.path for file in Path(each).glob("*-info/entry_points.txt"))
+    files = (file for folder in sys.path for file in Path(folder).glob("*-info/entry_points.txt"))
     if not any(map(_may_name_group, files)):
         return
     # This library takes 20 ms of each process.

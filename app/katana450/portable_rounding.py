@@ -43,14 +43,14 @@ def portable_rounding(environment: Mapping[str, str]) -> dict[str, str]:
 
     On processors other than x86-64 it is returned unchanged.
     """
-    found = dict(environment)
+    variables = dict(environment)
     if can_round_portably():
-        tunables = found.get(LIBM, "")
+        tunables = variables.get(LIBM, "")
         if not tunables.endswith(LIBM_CHOICE):
             # The last one counts.
-            found[LIBM] = f"{tunables}:{LIBM_CHOICE}".lstrip(":")
-        found |= {BLAS: BLAS_CORE, THREADS: "1", NUMPY: NUMPY_CHOICE}
-    return found
+            variables[LIBM] = f"{tunables}:{LIBM_CHOICE}".lstrip(":")
+        variables |= {BLAS: BLAS_CORE, THREADS: "1", NUMPY: NUMPY_CHOICE}
+    return variables
 
 
 def rounds_portably(environment: Mapping[str, str]) -> bool:

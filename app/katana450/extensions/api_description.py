@@ -50,18 +50,18 @@ def documentation(kind: type) -> tuple[str, dict[str, str]]:
     return text, fields
 
 
-def schemas(asked: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
+def schemas(requests: tuple[type[Request], ...]) -> tuple[dict[str, Any], dict[str, Any], Any]:
     """Return the schemas of a request and of an answer, and those of all classes by name.
 
     Each field is described by the entry of its class under ``Attributes``. ``asked``: the requests
     of the server.
     """
-    shapes: list[Any] = [Union[asked], Union[answers.EVERY]]  # noqa: UP007
+    shapes: list[Any] = [Union[requests], Union[answers.EVERY]]  # noqa: UP007
     (request, answer), components = msgspec.json.schema_components(
         shapes, schema_hook=field_schema, ref_template=REFERENCE
     )
     components = {name: _portable(schema) for name, schema in components.items()}
-    messages = {each.__name__: each for each in (*asked, *answers.EVERY)}
+    messages = {message.__name__: message for message in (*requests, *answers.EVERY)}
     for name, schema in components.items():
         text, fields = _divided(inspect.cleandoc(schema.get("description", "")))
         if name in messages:
@@ -113,13 +113,13 @@ READABLE = {
 
 
 @functools.cache
-def openapi_json(asked: tuple[type[Request], ...], served: frozenset[str] | None = None) -> bytes:
+def openapi_json(kinds: tuple[type[Request], ...], served: frozenset[str] | None = None) -> bytes:
     """Return the document as JSON.
 
-    ``asked``: the requests of the server. ``served``: paths of the server, of which only the first
+    ``kinds``: the requests of the server. ``served``: paths of the server, of which only the first
     name below ``/api/v1`` counts; None to describe all paths.
     """
-    request, answer, components = schemas(asked)
+    request, answer, components = schemas(kinds)
     paths: dict[str, Any] = {
         **{path: {"get": _question(path, kind)} for path, kind in READABLE.items()},
         "stop": {"post": _stop()},
@@ -337,14 +337,17 @@ def _recordings() -> dict[str, Any]:
         "404": _response("There is no such recording here.", answers.Refused),
         **COMMON_RESPONSES,
     }
-    made = {"409": _response("Nothing was recorded, and why.", answers.Refused), **common}
+    responses = {"409": _response("Nothing was recorded, and why.", answers.Refused), **common}
     return {
         "recording": {
             "get": {
                 "operationId": "download_recording",
                 "summary": "Download what was recorded, at most ten minutes of motion.",
                 "parameters": times,
-                "responses": {"200": _content("An MCAP file.", "application/octet-stream"), **made},
+                "responses": {
+                    "200": _content("An MCAP file.", "application/octet-stream"),
+                    **responses,
+                },
             }
         },
         "recording/script": {
@@ -352,7 +355,7 @@ def _recordings() -> dict[str, Any]:
                 "operationId": "download_recording_script",
                 "summary": "Download a script that runs the recorded motion again.",
                 "parameters": times,
-                "responses": {"200": _content("The script.", "application/yaml"), **made},
+                "responses": {"200": _content("The script.", "application/yaml"), **responses},
             }
         },
         "episodes": {
@@ -399,7 +402,7 @@ def _document(operation: str, about: str, media: str) -> dict[str, Any]:
     return {"get": {"operationId": operation, "summary": about, "responses": responses}}
 
 
-def _upload(media: str, kept: type) -> dict[str, Any]:
+def _upload(media: str, answer: type) -> dict[str, Any]:
     """Describe an upload of type ``media`` that is answered with ``kept``."""
     return {
         "requestBody": {
@@ -407,7 +410,7 @@ def _upload(media: str, kept: type) -> dict[str, Any]:
             "content": {media: {"schema": {"type": "string", "format": "binary"}}},
         },
         "responses": {
-            "200": _response("The file is kept.", kept),
+            "200": _response("The file is kept.", answer),
             "422": _response("The file cannot be read.", answers.Refused),
             "413": _response("The file is too large.", answers.Refused),
             **COMMON_RESPONSES,

@@ -77,7 +77,7 @@ def convex_body(points: npt.ArrayLike) -> ConvexBody:
         inside = corners.mean(axis=0)
         cut = _cut(planes, low, high, inside)
         grown = _grown(spanning, corners, planes, inside)
-        corners, off = min(cut, grown, key=lambda found: found[1])
+        corners, off = min(cut, grown, key=lambda solution: solution[1])
     return ConvexBody(
         frozen(corners * length + middle), off * length, thickened, volume * length**3
     )
@@ -133,8 +133,8 @@ def _over(
     outside = np.zeros(len(points), dtype=bool)
     limit = (heights + EXACT)[:, None]
     step = max(1, BLOCK // len(normals))
-    for at in range(0, len(points), step):
-        block = points[at : at + step]
+    for start in range(0, len(points), step):
+        block = points[start : start + step]
         along = normals @ block.T
         number = along.argmax(axis=1)
         maximum = along[np.arange(len(normals)), number]
@@ -143,7 +143,7 @@ def _over(
         # Only where a face has a point above it can a point of the block be outside.
         rows = maximum > limit[:, 0]
         if rows.any():
-            outside[at : at + step] = (along[rows] > limit[rows]).any(axis=0)
+            outside[start : start + step] = (along[rows] > limit[rows]).any(axis=0)
     return farthest, best, outside
 
 
@@ -170,12 +170,12 @@ def _farthest(
     along = np.full(len(directions), -np.inf)
     rows = np.arange(len(directions))
     step = max(1, BLOCK // len(directions))
-    for at in range(0, len(points), step):
-        heights = directions @ points[at : at + step].T
+    for start in range(0, len(points), step):
+        heights = directions @ points[start : start + step].T
         best = heights.argmax(axis=1)
         maximum = heights[rows, best]
         better = maximum > along
-        number[better], along[better] = at + best[better], maximum[better]
+        number[better], along[better] = start + best[better], maximum[better]
     return number, along
 
 
@@ -222,19 +222,21 @@ def _cut(
 
     ``low``, ``high`` (3,) are its ends along the axes, ``inside`` (3,) is a point in it.
     """
-    kept = np.concatenate((np.column_stack((np.eye(3), high)), np.column_stack((-np.eye(3), -low))))
-    corners = _corners(kept, inside)
+    bounds = np.concatenate(
+        (np.column_stack((np.eye(3), high)), np.column_stack((-np.eye(3), -low)))
+    )
+    corners = _corners(bounds, inside)
     while True:
         over = corners @ planes[:, :3].T - planes[:, 3]
         worst = int(over.max(axis=0).argmax())
         off = float(over.max())
         if off <= EXACT:
             return corners, off
-        tried = np.concatenate((kept, planes[worst : worst + 1]))
-        cut = _corners(tried, inside)
+        candidates = np.concatenate((bounds, planes[worst : worst + 1]))
+        cut = _corners(candidates, inside)
         if len(cut) > MAX_CORNERS:
             return corners, off
-        kept, corners = tried, cut
+        bounds, corners = candidates, cut
 
 
 def _grown(

@@ -36,7 +36,11 @@ def free_place(
     [m] it is near that point. If there is room nowhere, it is straight ahead. All places are clear
     of the arm in its ready posture, and of other objects. ``table``: its height [m].
     """
-    others = [each for each in objects if each.name != scene_object.name and not each.carried]
+    others = [
+        neighbour
+        for neighbour in objects
+        if neighbour.name != scene_object.name and not neighbour.carried
+    ]
     places = [
         (distance * math.cos(azimuth), distance * math.sin(azimuth))
         for distance in np.arange(MIN_DISTANCE, MAX_DISTANCE, 0.06).tolist()
@@ -52,7 +56,8 @@ def free_place(
         places = [*clear, *sorted(places, key=lambda place: math.dist(place, near))]
     for place in places:
         gaps = (
-            math.dist(each.T[:2, 3], place) - girth(each) - girth(scene_object) for each in others
+            math.dist(neighbour.T[:2, 3], place) - girth(neighbour) - girth(scene_object)
+            for neighbour in others
         )
         if all(gap >= OBJECT_GAP for gap in gaps):
             return se3.from_rotation_translation(np.eye(3), (*place, table))

@@ -23,8 +23,8 @@ def report_to(listener: Callable[[float], None]) -> None:
 
 def report(fraction: float) -> None:
     """Report that ``fraction`` (0 to 1) of the present work is done, to all listeners."""
-    for each in _listeners:
-        each(fraction)
+    for listener in _listeners:
+        listener(fraction)
 
 
 def progress(

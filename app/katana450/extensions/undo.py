@@ -82,14 +82,14 @@ class UndoHistory:
         self._count += 1
         if isinstance(command, cmd.ReplaceScene):
             self._changes = self._undone = ()
-        found = _inverse(state, command)
-        if found is None:
-            if any(each.traits.supersedes and not each.traits.protective for each in command.parts):
+        inverse = _inverse(state, command)
+        if inverse is None:
+            if any(part.traits.supersedes and not part.traits.protective for part in command.parts):
                 # Whatever came before this motion, its undoing would be another leap.
                 self._changes = self._undone = ()
             return
         self._undone = ()
-        change = Change(*found, actor, self._clock())
+        change = Change(*inverse, actor, self._clock())
         last = self._changes[-1] if self._changes else None
         one_gesture = command.traits.stream or command.traits.gesture
         # A state without the last command does not show what this one changes.
@@ -107,12 +107,12 @@ class UndoHistory:
 
     def changes(self, key: str, revocations: int, *, redo: bool = False) -> tuple[Change, ...]:
         """Return the changes that the participant of ``key`` can undo or redo, the newest first."""
-        found = []
+        changes = []
         for change in reversed(self._undone if redo else self._changes):
             if (change.actor.key, change.actor.seen) != (key, revocations):
                 break
-            found.append(change)
-        return tuple(found)
+            changes.append(change)
+        return tuple(changes)
 
     def inverse(
         self, key: str, revocations: int, state: State, *, redo: bool
@@ -133,7 +133,7 @@ class UndoHistory:
         now = None if name is None else named(state.objects, name)
         if now is not None and now.held:
             raise InputError(f"{now.name!r} is held: open the gripper first.")
-        holds = any(each.held for each in state.objects)
+        holds = any(scene_object.held for scene_object in state.objects)
         if isinstance(command, cmd.Gripper) and holds and state.moving:
             raise InputError("The hand holds an object and the arm moves: wait until it rests.")
         if isinstance(command, cmd.PlaceObject) and now is not None:
@@ -149,8 +149,8 @@ class UndoHistory:
 
         No later command continues it.
         """
-        found = _inverse(state, command)
-        return None if found is None else replace(change, inverse=found[1], at=-math.inf)
+        inverse = _inverse(state, command)
+        return None if inverse is None else replace(change, inverse=inverse[1], at=-math.inf)
 
     def move(
         self,
@@ -256,6 +256,9 @@ class UndoRequests(RequestHandler):
 
     def page_status(self, participant: Participant) -> dict[str, Any]:
         """Return the names of what ``participant`` can undo and redo, the newest first."""
-        of = participant.person.key, self.hub.gate.revocations
-        changes, undone = self.history.changes(*of), self.history.changes(*of, redo=True)
-        return {"undo": [each.name for each in changes], "redo": [each.name for each in undone]}
+        owner = participant.person.key, self.hub.gate.revocations
+        changes, undone = self.history.changes(*owner), self.history.changes(*owner, redo=True)
+        return {
+            "undo": [change.name for change in changes],
+            "redo": [change.name for change in undone],
+        }

@@ -1,0 +1,138 @@
+"""Variables and parameters are nouns that name their quantity."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import katana450
+
+PACKAGE = Path(katana450.__file__).parent
+
+AVOIDED = frozenset(
+    [
+        "ahead",
+        "asked",
+        "at",
+        "begun",
+        "beside",
+        "each",
+        "found",
+        "given",
+        "gone",
+        "here",
+        "kept",
+        "made",
+        "met",
+        "of",
+        "seen",
+        "taken",
+        "there",
+        "told",
+        "tried",
+    ]
+)
+"""Names that say nothing about the quantity: `candidate`, `posture` or `match` says what it is."""
+
+NOT_YET = (
+    "arm/control",
+    "arm/drivers",
+    "arm/robot",
+    "arm/runtime",
+    "assembly",
+    "cli",
+    "client",
+    "extensions/bodies",
+    "extensions/conduit",
+    "extensions/ellipsoid",
+    "extensions/event_log",
+    "extensions/experiments",
+    "extensions/export",
+    "extensions/gallery",
+    "extensions/general_arms",
+    "extensions/hands",
+    "extensions/importers",
+    "extensions/joint_view",
+    "extensions/kinematics",
+    "extensions/leader",
+    "extensions/loops",
+    "extensions/media",
+    "extensions/objects",
+    "extensions/phone",
+    "extensions/programs",
+    "extensions/reachability",
+    "extensions/real_arm",
+    "extensions/recording",
+    "extensions/rosbridge",
+    "extensions/scene",
+    "extensions/server_commands",
+    "extensions/touch",
+    "extensions/water",
+    "extensions/xacro",
+    "library",
+    "maths/collision",
+    "maths/geometry",
+    "maths/kinematics",
+    "maths/motion",
+    "maths/planning",
+    "maths/water",
+    "server/api",
+    "server/service",
+    "server/view",
+    "server/viser_bridge",
+    "server/web",
+)
+"""Folders below the package that still have such names."""
+
+
+def variables(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Yield the names that ``tree`` binds, with their lines, but no fields of classes.
+
+    A field keeps the word that files and the API have for it, such as the ``at`` of an event.
+    """
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id, node.lineno
+        elif isinstance(node, ast.arg):
+            yield node.arg, node.lineno
+        elif isinstance(node, ast.MatchAs | ast.MatchStar) and node.name:
+            yield node.name, node.lineno
+        if isinstance(tree, ast.ClassDef) and isinstance(node, ast.AnnAssign):
+            continue
+        yield from variables(node)
+
+
+def avoided_in(source: str) -> list[tuple[str, int]]:
+    return [(name, line) for name, line in variables(ast.parse(source)) if name in AVOIDED]
+
+
+def test_variables_are_nouns() -> None:
+    wrong = [
+        f"{path.relative_to(PACKAGE)}:{line}: {name}"
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if not any(path.is_relative_to(PACKAGE / folder) for folder in NOT_YET)
+        for name, line in avoided_in(path.read_text("utf-8"))
+    ]
+    assert not wrong, "Name the quantity instead:\n" + "\n".join(wrong)
+
+
+def test_every_kind_of_variable_is_read() -> None:
+    source = """
+class Event:
+    at: float
+    def judge(self, found):
+        for each in found:
+            here = [at for at in each]
+        match here:
+            case [kept, *met]:
+                pass
+"""
+    assert sorted(avoided_in(source)) == [
+        ("at", 6),
+        ("each", 5),
+        ("found", 4),
+        ("here", 6),
+        ("kept", 8),
+        ("met", 8),
+    ]
