@@ -10,8 +10,8 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.teach import taught
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.teach import taught
 from tests.browser.page import ViserPage
 from tests.browser.session import Truth, clear_stop, go_home
 from tests.browser.teach_sheet import (

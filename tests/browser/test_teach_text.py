@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.teach import taught
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.teach import taught
 from tests.browser.page import ViserPage
 from tests.browser.session import Truth, bar, clear_stop, mood, prepare
 from tests.browser.teach_sheet import PLAYED, open_sheet, press, reload, says, teach, turns

@@ -14,8 +14,8 @@ import pytest
 from PIL import Image
 
 from katana450.cli.main import main
-from katana450.extensions.programs.circle import CircleDemo
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.script import parse
 
 ROOT = Path(__file__).resolve().parents[2]
 

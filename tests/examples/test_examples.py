@@ -14,10 +14,10 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import Script, parse
-from katana450.extensions.programs.script_files import script_text
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.script import Script, parse
+from katana450.extensions.programs.script.script_files import script_text
 from tests.browser.server import ROOT, AppServer
 from tests.programs.conftest import Stage
 

@@ -27,7 +27,7 @@ from katana450.extensions.importers.scene_file import (
     scene_zip,
 )
 from katana450.extensions.importers.shape_file import Up
-from katana450.extensions.programs.scene_draft import MeshFile, Scene, parsed
+from katana450.extensions.programs.script.scene_draft import MeshFile, Scene, parsed
 from katana450.extensions.scene.text import written
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -21,11 +21,11 @@ from katana450.arm.robot.weight import loads_of
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

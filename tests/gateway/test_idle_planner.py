@@ -10,7 +10,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
-from katana450.extensions.programs.script_files import LIBRARY, script_text
+from katana450.extensions.programs.script.script_files import LIBRARY, script_text
 from katana450.extensions.programs.server import idle_planner, program_planner
 from katana450.extensions.programs.server.idle_planner import IdlePlanner
 from katana450.server.api.program_requests import ProgramOrder

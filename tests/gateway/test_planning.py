@@ -16,8 +16,8 @@ from katana450.arm.control.lease import Role
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.extensions.programs.compiler import TIMING, PlanningStage
-from katana450.extensions.programs.program import compiled
+from katana450.extensions.programs.run.compiler import TIMING, PlanningStage
+from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.server import program_planner
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint

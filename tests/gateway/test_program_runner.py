@@ -16,7 +16,7 @@ from katana450.arm.control.actor import CommandChannel, Grounds
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.errors import LeaseError
-from katana450.extensions.programs.actions import ACTION_TIMEOUT
+from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.extensions.programs.server.panel import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import State
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext
-from katana450.extensions.programs.pose_path import PosePath
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run, step
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run, step
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.approach import Approach
-from katana450.extensions.programs.hand_planning import hand_of
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.planning.approach import Approach
+from katana450.extensions.programs.planning.hand_planning import hand_of
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.general_arms.chain_urdf import chain_urdf

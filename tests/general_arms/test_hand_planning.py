@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.arm_plane import ArmPlane
-from katana450.extensions.programs.hand_planning import HandPlanning
-from katana450.extensions.programs.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.planning.arm_plane import ArmPlane
+from katana450.extensions.programs.planning.hand_planning import HandPlanning
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward

@@ -17,16 +17,16 @@ from katana450.assembly.robot_session import describe_robot, find_arm
 from katana450.errors import InputError
 from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.media.measures import measurements
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.clocked_run import Planned, run_by_clock
-from katana450.extensions.programs.curves import PoseTurn
-from katana450.extensions.programs.plan_builder import TICK, PlanContext
-from katana450.extensions.programs.pouring import POURING
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.simulation import Simulation
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.vessel_turn import UNDERSIDES
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import TICK, PlanContext
+from katana450.extensions.programs.building.vessel_turn import UNDERSIDES
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.planning.curves import PoseTurn
+from katana450.extensions.programs.run.clocked_run import Planned, run_by_clock
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.pouring import POURING
 from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3

@@ -10,11 +10,11 @@ import pytest
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run, step
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run, step
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch

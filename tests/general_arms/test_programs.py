@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.extensions.programs.moves import Home, Joints, Move, Nudge, Via
-from katana450.extensions.programs.plan_builder import UntimedPath
-from katana450.extensions.programs.pose_path import PosePath
-from katana450.extensions.programs.step_target import StepTarget
+from katana450.extensions.programs.building.plan_builder import UntimedPath
+from katana450.extensions.programs.language.step_target import StepTarget
+from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.steps.moves import Home, Joints, Move, Nudge, Via
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain

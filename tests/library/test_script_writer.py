@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.extensions.programs.located_step import count
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import script_text
-from katana450.extensions.programs.steps import STEPS
+from katana450.extensions.programs.building.located_step import count
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import script_text
+from katana450.extensions.programs.steps.steps import STEPS
 from tests.programs.yaml_core import loaded
 
 ALL = """\

@@ -11,10 +11,10 @@ import pytest
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from katana450.extensions.programs.blocks import MAX_STEPS
-from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.place import Pick
-from katana450.extensions.programs.script import Script, parse
-from katana450.extensions.programs.settings_steps import TimedPause
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.step_target import StepTarget
-from katana450.extensions.programs.tool_moves import Line
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.language.step_target import StepTarget
+from katana450.extensions.programs.script.blocks import MAX_STEPS
+from katana450.extensions.programs.script.script import Script, parse
+from katana450.extensions.programs.steps.moves import Move
+from katana450.extensions.programs.steps.place import Pick
+from katana450.extensions.programs.steps.settings_steps import TimedPause
+from katana450.extensions.programs.steps.tool_moves import Line
 
 HEAD = """\
 let:

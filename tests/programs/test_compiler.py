@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from katana450.errors import CancelledError, InputError
-from katana450.extensions.programs.actions import PutObject
-from katana450.extensions.programs.compiler import FINDING, TIMING, Compiler, PlanningStage
-from katana450.extensions.programs.plan_builder import PlanBuilder, UntimedPath
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.actions import PutObject
+from katana450.extensions.programs.building.plan_builder import PlanBuilder, UntimedPath
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.compiler import FINDING, TIMING, Compiler, PlanningStage
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage
 

@@ -15,13 +15,13 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.arm.control.stopping import HOLD_OFF
 from katana450.errors import BlockedError, InputError
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.continuation import RETURN, Interruption, continued
-from katana450.extensions.programs.pouring import POURING
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.run.continuation import RETURN, Interruption, continued
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import steps_of
+from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import TICK, Stage

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.extensions.programs.expression import (
+from katana450.extensions.programs.language.expression import (
     ANGLE,
     LENGTH,
     MAX_LENGTH,

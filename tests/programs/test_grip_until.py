@@ -9,11 +9,11 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.grip_until import CloseUntil
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.grip_until import CloseUntil
 from katana450.extensions.touch.held_load import DENSITY, FRICTION
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.water.units import GRAVITY

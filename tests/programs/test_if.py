@@ -7,16 +7,16 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.compiler import MAX_COPIES, Compiler
-from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.run.timeline import Timeline, moments
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import current_step, page, steps_of
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.timeline import Timeline, moments
 from tests.programs.conftest import TICK, Stage
 
 HEAD = "frame: base\nsteps:\n"

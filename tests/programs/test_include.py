@@ -10,19 +10,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.programs.attached_files import (
+from katana450.extensions.programs.language.attached_files import (
     MAX_FILES,
     attached,
     attached_file,
     without_scene,
 )
-from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import Scripts, files_in, script_text
-from katana450.extensions.programs.settings_steps import TimedPause
-from katana450.extensions.programs.source import Problem, ScriptError, read
-from katana450.extensions.programs.step_target import StepTarget
+from katana450.extensions.programs.language.source import Problem, ScriptError, read
+from katana450.extensions.programs.language.step_target import StepTarget
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import Scripts, files_in, script_text
+from katana450.extensions.programs.steps.moves import Move
+from katana450.extensions.programs.steps.settings_steps import TimedPause
 from tests.programs.conftest import Stage
 
 PARTS = """\

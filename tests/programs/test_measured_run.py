@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.clocked_run import Planned, plan_script, run_by_clock
-from katana450.extensions.programs.measured_run import MeasuredRun, nearest_points, path_of
-from katana450.extensions.programs.measures import MEASURES, OF_A_MEASURED_ARM
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.simulation import Simulation
+from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
+from katana450.extensions.programs.run.measured_run import MeasuredRun, nearest_points, path_of
+from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.script.measures import MEASURES, OF_A_MEASURED_ARM
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.profile import KATANA450
 from katana450.maths.geometry.arrays import FloatArray

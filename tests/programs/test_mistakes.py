@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 import yaml
 
-from katana450.extensions.programs.circle import CircleDemo
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import script_text
-from katana450.extensions.programs.source import Problem, ScriptError
+from katana450.extensions.programs.language.source import Problem, ScriptError
+from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import script_text
 from tests.conftest import LONG
 from tests.programs.yaml_core import loaded
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.messages import AXIS_NAMES
-from katana450.extensions.programs.out_of_reach import unreached
-from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.step_target import ScriptFrame
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.language.step_target import ScriptFrame
+from katana450.extensions.programs.planning.out_of_reach import unreached
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain

@@ -11,12 +11,12 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.actions import FollowPlan, Task
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import se3, so3
 from katana450.maths.planning.plan import MARGIN
 from tests.programs.conftest import TICK, Stage

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import State
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.programs.conftest import Stage

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.measures import score
-from katana450.extensions.programs.pour import PourDemo, Spot
-from katana450.extensions.programs.pouring import POURING
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.measures import score
+from katana450.extensions.programs.script.pour import PourDemo, Spot
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import MILLILITRE, ML, counted
 from tests.programs.conftest import TICK, Stage

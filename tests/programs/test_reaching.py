@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.programs.plan_builder import PlanBuilder
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.step_target import ScriptFrame
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.language.step_target import ScriptFrame
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.script import parse
 from tests.programs.conftest import Stage
 
 PLACE = "frame: {frame}\nsteps:\n  - move: {{x: {x}, y: {y}, z: {z}, pitch: {pitch}, roll: 0}}\n"

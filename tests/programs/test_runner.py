@@ -13,14 +13,14 @@ import katana450.extensions.programs
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.actions import ACTION_TIMEOUT, FollowPlan
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.actions import ACTION_TIMEOUT, FollowPlan
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.run.timeline import Timeline
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import steps_of
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.timeline import Timeline
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.programs.conftest import Stage

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from katana450.extensions.programs.blocks import MAX_STEPS
-from katana450.extensions.programs.moves import Move
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
-from katana450.extensions.programs.step_target import StepTarget
-from katana450.extensions.programs.tool_moves import Circle, Line
+from katana450.extensions.programs.language.source import MAX_BYTES, MAX_DEPTH, Problem, ScriptError
+from katana450.extensions.programs.language.step_target import StepTarget
+from katana450.extensions.programs.script.blocks import MAX_STEPS
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.steps.moves import Move
+from katana450.extensions.programs.steps.tool_moves import Circle, Line
 
 GOOD = """\
 name: Try

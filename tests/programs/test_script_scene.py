@@ -10,11 +10,11 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.attached_files import attached
-from katana450.extensions.programs.clocked_run import plan_script
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_scene import ScriptScene
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.language.attached_files import attached
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.clocked_run import plan_script
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_scene import ScriptScene
 from katana450.maths.water.units import MILLILITRE
 from katana450.resources import URDF_PATH
 from tests.programs.conftest import TICK, Stage

@@ -11,19 +11,19 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from docs.script_schema import FILE, content
-from katana450.extensions.programs.blocks import BLOCKS
-from katana450.extensions.programs.circle import CircleDemo
-from katana450.extensions.programs.declaration import Schema
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import script_text
-from katana450.extensions.programs.script_schema import (
+from katana450.extensions.programs.language.declaration import Schema
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.script.blocks import BLOCKS
+from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import script_text
+from katana450.extensions.programs.script.script_schema import (
     STEP_VALUES,
     WITHOUT_VALUE,
     script_schema,
 )
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.steps import STEPS
+from katana450.extensions.programs.steps.steps import STEPS
 from tests.programs.yaml_core import loaded
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from katana450.errors import ConfigurationError, InputError
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import LIBRARY, Scripts
-from katana450.extensions.programs.teach import TaughtPose, taught
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
+from katana450.extensions.programs.script.teach import TaughtPose, taught
 from tests.programs.conftest import Stage
 
 TAUGHT = """\

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import ActiveStop
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.timeline import Moment, Timeline, moments
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.timeline import Moment, Timeline, moments
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.water.units import MILLILITRE
 from tests.programs.conftest import Stage
 

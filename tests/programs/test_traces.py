@@ -13,7 +13,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_along
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.extensions.programs.curves import Linear, ToolArc
+from katana450.extensions.programs.planning.curves import Linear, ToolArc
+from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.programs.server.traces import (
     BAD_COLOUR,
     GOOD_COLOUR,
@@ -21,7 +22,6 @@ from katana450.extensions.programs.server.traces import (
     Traces,
     coloured,
 )
-from katana450.extensions.programs.tool_path import ToolPath
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.settings import Settings

@@ -14,15 +14,15 @@ from katana450.arm.control.commands import PlaceObject
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.attached_files import attached
-from katana450.extensions.programs.continuation import continued
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.trajectory_path import CubicSpline, TrajectoryPath
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.language.attached_files import attached
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.planning.trajectory_path import CubicSpline, TrajectoryPath
+from katana450.extensions.programs.run.continuation import continued
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.forward import forward

@@ -12,10 +12,10 @@ from katana450.arm.control.pouring import MAX_VESSELS, is_vessel
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import MILLILITRE, ML, counted
 from tests.programs.conftest import Stage

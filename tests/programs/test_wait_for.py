@@ -10,12 +10,12 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.source import ScriptError
-from katana450.extensions.programs.timeline import Timeline, moments
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.run.timeline import Timeline, moments
+from katana450.extensions.programs.script.script import parse
 from tests.programs.conftest import TICK, Stage
 
 HEAD = "frame: base\nsteps:\n"

@@ -10,11 +10,11 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from tests.recording.recorded import PERIOD, described, header, run
 

@@ -22,7 +22,7 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
-from katana450.extensions.programs.script_files import script_text
+from katana450.extensions.programs.script.script_files import script_text
 from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile

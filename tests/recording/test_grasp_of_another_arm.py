@@ -13,11 +13,11 @@ from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import compiled
-from katana450.extensions.programs.runner import Phase, Run
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.program import compiled
+from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.header import header_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.settings import Settings

@@ -21,7 +21,7 @@ from katana450.arm.control.lease import Role
 from katana450.arm.control.scene_objects import Shape
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.resources import URDF_PATH

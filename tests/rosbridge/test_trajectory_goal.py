@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.rosbridge.messages import FollowJointTrajectory
 from katana450.extensions.rosbridge.trajectory import (
     MAX_POINTS,

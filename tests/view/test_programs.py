@@ -18,16 +18,16 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.timeline import Timeline
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.server.panel import PanelAccess, ProgramsPanel, _page
 from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.server.step_list import ListedStep, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
-from katana450.extensions.programs.timeline import Timeline
 from katana450.extensions.water.nodes import WORTH_SHOWING
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH

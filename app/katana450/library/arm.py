@@ -18,7 +18,7 @@ from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
-from katana450.extensions.programs.places import ROOMIEST
+from katana450.extensions.programs.language.places import ROOMIEST
 from katana450.extensions.reachability.map import MapOptions, ReachabilityMap, survey_of
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.planner import Planner

@@ -12,10 +12,14 @@ import numpy.typing as npt
 
 from katana450.arm.control.session import Session
 from katana450.errors import InputError
-from katana450.extensions.programs.places import ROOMIEST
-from katana450.extensions.programs.plan_builder import PlanBuilder, PlanContext, UntimedPath
-from katana450.extensions.programs.step_target import Angles, StepTarget
-from katana450.extensions.programs.tool_moves import Circle, Line
+from katana450.extensions.programs.building.plan_builder import (
+    PlanBuilder,
+    PlanContext,
+    UntimedPath,
+)
+from katana450.extensions.programs.language.places import ROOMIEST
+from katana450.extensions.programs.language.step_target import Angles, StepTarget
+from katana450.extensions.programs.steps.tool_moves import Circle, Line
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
 from katana450.maths.kinematics.branch import AnyBranch

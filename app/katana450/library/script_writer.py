@@ -12,9 +12,9 @@ import numpy as np
 import yaml
 
 from katana450.errors import InputError
-from katana450.extensions.programs.attached_files import attached
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import files_in
+from katana450.extensions.programs.language.attached_files import attached
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import files_in
 from katana450.maths.geometry.arrays import FloatArray
 
 Number = float | str

@@ -15,8 +15,8 @@ from katana450.client.asynchronous import PROGRESS_RATE, UNPLANNED_STATUSES, is_
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
 from katana450.extensions.experiments.keyboard import Keyboard
-from katana450.extensions.programs.attached_files import without_scene
-from katana450.extensions.programs.script import Script
+from katana450.extensions.programs.language.attached_files import without_scene
+from katana450.extensions.programs.script.script import Script
 from katana450.platform_support import without_interrupts
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Breakpoints, ProgramOrder, Steer

@@ -10,7 +10,7 @@ from pathlib import Path
 from katana450.client import Client, RefusedError
 from katana450.client.files import LostError
 from katana450.extensions.experiments.simulate import Simulated, exit_status
-from katana450.extensions.programs.measured_run import MeasuredRun
+from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.language.source import ScriptError
 
 
 def print_problems(error: ScriptError, source: str) -> None:

@@ -7,11 +7,11 @@ from functools import partial
 
 from katana450.errors import InputError
 from katana450.extensions.experiments.problems import print_problems
-from katana450.extensions.programs.circle import CircleDemo
-from katana450.extensions.programs.pour import PourDemo
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import script_text
-from katana450.extensions.programs.source import ScriptError
+from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import script_text
 
 
 def run(options: Namespace) -> int:

@@ -18,15 +18,15 @@ from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
 from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
-from katana450.extensions.programs.actions import FollowPlan, Task
-from katana450.extensions.programs.clocked_run import plan_script, ready, run_by_clock
-from katana450.extensions.programs.measured_run import MeasuredRun
-from katana450.extensions.programs.measures import OF_A_MEASURED_ARM
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.script_scene import begun
-from katana450.extensions.programs.simulation import Simulation
-from katana450.extensions.programs.task_list import ConditionalJump
+from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.run.clocked_run import plan_script, ready, run_by_clock
+from katana450.extensions.programs.run.measured_run import MeasuredRun
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.run.task_list import ConditionalJump
+from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
+from katana450.extensions.programs.script.script import Script
+from katana450.extensions.programs.script.script_scene import begun
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.profile import profile_named
 from katana450.extras import MissingExtraError

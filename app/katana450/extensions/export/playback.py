@@ -61,12 +61,12 @@ def of_script(name: str, urdf: Path) -> Playback:
     Raises InputError with the line of an error in the script.
     """
     # Imported here, because poses and tables do not need the extension ``programs``.
-    from katana450.extensions.programs.circle import CircleDemo
-    from katana450.extensions.programs.clocked_run import plan_script, run_by_clock
-    from katana450.extensions.programs.pour import PourDemo
-    from katana450.extensions.programs.script import parse
-    from katana450.extensions.programs.script_files import script_text
-    from katana450.extensions.programs.source import ScriptError
+    from katana450.extensions.programs.language.source import ScriptError
+    from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
+    from katana450.extensions.programs.script.circle import CircleDemo
+    from katana450.extensions.programs.script.pour import PourDemo
+    from katana450.extensions.programs.script.script import parse
+    from katana450.extensions.programs.script.script_files import script_text
 
     demos = {"circle": CircleDemo, "pour": PourDemo}
     try:

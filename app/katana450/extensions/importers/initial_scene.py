@@ -19,8 +19,8 @@ from katana450.extensions.free_place import free_place
 from katana450.extensions.importers.mesh_file import read_mesh_file
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_folder
 from katana450.extensions.objects.scenes import free_name
-from katana450.extensions.programs.scene_draft import Scene
-from katana450.extensions.programs.script_scene import check_scene
+from katana450.extensions.programs.script.scene_draft import Scene
+from katana450.extensions.programs.script.script_scene import check_scene
 from katana450.maths.geometry import se3
 
 PLACED = re.compile(

@@ -21,11 +21,11 @@ from katana450.extensions.importers.archive import (
 )
 from katana450.extensions.importers.mesh_file import content_of, read_mesh
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
-from katana450.extensions.programs.attached_files import attached
-from katana450.extensions.programs.scene_draft import MeshFile, Scene, SceneDraft, parsed
-from katana450.extensions.programs.script import is_script, parse
-from katana450.extensions.programs.script_files import files_in
-from katana450.extensions.programs.source import MAX_BYTES, Problem, ScriptError
+from katana450.extensions.programs.language.attached_files import attached
+from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
+from katana450.extensions.programs.script.scene_draft import MeshFile, Scene, SceneDraft, parsed
+from katana450.extensions.programs.script.script import is_script, parse
+from katana450.extensions.programs.script.script_files import files_in
 from katana450.extensions.scene.text import written
 from katana450.maths.geometry.arrays import FloatArray
 

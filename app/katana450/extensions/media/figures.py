@@ -14,8 +14,8 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.media.measures import PathTrace
 from katana450.extensions.media.pour_record import PourRecord
-from katana450.extensions.programs.measured_run import Deviation, MeasuredRun
-from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRun
+from katana450.extensions.programs.run.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.path import point_derivatives
 

@@ -14,15 +14,15 @@ from itertools import pairwise
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.extensions.programs.actions import FollowPlan, Task
-from katana450.extensions.programs.curves import ToolCoordinates
-from katana450.extensions.programs.measures import motion_measures, water_measures
-from katana450.extensions.programs.pose_path import PosePath
-from katana450.extensions.programs.pouring import POURING
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.simulation import Trace
-from katana450.extensions.programs.tool_path import ToolPath
+from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.planning.curves import ToolCoordinates
+from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.planning.tool_path import ToolPath
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.script.measures import motion_measures, water_measures
+from katana450.extensions.programs.script.script import Script
+from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

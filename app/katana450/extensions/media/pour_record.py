@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.pouring import MotionWithWater
-from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.run.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE
 

@@ -23,11 +23,11 @@ from katana450.extensions.media import figures
 from katana450.extensions.media.figures import measured_figure
 from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
 from katana450.extensions.media.pour_record import COLUMNS, PourRecord
-from katana450.extensions.programs.measured_run import MeasuredRun
-from katana450.extensions.programs.measures import MEASURES, title_of, unit_of
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.script import Script
-from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.run.measured_run import MeasuredRun
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.simulation import Trace
+from katana450.extensions.programs.script.measures import MEASURES, title_of, unit_of
+from katana450.extensions.programs.script.script import Script
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward

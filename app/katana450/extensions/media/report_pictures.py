@@ -21,11 +21,11 @@ from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.picture import picture
 from katana450.extensions.media.scene import Item, unit
 from katana450.extensions.media.stage import RenderStage
-from katana450.extensions.programs.actions import FollowPlan
-from katana450.extensions.programs.pouring import POURING
-from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
-from katana450.extensions.programs.simulation import Trace
+from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import CurvePath, point_derivatives

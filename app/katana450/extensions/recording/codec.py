@@ -28,7 +28,7 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.tool_pose import ToolPose
-from katana450.extensions.programs.curves import (
+from katana450.extensions.programs.planning.curves import (
     Curve,
     Linear,
     PoseCurve,
@@ -42,9 +42,9 @@ from katana450.extensions.programs.curves import (
     ToolTurn,
     TurnedCurve,
 )
-from katana450.extensions.programs.pose_path import PosePath
-from katana450.extensions.programs.tool_path import ToolPath
-from katana450.extensions.programs.trajectory_path import TrajectoryPath
+from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.planning.tool_path import ToolPath
+from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath
 from katana450.extensions.recording.former_forms import FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (
     MAX_INT,

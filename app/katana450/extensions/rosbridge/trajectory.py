@@ -15,7 +15,7 @@ from enum import IntEnum
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.programs.trajectory_path import MIN_INTERVAL
+from katana450.extensions.programs.planning.trajectory_path import MIN_INTERVAL
 from katana450.extensions.rosbridge.messages import (
     FollowJointTrajectory,
     JointTolerance,

@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 from katana450.arm.control.scene_objects import SceneObject
-from katana450.extensions.programs.scene_draft import VERSION, MeshFile, Scene
+from katana450.extensions.programs.script.scene_draft import VERSION, MeshFile, Scene
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import ML

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 from katana450.arm.control.state import State
 from katana450.errors import KatanaError
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import LIBRARY, script_text
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import LIBRARY, script_text
 from katana450.extensions.programs.server.program_planning import Planning
 
 DELAY = 10.0

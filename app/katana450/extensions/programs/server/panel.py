@@ -16,10 +16,10 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError, LeaseError
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.runner import Phase
-from katana450.extensions.programs.script import parse
-from katana450.extensions.programs.script_files import Scripts
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.server import step_list
 from katana450.extensions.programs.server.preview import TIME_STEP, Preview
 from katana450.extensions.programs.server.program_runner import ProgramRunner

@@ -17,10 +17,10 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError
-from katana450.extensions.programs.actions import FollowPlan, UseTool
-from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.building.actions import FollowPlan, UseTool
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.timeline import Moment, Timeline, moments
 from katana450.extensions.programs.server.ghost_scene import GhostScene
-from katana450.extensions.programs.timeline import Moment, Timeline, moments
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

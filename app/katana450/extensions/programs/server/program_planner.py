@@ -6,14 +6,14 @@ from collections.abc import Iterable
 
 from katana450.arm.control import commands as cmd
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.programs.continuation import Interruption, continued
-from katana450.extensions.programs.plan_builder import PlanContext
-from katana450.extensions.programs.program import Program, compiled
-from katana450.extensions.programs.script import parse
+from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.language.source import MAX_BYTES
+from katana450.extensions.programs.run.continuation import Interruption, continued
+from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.idle_planner import IdlePlanner
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_planning import Planning
-from katana450.extensions.programs.source import MAX_BYTES
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant

@@ -9,10 +9,10 @@ from enum import Enum
 
 from katana450.arm.control.state import State
 from katana450.errors import CancelledError, KatanaError
-from katana450.extensions.programs.compiler import PlanningStage
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.runner import Run
-from katana450.extensions.programs.situation import Situation
+from katana450.extensions.programs.run.compiler import PlanningStage
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.runner import Run
+from katana450.extensions.programs.run.situation import Situation
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.server.api import answers
 

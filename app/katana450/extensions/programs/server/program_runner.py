@@ -20,10 +20,10 @@ from katana450.arm.control.actor import Actor
 from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.programs import runner
-from katana450.extensions.programs.continuation import Interruption
-from katana450.extensions.programs.program import Program
-from katana450.extensions.programs.runner import Phase, Run
+from katana450.extensions.programs.run import runner
+from katana450.extensions.programs.run.continuation import Interruption
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
 from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_participant import (

@@ -8,8 +8,8 @@ from html import escape
 from itertools import accumulate
 from typing import NamedTuple
 
-from katana450.extensions.programs.actions import expected_time
-from katana450.extensions.programs.program import Program
+from katana450.extensions.programs.building.actions import expected_time
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.server.state_line import RUNS
 from katana450.server.api.answers import Progress
 

@@ -13,11 +13,11 @@ import yaml
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
-from katana450.extensions.programs.blocks import MAX_STEPS
-from katana450.extensions.programs.script import MAX_NAME_LENGTH
-from katana450.extensions.programs.source import MAX_BYTES, MAX_VALUES
-from katana450.extensions.programs.trajectory import MAX_POSTURES, TRAJECTORY
-from katana450.extensions.programs.trajectory_path import CubicSpline
+from katana450.extensions.programs.language.source import MAX_BYTES, MAX_VALUES
+from katana450.extensions.programs.planning.trajectory_path import CubicSpline
+from katana450.extensions.programs.script.blocks import MAX_STEPS
+from katana450.extensions.programs.script.script import MAX_NAME_LENGTH
+from katana450.extensions.programs.steps.trajectory import MAX_POSTURES, TRAJECTORY
 from katana450.extensions.recording.run_again.recorded_part import RecordedPart
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.planning.joint_path import JointPath

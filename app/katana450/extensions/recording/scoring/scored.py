@@ -13,18 +13,18 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.programs.measured_run import (
+from katana450.extensions.programs.planning.trajectory_path import CubicSpline
+from katana450.extensions.programs.run.measured_run import (
     MeasuredRun,
     commanded_errors,
     path_of,
 )
-from katana450.extensions.programs.measures import MEASURES as REPORTED
-from katana450.extensions.programs.measures import (
+from katana450.extensions.programs.script.measures import MEASURES as REPORTED
+from katana450.extensions.programs.script.measures import (
     OF_A_MEASURED_ARM,
     motion_measures,
     water_measures,
 )
-from katana450.extensions.programs.trajectory_path import CubicSpline
 from katana450.extensions.recording.files.checking import check_whole
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile

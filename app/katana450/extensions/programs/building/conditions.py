@@ -1,0 +1,337 @@
+"""Conditions on the arm, the objects and the water, as a script waits for them."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Self
+
+import numpy as np
+
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.pouring import BASIN, CUP, is_vessel
+from katana450.arm.control.scene_objects import named
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.language.declaration import Declared, Group, Kind, record
+from katana450.extensions.programs.language.kinds import (
+    FINGER_PLACE,
+    XYZ,
+    Axis,
+    Length,
+    Object,
+    ObjectName,
+    angle,
+    bound,
+    millimetres,
+    number,
+    one_of,
+)
+from katana450.extensions.programs.language.places import Point
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.water.units import MILLILITRE
+
+MAX_TIME = 86_400.0
+"""[s] Maximum time of a condition."""
+
+Millilitres = Annotated[float, number(0.0, 10_000.0, "ml")]
+JointBound = Annotated[float, angle(-720.0, 720.0)]
+FingerBound = Annotated[float, FINGER_PLACE]
+Seconds = Annotated[float, number(0.0, MAX_TIME, "s")]
+
+
+class Bounded(Declared):
+    """A condition on a value, which is within bounds, both included."""
+
+    needs = ("at_least", "at_most")
+
+    at_least: float
+    at_most: float
+
+    def has(self, value: float) -> bool:
+        """Return whether ``value`` is within the bounds."""
+        return self.at_least <= value <= self.at_most
+
+
+class Condition(Declared):
+    """A condition on the measured state of an arm and its surroundings."""
+
+    @property
+    @abstractmethod
+    def awaited(self) -> str:
+        """Words for what is awaited, as in "wait for cup in the hand"."""
+
+    @abstractmethod
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition for the arm of ``builder``.
+
+        Raises InputError if it can never hold for that arm.
+        """
+
+    @abstractmethod
+    def holds(self, state: State) -> bool:
+        """Return whether it holds in ``state``."""
+
+
+@dataclass(frozen=True)
+class Held(Condition):
+    """The fingers hold this object."""
+
+    short = "name"
+
+    name: ObjectName
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"{self.name} in the hand"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError without such an object."""
+        builder.scene_object(self.name)
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the fingers hold the object."""
+        found = named(state.objects, self.name)
+        return found is not None and found.held
+
+
+@dataclass(frozen=True, eq=False)
+class Placed(Condition):
+    """An object stands at a point.
+
+    Attributes:
+        name: name of the object.
+        at: (3,) the point [m].
+        within: maximum distance from it [m].
+        in_base: whether it is in the base frame, not in {S}.
+    """
+
+    noun = "placed"
+
+    name: Object
+    at: Point
+    within: Annotated[float, millimetres(0.1, 1000.0, "Distance, mm; 10 unless given")] = 0.01
+    in_base: bool = False
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"{self.name} at its place"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition in the base frame. Raises InputError without such an object."""
+        builder.scene_object(self.name)
+        if self.in_base:
+            return self
+        T = builder.plan_context.T_base_shoulder
+        return replace(self, at=frozen(T[:3, :3] @ self.at + T[:3, 3]), in_base=True)
+
+    def holds(self, state: State) -> bool:
+        """Return whether the object stands there; an object in the hand stands nowhere."""
+        found = named(state.objects, self.name)
+        if found is None or found.carried:
+            return False
+        return bool(np.linalg.norm(found.T[:3, 3] - self.at) <= self.within)
+
+
+@dataclass(frozen=True)
+class Volume(Bounded, Condition):
+    """Water in the cup, the basin or another vessel, ml."""
+
+    noun = "a volume"
+
+    of: ObjectName
+    at_least: Millilitres = -math.inf
+    at_most: Millilitres = math.inf
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"the water in the {self.of}"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError without water, and for another object."""
+        if self.of not in (CUP, BASIN) and not is_vessel(builder.scene_object(self.of)):
+            raise InputError(f"{self.of} holds no water: only cup, basin and vessels do.")
+        if builder.state.poured is None:
+            raise InputError(
+                "There is no water: there is no cup in the scene, or nothing is filled."
+            )
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the volume is within the bounds."""
+        if state.poured is None:
+            return False
+        water, vessel = state.poured.water, state.poured.water.vessel(self.of)
+        if vessel is None and self.of != BASIN:
+            return False
+        return self.has((water.basin if vessel is None else vessel.volume) / MILLILITRE)
+
+
+@dataclass(frozen=True)
+class JointAngle(Bounded, Condition):
+    """Angle of a joint, deg.
+
+    Attributes:
+        axis: index of the joint, from 0.
+        at_least, at_most: bounds [rad].
+    """
+
+    noun = "a joint"
+
+    axis: Axis
+    at_least: JointBound = -math.inf
+    at_most: JointBound = math.inf
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"axis {self.axis + 1}"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return itself. Raises InputError if the arm or the limits of the joint exclude it."""
+        chain = builder.plan_context.arm.chain
+        if self.axis >= chain.n:
+            raise InputError(f"There is no axis {self.axis + 1}: the robot has {chain.n} axes.")
+        lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
+        if self.at_least > upper or self.at_most < lower:
+            raise InputError(
+                f"Axis {self.axis + 1} never gets there: its range is {math.degrees(lower):.1f} to "
+                f"{math.degrees(upper):.1f} deg."
+            )
+        return self
+
+    def holds(self, state: State) -> bool:
+        """Return whether the angle is within the bounds."""
+        return self.has(float(state.q[self.axis]))
+
+
+@dataclass(frozen=True)
+class FingerPlace(Bounded, Condition):
+    """Angle of the fingers, deg, or their place, mm, if they slide.
+
+    Attributes:
+        at_least, at_most: bounds [deg or mm]; of a condition that is checked [rad or m].
+    """
+
+    noun = "a gripper"
+
+    at_least: FingerBound = -math.inf
+    at_most: FingerBound = math.inf
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return "the gripper"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition in rad or m. Raises InputError for an arm without fingers."""
+        fingers = builder.plan_context.arm.gripper
+        if not fingers.moves:
+            raise InputError("This arm has no fingers.")
+        scale = 1e-3 if fingers.slides else math.radians(1.0)
+        return replace(self, at_least=scale * self.at_least, at_most=scale * self.at_most)
+
+    def holds(self, state: State) -> bool:
+        """Return whether the fingers are within the bounds."""
+        return self.has(state.gripper)
+
+
+@dataclass(frozen=True)
+class CoordinateBounds(Bounded):
+    """Bounds of a coordinate [m]."""
+
+    noun = "a coordinate"
+
+    at_least: Length = -math.inf
+    at_most: Length = math.inf
+
+
+Coordinate = Annotated[CoordinateBounds | None, record(CoordinateBounds)]
+
+
+@dataclass(frozen=True, eq=False)
+class ToolPlace(Condition):
+    """Coordinates of the tool point, mm.
+
+    Attributes:
+        x, y, z: bounds of each, in the frame of the script; None for any.
+        in_base: whether they are in the base frame, not in {S}.
+        arm: the arm model, once it is known.
+        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
+    """
+
+    noun = "a tool"
+    needs = XYZ
+
+    x: Coordinate = None
+    y: Coordinate = None
+    z: Coordinate = None
+    in_base: bool = False
+    arm: ArmModel | None = None
+    T_base_shoulder: FloatArray = field(default_factory=lambda: np.eye(4))
+
+    @property
+    def bounds(self) -> dict[str, CoordinateBounds]:
+        """The bounds by the names of their coordinates."""
+        bounds = {"x": self.x, "y": self.y, "z": self.z}
+        return {name: bound for name, bound in bounds.items() if bound is not None}
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return f"{' and '.join(self.bounds)} of the tool"
+
+    def checked(self, builder: PlanBuilder) -> Self:
+        """Return the condition for the arm of ``builder``."""
+        context = builder.plan_context
+        return replace(self, arm=context.arm, T_base_shoulder=context.T_base_shoulder)
+
+    def holds(self, state: State) -> bool:
+        """Return whether the point of the present tool frame is within the bounds."""
+        assert self.arm is not None
+        p = forward(self.arm.chain_to(state.tool), state.q)[:3, 3]
+        if self.in_base:
+            p = self.T_base_shoulder[:3, :3] @ p + self.T_base_shoulder[:3, 3]
+        at = dict(zip(XYZ, p.tolist(), strict=True))
+        return all(bounds.has(at[name]) for name, bounds in self.bounds.items())
+
+
+@dataclass(frozen=True)
+class ProgramTime(Bounded):
+    """Time since the program began, with pauses, s."""
+
+    noun = "a time"
+
+    at_least: Seconds = -math.inf
+    at_most: Seconds = math.inf
+
+    @property
+    def awaited(self) -> str:
+        """Words for what is awaited."""
+        return "the time"
+
+
+CONDITIONS: dict[str, Kind[Condition]] = {
+    "held": record(Held),
+    "placed": record(Placed),
+    "volume": record(Volume),
+    "joint": record(JointAngle),
+    "gripper": record(FingerPlace),
+    "tool": record(ToolPlace),
+}
+"""The conditions on the state, by their names in a script."""
+
+CONDITION: Group[Condition | None] = one_of(CONDITIONS)
+"""One condition on the state."""
+
+Choice = Condition | ProgramTime
+CHOICES: dict[str, Kind[Choice]] = {**CONDITIONS, "time": record(ProgramTime)}
+CHOICE: Group[Choice | None] = one_of({name: bound(kind) for name, kind in CHOICES.items()})
+"""One condition of an ``if``, in which names may stand for values."""

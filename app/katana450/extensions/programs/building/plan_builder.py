@@ -1,0 +1,409 @@
+"""The state in which a script is planned: the arm as predicted, and the plans made so far."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.commands import Command, Joints
+from katana450.arm.control.modes import IDLE
+from katana450.arm.control.plans import path_to, plan_along
+from katana450.arm.control.scene_objects import SceneObject, named
+from katana450.arm.control.session import TOOL_SPEED, Session
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import Action, FollowPlan, MoveFingers
+from katana450.extensions.programs.language.step_target import ScriptFrame, StepTarget
+from katana450.extensions.programs.planning.approach import Approach
+from katana450.extensions.programs.planning.hand_planning import HandPlanning, hand_of
+from katana450.extensions.programs.planning.out_of_reach import unreached
+from katana450.extensions.programs.planning.tool_planning import AnyCurve, ToolPlanning, planning_of
+from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.motion.limiter import JointMotion
+from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.planning.path import Path, joint_derivatives
+from katana450.maths.planning.plan import JOIN_TOLERANCE, check_clear
+
+W = TypeVar("W")
+L = TypeVar("L")
+
+EXACT = 1e-9
+"""[m or rad] Maximum error of a pose that counts as reached."""
+
+ALONG = np.linspace(0.0, 1.0, 5)
+"""Places of a path (sigma) at which the joints are checked for motion."""
+
+CARRY = 1.0
+"""[m/s^2] Maximum acceleration of the tool while it carries an object."""
+
+TICK = 0.01
+"""[s] Period of the simulated control cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanContext:
+    """The arm and environment that a script is planned for.
+
+    Attributes:
+        session: the rules of the arm, and its environment.
+        T_base_shoulder: (4, 4) pose of the shoulder frame {S} in the base frame [m].
+        seed: seed of the random search for paths round obstacles.
+    """
+
+    session: Session
+    T_base_shoulder: FloatArray
+    seed: int = 0
+
+    @property
+    def arm(self) -> ArmModel:
+        """The arm model of the session."""
+        return self.session.require_arm()
+
+    @property
+    def ready(self) -> FloatArray:
+        """The ready posture (n,) [rad], the target of ``home``."""
+        return self.session.ready
+
+
+@dataclass(frozen=True)
+class GraspInfo:
+    """A grasp.
+
+    Attributes:
+        at: pose of the tool.
+        chosen: the approach if the compiler has chosen it, else None.
+        before: the object as it stood before.
+    """
+
+    at: DragTarget
+    chosen: Approach | None
+    before: SceneObject
+
+
+@dataclass(frozen=True, eq=False)
+class UntimedPath:
+    """Paths that are checked for contacts but not yet timed, because timing takes longest.
+
+    Attributes:
+        arm: the arm model.
+        world: the collision world that they were checked against; None without collision checks.
+        state: the state at their start.
+        paths: the paths, one after another.
+        tool_speed: maximum speed of the tool point [m/s].
+    """
+
+    arm: ArmModel
+    world: CollisionWorld | None
+    state: State
+    paths: tuple[Path, ...]
+    tool_speed: float = field(default=TOOL_SPEED, kw_only=True)
+
+    def timed(self) -> FollowPlan:
+        """Return the timed plan, with limited tool acceleration if an object is held."""
+        gentle = None if self.state.grip is None else CARRY
+        paths = list(self.paths)
+        return FollowPlan(
+            plan_along(self.arm, self.world, self.state, paths, self.tool_speed, gentle)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PacedPath(UntimedPath):
+    """One path on which the place grows evenly with time, in ``duration`` [s] without the ramps."""
+
+    duration: float
+
+    def timed(self) -> FollowPlan:
+        """Return the timed plan. Raises InputError if the arm cannot move that fast."""
+        plan = super().timed().plan
+        (segment,) = plan.segments
+        fastest = segment.scaling
+        if fastest.span > self.duration:
+            raise InputError(
+                f"It takes at least {fastest.span:.2g} s, so {self.duration:.2g} s are too short: "
+                "give a lower rate or a larger part."
+            )
+        even = replace(fastest, coefficients=np.full_like(fastest.coefficients, self.duration))
+        nearest = plan.nearest
+        if nearest is not None:
+            nearest = replace(nearest, tau=even.tau(fastest.pace(nearest.tau).sigma))
+        return FollowPlan(
+            replace(plan, segments=(replace(segment, scaling=even),), nearest=nearest)
+        )
+
+
+class PlanBuilder:
+    """The builder of a program: predicts the arm from step to step and records the actions."""
+
+    def __init__(
+        self, plan_context: PlanContext, state: State, frame: ScriptFrame | None = None
+    ) -> None:
+        """Start from ``state``, in which the arm is at rest.
+
+        ``frame``: the frame of the script, which is planned; None without a script.
+        """
+        self.plan_context = plan_context
+        self.state = state
+        self.frame = frame
+        self.actions: list[tuple[str, Action | UntimedPath]] = []
+        self.taken: GraspInfo | None = None
+        """The grasp of the held object; None with an empty hand."""
+        self.given_up: tuple[Approach, ...] = ()
+        """Approaches of the grasp with which a later step failed."""
+        self.ahead: Sequence[object] = ()
+        """The steps after the present one."""
+        self._hands: dict[str, HandPlanning] = {}
+        # Whether a refusal is not shown, so that its details need not be found.
+        self._brief = False
+
+    @property
+    def world(self) -> CollisionWorld | None:
+        """The present collision world; None without collision checks."""
+        return self.plan_context.session.world_at(self.state)
+
+    @property
+    def chain(self) -> Chain:
+        """The kinematic chain to the present tool frame."""
+        return self.plan_context.arm.chain_to(self.state.tool)
+
+    @property
+    def q(self) -> FloatArray:
+        """The present joints (n,) [rad]."""
+        return self.state.setpoint
+
+    @property
+    def planning(self) -> ToolPlanning:
+        """The planning of the present tool."""
+        return planning_of(self.plan_context.arm.kinematics_to(self.state.tool), self.state)
+
+    @property
+    def hand(self) -> HandPlanning:
+        """The hand with the present tool. Raises InputError, with the reason, without one."""
+        tool, context = self.state.tool, self.plan_context
+        if tool not in self._hands:
+            self._hands[tool] = hand_of(context.session, context.T_base_shoulder, self.state)
+        return self._hands[tool]
+
+    @property
+    def target(self) -> DragTarget:
+        """The present target of the tool, of any arm."""
+        return self.planning.at(self.q)
+
+    def point(self, p: FloatArray, *, in_base: bool) -> FloatArray:
+        """Return the point ``p`` (3,) [m] in {S}; ``in_base``: it is given in the base frame."""
+        T = se3.inverse(self.plan_context.T_base_shoulder) if in_base else np.eye(4)
+        return frozen(T[:3, :3] @ p + T[:3, 3])
+
+    def direction(self, v: FloatArray, *, in_base: bool) -> FloatArray:
+        """Return the direction ``v`` (3,) in {S}; ``in_base``: it is given in the base frame."""
+        return frozen(self.plan_context.T_base_shoulder[:3, :3].T @ v if in_base else v)
+
+    def note(self, name: str, action: Action | UntimedPath, state: State) -> None:
+        """Append ``action``, which leads to ``state``."""
+        if isinstance(action, MoveFingers):
+            turn = abs(state.gripper_setpoint - self.state.gripper_setpoint)
+            action = replace(action, seconds=turn / self.plan_context.arm.gripper.speed)
+        self.actions.append((name, action))
+        self.state = state
+
+    def move_to(self, q: FloatArray, name: str) -> None:
+        """Append a free motion to ``q`` (n,) [rad] round obstacles; nothing if the arm is there."""
+        if float(np.abs(self.q - q).max()) <= JOIN_TOLERANCE:
+            return
+        self.follow(
+            [path_to(self.plan_context.arm, self.world, self.state, q, self.plan_context.seed)],
+            name,
+        )
+
+    def lead(self, curves: Sequence[AnyCurve], name: str, tool_speed: float = TOOL_SPEED) -> None:
+        """Append the tool's motion along ``curves``, from its present pose, on the same branch.
+
+        ``tool_speed``: maximum speed of the tool point [m/s]. Raises as ``follow``.
+        """
+        planning = self.planning
+        paths: list[Path] = []
+        made: dict[int, Path] = {}
+        q = self.q
+        for curve in curves:
+            path = made.get(id(curve))
+            if path is None or float(np.abs(path.start - q).max()) > JOIN_TOLERANCE:
+                path = planning.path(q, curve, planning.branches(q)[0])
+                made[id(curve)] = path
+            paths.append(path)
+            q = path.end
+        self.follow(paths, name, tool_speed)
+
+    def pace(self, curve: AnyCurve, duration: float, name: str) -> None:
+        """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
+
+        Raises as ``follow``.
+        """
+        self.lead([curve], name)
+        _, untimed = self.actions[-1]
+        assert isinstance(untimed, UntimedPath)
+        paced = PacedPath(untimed.arm, untimed.world, untimed.state, untimed.paths, duration)
+        self.actions[-1] = name, paced
+
+    def follow(self, paths: Sequence[Path], name: str, tool_speed: float = TOOL_SPEED) -> None:
+        """Append the motion along ``paths``, the first of which begins at the present posture.
+
+        ``tool_speed``: maximum speed of the tool point [m/s]. Raises BlockedError, and InputError
+        for a path on which nothing moves.
+        """
+        world, fingers = self.world, self.state.gripper_setpoint
+        for path in {id(path): path for path in paths}.values():
+            if float(np.abs(joint_derivatives(path, ALONG)[1]).max()) <= EXACT:
+                raise InputError(
+                    f"This {name} moves nothing: it ends where it begins. Change its "
+                    "target or remove it."
+                )
+            if world is not None:
+                check_clear(path, world, fingers)
+        self.note(
+            name,
+            UntimedPath(
+                self.plan_context.arm, world, self.state, tuple(paths), tool_speed=tool_speed
+            ),
+            self.standing(paths[-1].end),
+        )
+
+    def first(self, options: Iterable[W], build: Callable[[W], L]) -> L:
+        """Return ``build(option)`` of the first option that succeeds, and undo all failed attempts.
+
+        Raises InputError with the reason of the first option, which is the one that a person
+        expects.
+        """
+        refused = InputError("no alternative is left.")
+        state, actions = self.state, tuple(self.actions)
+        for number, option in enumerate(options):
+            checkpoint()
+            brief, self._brief = self._brief, self._brief or number > 0
+            try:
+                return build(option)
+            except InputError as error:
+                self.state, self.actions = state, list(actions)
+                if number == 0:
+                    refused = error
+            finally:
+                self._brief = brief
+        raise refused
+
+    def after(self, command: Command, ticks: int) -> State:
+        """Return the state ``ticks`` after ``command``, or at rest, as the session computes it."""
+        session, state = self.plan_context.session, self.state
+        given: tuple[Command, ...] = (command,)
+        for _ in range(ticks):
+            checkpoint()
+            state = session.step(state, given, state.t + TICK)
+            state = session.observe(state, state.setpoint, state.gripper_setpoint)
+            given = ()
+            if not state.moving:
+                break
+        return state
+
+    def scene_object(self, name: str) -> SceneObject:
+        """Return the object ``name``. Raises InputError with the known names."""
+        found = named(self.state.objects, name)
+        if found is None:
+            known = ", ".join(each.name for each in self.state.objects) or "none"
+            raise InputError(f"There is no object {name!r}. Known objects: {known}.")
+        return found
+
+    def standing(self, q: FloatArray) -> State:
+        """Return the state of the arm at rest at ``q`` (n,) [rad], free to move.
+
+        A program runs only after a stop was cleared and a pause ended, but may be planned before.
+        """
+        q, branch = frozen(q), self.plan_context.arm.kinematics.branch_of(q)
+        standing = replace(
+            self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE,
+            stopped=None, paused=False, blocked=False,
+        )  # fmt: skip
+        return self._with_still_water(standing)
+
+    def assume_missed(self) -> None:
+        """Continue as if the last grasp had missed: the fingers are closed, the object stands."""
+        if self.taken is None:
+            return
+        before, closed = self.taken.before, self.plan_context.arm.gripper.closed
+        objects = tuple(before if each.name == before.name else each for each in self.state.objects)
+        missed = replace(
+            self.state, objects=objects, grip=None, squeeze=0.0,
+            gripper=closed, gripper_setpoint=closed, gripper_goal=closed,
+        )  # fmt: skip
+        self.state = self._with_still_water(missed)
+        self.taken, self.given_up = None, ()
+
+    def predict_water(self, volumes: Mapping[str, int]) -> None:
+        """Continue with these volumes of water [fl] in vessels."""
+        self.state = self._with_still_water(self.state, volumes)
+
+    def _with_still_water(self, state: State, volumes: Mapping[str, int] | None = None) -> State:
+        """Return ``state`` with the water at rest in the vessels, where they are now."""
+        pouring = self.plan_context.session.pouring
+        if pouring is None or state.poured is None:
+            return state
+        still = pouring.settled(state.poured.water, state.objects, state.x_setpoint, volumes or {})
+        return replace(state, poured=still)
+
+    def joints_at(self, place: StepTarget) -> FloatArray:
+        """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
+        if place.joints is not None:
+            self.plan_context.session.check(Joints(place.joints))
+            q = self.plan_context.arm.chain.check_q(place.joints)
+            _check_range(self.chain, q)
+            return q
+        return self.joints_of(self.target_at(place), place.branch)
+
+    def target_at(self, place: StepTarget, now: DragTarget | None = None) -> DragTarget:
+        """Return the target at ``place``, which has no joints; ``now`` gives absent values."""
+        now = self.target if now is None else now
+        p = now.position
+        if place.position is not None:
+            p = self.point(place.position, in_base=place.in_base)
+        R = self.plan_context.T_base_shoulder[:3, :3] if place.in_base else np.eye(3)
+        return self.planning.oriented(now.moved(p), place.angles, R)
+
+    def joints_of(self, target: DragTarget, branch: AnyBranch | None = None) -> FloatArray:
+        """Return the joints (n,) [rad] for ``target``, on the present branch if possible.
+
+        Raises InputError with the nearest places.
+        """
+        branch = None if branch is None else self.planning.branch(branch)
+        found = self.planning.joints(self.q, target, branch)
+        if found is None:
+            raise InputError("" if self._brief else self.unreached(target, branch))
+        return found
+
+    def unreached(self, target: DragTarget, branch: AnyBranch | None) -> str:
+        """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
+        T = self.plan_context.T_base_shoulder
+        frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
+        return unreached(self.planning, self.q, target, branch, frame)
+
+    def branches(self, wanted: AnyBranch | None) -> Sequence[AnyBranch]:
+        """Return the branches to try, in their order; only ``wanted`` if it is given."""
+        planning = self.planning
+        return planning.branches(self.q) if wanted is None else (planning.branch(wanted),)
+
+
+def _check_range(chain: Chain, q: FloatArray) -> None:
+    """Raise InputError, with the range, if an axis at ``q`` (n,) [rad] is beyond its limits."""
+    if chain.within_limits(q):
+        return
+    number = int(np.maximum(chain.lower - q, q - chain.upper).argmax())
+    value, low, high = (math.degrees(bounds[number]) for bounds in (q, chain.lower, chain.upper))
+    raise InputError(
+        f"Axis {number + 1} would be at {value:.1f} deg, beyond its limit: its range is "
+        f"{low:.1f} to {high:.1f} deg."
+    )

@@ -1,0 +1,286 @@
+"""The turn of a held vessel over a basin or another vessel: by the wrist, or about its lip.
+
+An arm of the five-axis family rolls the vessel by its wrist. Other arms tilt it about its lip.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+from numpy.polynomial.polynomial import polyfit, polyval
+
+from katana450.arm.control.pouring import is_vessel
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.errors import InputError
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.planning.approach import UP
+from katana450.extensions.programs.planning.curves import PoseTurn, ToolLine, ToolTurn
+from katana450.extensions.programs.planning.tool_planning import AnyCurve, ToolPlanning
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+
+EMPTY_TILT: Final = math.radians(120.0)
+"""[rad] Tilt of a cup that is emptied about its lip: past its side. It is not tilted farther."""
+
+POUR_TURN: Final = math.radians(165.0)
+"""[rad] Roll of a pour: with any tilt of the tool, the cup then lies past its side."""
+
+UNDERSIDES: Final = (0.02, 0.05, 0.09)
+"""[m] Heights of the upright cup over the rim below it, tried in this order."""
+
+ABOVE_RIM: Final = 0.13
+"""[m] Height of the tool above the rim of a basin: the cup is rolled over between them."""
+
+AIM: Final = 0.015
+"""[m] Distance of the lip before the middle of another vessel: as far as the water flies while it
+falls, with the flows of a pour.
+"""
+
+NODES: Final = frozen(-np.cos(np.linspace(0.0, np.pi, 15)))
+"""Places in the interval from -1 to 1, with its ends, through which polynomials are laid."""
+
+ROUNDS: Final = 12
+"""Number of corrections of the tool's place; each leaves less than a third of the error."""
+
+FIRST_ROLL: Final = 1e-4
+"""[1] Fraction of the roll at which the lip of an upright vessel is found."""
+
+
+class VesselTurn(ABC):
+    """The motions that turn an upright vessel over. Angles [rad] count from upright.
+
+    Attributes:
+        at: the tool with the vessel upright.
+        end: angle at the end of the pour.
+    """
+
+    at: DragTarget
+    end: float
+
+    @abstractmethod
+    def angles(self, tilts: FloatArray) -> FloatArray:
+        """Return the angles (N,) at which the vessel has these tilts. Raises InputError."""
+
+    @abstractmethod
+    def line(self, start: float, end: float) -> AnyCurve:
+        """Return the even turn from one angle to another."""
+
+    @abstractmethod
+    def by(self, angles: FloatArray) -> AnyCurve:
+        """Return the turn by a polynomial of ``angles`` (n,), in powers of 2 sigma - 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tilting(VesselTurn):
+    """The turn of a cup about its lip. Its angle is the tilt.
+
+    Attributes:
+        at: the tool with the cup upright.
+        lip: (3,) the point of the lip about which the cup tilts [m].
+        axis: unit vector (3,), level, about which it does.
+        axis_in_pose: the same in the frame of the rotation of a `ToolPose`.
+        planning: that of the tool.
+        end: angle at the end of the pour.
+    """
+
+    at: ToolPose
+    lip: FloatArray
+    axis: FloatArray
+    axis_in_pose: FloatArray
+    planning: ToolPlanning
+    end: float
+
+    def angles(self, tilts: FloatArray) -> FloatArray:
+        """Return ``tilts``."""
+        if tilts.max() > EMPTY_TILT:
+            raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
+        return tilts
+
+    def line(self, start: float, end: float) -> AnyCurve:
+        """Return the arc of the tool about the lip."""
+        one, other = (self._tilted(tilt) if tilt else self.at for tilt in (start, end))
+        return self.planning.arc(self.lip, self.axis, end - start, 0.0, one, other)
+
+    def _tilted(self, tilt: float) -> ToolPose:
+        position = self.lip + so3.exp(tilt * self.axis) @ (self.at.position - self.lip)
+        return ToolPose(frozen(position), frozen(so3.exp(tilt * self.axis_in_pose) @ self.at.R))
+
+    def by(self, angles: FloatArray) -> AnyCurve:
+        """Return the `PoseTurn`."""
+        return PoseTurn(self.at, self.lip, self.axis, angles, self.axis_in_pose)
+
+
+@dataclass(frozen=True, eq=False)
+class Rolling(VesselTurn):
+    """The roll of a vessel by the wrist. Its angle is the roll of the tool, either way.
+
+    Attributes:
+        at: the tool with the vessel upright.
+        end: angle at the end of the pour.
+        offsets: coefficients (n, 3) of the path of the tool point [m] that keeps the lip in its
+            place, of the powers of 2 angle / end - 1; None to keep the tool point.
+    """
+
+    at: ToolTarget
+    end: float
+    offsets: FloatArray | None = None
+
+    def angles(self, tilts: FloatArray) -> FloatArray:
+        """Return the rolls that give ``tilts``."""
+        rolls = _roll_of(tilts, self.at.pitch)
+        if rolls.max() > abs(self.end) and rolls.max() >= POUR_TURN:
+            raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
+        return np.asarray(math.copysign(1.0, self.end) * rolls)
+
+    def line(self, start: float, end: float) -> AnyCurve:
+        """Return the even roll."""
+        if self.offsets is None:
+            one, other = (replace(self.at, roll=self.at.roll + roll) for roll in (start, end))
+            return ToolLine(one, other)
+        return self.by(np.array((0.5 * (start + end), 0.5 * (end - start))))
+
+    def by(self, angles: FloatArray) -> AnyCurve:
+        """Return the `ToolTurn`."""
+        rolls = np.append(self.at.roll + angles[0], angles[1:])
+        if self.offsets is None:
+            return ToolTurn(self.at, rolls)
+        places = 2.0 * polyval(NODES, angles) / self.end - 1.0
+        return ToolTurn(self.at, rolls, _through(polyval(places, self.offsets).T))
+
+
+def turns_over(
+    builder: PlanBuilder,
+    held: SceneObject,
+    below: SceneObject,
+    tilt: float | None,
+    *,
+    is_rated: bool,
+) -> Iterator[VesselTurn]:
+    """Yield the ways to turn the vessel in the hand over ``below``, the best first.
+
+    Args:
+        builder: the arm, which holds it.
+        held: the vessel.
+        below: what receives its water.
+        tilt: its tilt at the end of the pour [rad]; None to empty it.
+        is_rated: whether it is tilted at a rate, whose tilts `VesselTurn.angles` checks.
+
+    Raises InputError for a tilt that the arm cannot give it, and out of reach.
+    """
+    level = builder.target
+    if not isinstance(level, ToolTarget):
+        if tilt is not None and tilt > EMPTY_TILT and not is_rated:
+            raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
+        yield from _about_the_lip(builder, held, below, tilt)
+        return
+    roll = POUR_TURN if tilt is None else float(_roll_of(tilt, level.pitch))
+    if tilt is not None and roll >= POUR_TURN:
+        raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
+    over = _over_vessel if is_vessel(below) else _over_basin
+    for sign, limit in ((1.0, builder.chain.upper[4]), (-1.0, -builder.chain.lower[4])):
+        # The turn is limited to the range of the wrist.
+        turn = sign * min(roll, 0.995 * float(limit) - abs(level.roll))
+        yield over(builder, held, below, level, turn, is_emptied=tilt is None)
+
+
+def _about_the_lip(
+    builder: PlanBuilder, held: SceneObject, below: SceneObject, tilt: float | None
+) -> Iterator[Tilting]:
+    """Yield the ways to tilt an upright cup about its lip, by a hand that takes poses."""
+    T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+    cup = builder.point(T[:3, 3] + held.height * T[:3, 2], in_base=True)
+    over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height), in_base=True)
+    level, hand, aim = builder.target, builder.hand, AIM if is_vessel(below) else 0.0
+    for height in UNDERSIDES:
+        point = over + (held.height + height) * UP
+        for turn, toward, in_pose in hand.tilt_directions(builder.q, cup, point):
+            lip = point - aim * toward
+            axis, axis_in_pose = (frozen(np.cross(UP, d)) for d in (toward, in_pose))
+            # The cup turns with the arm on the way to the basin.
+            moved = so3.rotation_z(turn) @ (level.position - cup)
+            at = hand.turned(level, lip - held.extent[0] * toward + moved, turn)
+            assert isinstance(at, ToolPose)
+            end = EMPTY_TILT if tilt is None else tilt
+            yield Tilting(at, frozen(lip), axis, axis_in_pose, builder.planning, end)
+
+
+def _over_basin(
+    builder: PlanBuilder,
+    held: SceneObject,
+    below: SceneObject,
+    level: ToolTarget,
+    turn: float,
+    *,
+    is_emptied: bool,
+) -> Rolling:
+    """Return the roll with the lip over the middle of the object ``below`` when it pours."""
+    over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height + ABOVE_RIM), in_base=True)
+    position = over
+    for _ in range(3):
+        # When the cup lies on its side, or is tilted as far as it will be.
+        at = replace(level, position=position)
+        tilted = 0.5 * turn if is_emptied else turn
+        side = builder.joints_of(replace(at, roll=level.roll + tilted))
+        position = position + (over - _lip(builder, held, side)[0]) * (1.0, 1.0, 0.0)
+    return Rolling(replace(level, position=position), turn)
+
+
+def _over_vessel(
+    builder: PlanBuilder,
+    held: SceneObject,
+    below: SceneObject,
+    level: ToolTarget,
+    turn: float,
+    *,
+    is_emptied: bool,  # noqa: ARG001
+) -> Rolling:
+    """Return the roll with the lip in one place over the vessel ``below``."""
+    height = below.height + held.height + UNDERSIDES[0]
+    over = builder.point(below.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+    positions, position = [], over
+    for roll in (0.5 * turn * np.maximum(1.0 + NODES, FIRST_ROLL)).tolist():
+        for _ in range(ROUNDS):
+            tool = replace(level, position=position, roll=level.roll + roll)
+            lip, toward = _lip(builder, held, builder.joints_of(tool))
+            position = position + over - AIM * toward - lip
+        positions.append(position)
+    at = replace(level, position=frozen(positions[0]))
+    return Rolling(at, turn, _through(np.array(positions) - positions[0]))
+
+
+def _lip(builder: PlanBuilder, held: SceneObject, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest point (3,) [m] of the rim in {S}, and the level direction (3,) out of it.
+
+    q: the joints (5,) [rad] with which the vessel is tilted.
+    """
+    environment = builder.plan_context.session.environment
+    T = environment.pose(held, np.append(q, builder.state.gripper_setpoint))
+    up = T[:3, 2]
+    downhill = -(np.array((0.0, 0.0, 1.0)) - up[2] * up)
+    downhill /= np.linalg.norm(downhill)
+    rim = builder.point(T[:3, 3] + held.height * up + held.extent[0] * downhill, in_base=True)
+    toward = np.array((up[0], up[1], 0.0)) / np.hypot(up[0], up[1])
+    return rim, builder.direction(toward, in_base=True)
+
+
+def _through(values: FloatArray) -> FloatArray:
+    """Return the coefficients (n, 3) of the polynomial with the ``values`` (n, 3) at NODES."""
+    return frozen(polyfit(NODES, values, len(NODES) - 1))
+
+
+def _roll_of(tilt: npt.ArrayLike, pitch: float) -> FloatArray:
+    """Return the roll [rad] of a tool with ``pitch`` [rad] at which a cup has ``tilt`` [rad].
+
+    Rolling by phi tilts it by cos(tilt) = cos(phi) + (1 - cos(phi)) sin(pitch)^2. The result is pi
+    where no roll tilts it that far.
+    """
+    steep = math.sin(pitch) ** 2
+    return np.arccos(np.clip((np.cos(tilt) - steep) / (1.0 - steep), -1.0, 1.0))

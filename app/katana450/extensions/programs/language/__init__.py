@@ -1,0 +1,1 @@
+"""The language of scripts: YAML with lines, values with units, names and fields."""

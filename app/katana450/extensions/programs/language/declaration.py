@@ -1,0 +1,215 @@
+"""Classes that declare their fields, from which their reading and their JSON Schema follow.
+
+The type of a field has its kind, as in ``x: Annotated[float, LENGTH]``: how its value is read, and
+how an editor explains and checks it.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar, get_args
+
+from katana450.extensions.programs.language.fields import Fields
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import YamlValue
+
+Schema = dict[str, Any]
+T = TypeVar("T")
+T_co = TypeVar("T_co", covariant=True)
+
+ALONE = ScriptContext()
+"""The settings of a value that does not depend on its script."""
+
+REQUIRED = inspect.Parameter.empty
+"""The default of a field that must be given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kind(Generic[T_co]):
+    """A kind of value.
+
+    Attributes:
+        read: function of a value and of the settings of its script. It raises ScriptError.
+        schema: its JSON Schema.
+        field: name of the field in a script, if it is not that of the attribute.
+    """
+
+    read: Callable[[YamlValue, ScriptContext], T_co]
+    schema: Schema
+    field: str = ""
+
+    def __call__(self, value: YamlValue, context: ScriptContext = ALONE) -> T_co:
+        """Read the value. Raises ScriptError."""
+        return self.read(value, context)
+
+    def within(self, context: ScriptContext) -> Callable[[YamlValue], T_co]:
+        """Return the function that reads a value of a script with these settings."""
+        return lambda value: self.read(value, context)
+
+    def about(self, text: str) -> Kind[T_co]:
+        """Return the kind with the description ``text``."""
+        return replace(self, schema={**self.schema, "description": text})
+
+    def named(self, field: str) -> Kind[T_co]:
+        """Return the kind of a field that is not named like the attribute."""
+        return replace(self, field=field)
+
+
+@dataclass(frozen=True, eq=False)
+class Group(Generic[T_co]):
+    """Fields of a mapping that are one value of a class.
+
+    Attributes:
+        take: function that takes the value from the fields, and adds mistakes to their problems.
+        schemas: schemas of the fields, by their names.
+    """
+
+    take: Callable[[Fields, ScriptContext], T_co]
+    schemas: Mapping[str, Schema]
+
+
+class _Part(NamedTuple):
+    """The kind that a class declares of one attribute, and its default."""
+
+    kind: Kind[Any] | Group[Any]
+    default: Any
+
+
+class Declared:
+    """A class that is read from a mapping, by the kinds of its attributes.
+
+    Attributes that declare no kind have a default; ``in_base`` becomes whether the script gives
+    points in the base frame, and ``source`` the value itself. The first line of the docstring
+    describes the class in editors.
+
+    Attributes:
+        noun: what it is in messages, as in "a circle".
+        short: attribute that a value stands for which is no mapping; "" for none. If no other one
+            is declared, there is no mapping.
+        needs: names of fields of which at least one must be given.
+        excludes: names of two fields that exclude each other.
+    """
+
+    noun: ClassVar[str] = ""
+    short: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
+    excludes: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def read(cls, value: YamlValue, context: ScriptContext) -> Self:
+        """Read the value. Raises ScriptError with all mistakes."""
+        parts, others = _declaration(cls)
+        if not parts:
+            if value.kind != "nothing":
+                raise value.wrong(f"{cls.noun.capitalize()} takes no value. Remove it.")
+            return cls()
+        own = {"in_base": context.in_base, "source": value}
+        own = {name: own[name] for name in others if name in own}
+        if cls.short and (value.kind != "mapping" or len(parts) == 1):
+            kind = parts[cls.short].kind
+            assert isinstance(kind, Kind)
+            return cls(**{cls.short: kind(value, context)}, **own)
+        fields = Fields(value, cls.noun)
+        given: dict[str, Any] = {}
+        for name, part in parts.items():
+            if isinstance(part.kind, Group):
+                given[name] = part.kind.take(fields, context)
+            elif fields.has(field := part.kind.field or name) or part.default is REQUIRED:
+                given[name] = fields.need(field, part.kind.within(context), None)
+        if cls.needs and not any(map(fields.has, cls.needs)):
+            *before, last = (f"`{name}`" for name in cls.needs)
+            fields.refuse(f"{cls.noun.capitalize()} needs {', '.join(before)} or {last}.")
+        if cls.excludes and all(map(fields.has, cls.excludes)):
+            one, other = cls.excludes
+            fields.refuse(f"{cls.noun.capitalize()} takes `{one}` or `{other}`, not both.", other)
+        for name, problem in cls.mistakes(given):
+            fields.refuse(problem, name)
+        fields.done()
+        return cls(**given, **own)
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:  # noqa: ARG003
+        """Yield field and text of each mistake in ``given`` that no field has by itself.
+
+        The field is "" for the whole mapping. ``given`` has the attributes that the mapping gives,
+        None for one that is wrong.
+        """
+        yield from ()
+
+    @classmethod
+    def schema(cls) -> Schema:
+        """Return the JSON Schema of the value."""
+        about = " ".join((cls.__doc__ or "").partition("\n\n")[0].split()).rstrip(".")
+        parts = _declaration(cls).parts
+        if not parts:
+            return {"type": "null", "description": about}
+        short = parts[cls.short].kind if cls.short else None
+        if isinstance(short, Kind) and len(parts) == 1:
+            return short.about(about).schema
+        properties: dict[str, Schema] = {}
+        required = []
+        for name, (kind, default) in parts.items():
+            if isinstance(kind, Group):
+                properties |= kind.schemas
+                continue
+            properties[kind.field or name] = kind.schema
+            if default is REQUIRED:
+                required.append(kind.field or name)
+        mapping = {
+            "type": "object",
+            "properties": properties,
+            "required": required,
+            "additionalProperties": False,
+        }
+        if cls.needs:
+            mapping["anyOf"] = [{"required": [name]} for name in cls.needs]
+        if cls.excludes:
+            mapping["not"] = {"required": list(cls.excludes)}
+        if isinstance(short, Kind):
+            return {"description": about, "anyOf": [short.schema, mapping]}
+        return {"description": about, **mapping}
+
+
+def record(declared: type[T]) -> Kind[T]:
+    """Return the kind of a value that is read as the class ``declared``."""
+    assert issubclass(declared, Declared)
+    return Kind(declared.read, declared.schema())
+
+
+class _Declaration(NamedTuple):
+    """The attributes of a class that declare a kind, and the names of the others."""
+
+    parts: Mapping[str, _Part]
+    others: tuple[str, ...]
+
+
+_DECLARATIONS: dict[type[Declared], _Declaration] = {}
+
+
+def _declaration(declared: type[Declared]) -> _Declaration:
+    """Return the attributes of a class, each in their order."""
+    if declared not in _DECLARATIONS:
+        hints: dict[str, Any] = {}
+        for base in reversed(declared.__mro__):
+            hints |= inspect.get_annotations(base, eval_str=True)
+        parts: dict[str, _Part] = {}
+        others = []
+        for name, parameter in inspect.signature(declared).parameters.items():
+            kind = _kind(hints.get(name))
+            if kind is None:
+                others.append(name)
+            else:
+                parts[name] = _Part(kind, parameter.default)
+        _DECLARATIONS[declared] = _Declaration(parts, tuple(others))
+    return _DECLARATIONS[declared]
+
+
+def _kind(hint: Any) -> Kind[Any] | Group[Any] | None:
+    """Return the kind that the type of an attribute has; None for other attributes."""
+    for option in (hint, *get_args(hint)):
+        for extra in reversed(getattr(option, "__metadata__", ())):
+            if isinstance(extra, Kind | Group):
+                return extra
+    return None

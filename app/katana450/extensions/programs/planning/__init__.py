@@ -1,0 +1,1 @@
+"""The planning of curves, postures, hands and vessels, without a script."""

@@ -1,0 +1,145 @@
+"""The plane in which an arm with fewer than six axes moves its hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from katana450.errors import InputError
+from katana450.extensions.programs.planning.approach import UP
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.turns import wrapped
+
+ROLLING_AXES, PLANAR_AXES = 5, 4
+"""Numbers of axes with which a hand takes every place, pitch and roll, or every place and pitch."""
+
+STRAIGHT: Final = 1e-3
+"""[1] Sine of the angle up to which directions count as parallel."""
+
+MAX_BEND: Final = math.radians(10.0)
+"""[rad] Maximum angle between the fingers and the roll axis, along which the hand approaches."""
+
+NOT_IN_PLANE: Final = (
+    "An arm with fewer than six axes grasps if axis 1 is upright, axes 2 to 4 are level, and its "
+    "fingers point along the plane of the arm. With four axes they also close across it. The "
+    "description of this arm has them otherwise."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPlane:
+    """The plane in which an arm with fewer than six axes moves its tool. It turns with axis 1.
+
+    Vectors and rotations are in {S} with axis 1 at zero.
+
+    Attributes:
+        outward: direction (3,) of the plane, away from axis 1.
+        across: unit vector (3,) across it.
+        sign: +1 or -1, of the turn of the plane about the vertical with the angle of axis 1.
+        R_hand_tool: (3, 3) rotation of the tool in the frame of the hand, whose x axis points along
+            the approach, and along whose y axis the fingers close.
+        centre: (3,) a point in the frame of the tool that no roll moves [m].
+        beside: distance of this point from axis 1 along ``across`` [m].
+        rolls: whether the arm chooses the roll.
+    """
+
+    outward: FloatArray
+    across: FloatArray
+    sign: float
+    R_hand_tool: FloatArray
+    centre: FloatArray
+    beside: float
+    rolls: bool
+
+    @staticmethod
+    def of(chain: Chain, T_tool_grasp: FloatArray, ready: FloatArray) -> ArmPlane:
+        """Return the plane of an arm whose tool is in front of axis 1 at ``ready`` (n,) [rad].
+
+        Raises InputError for an arm that does not move its hand in a plane.
+        """
+        across, rolls = np.array(chain.S[:3, 1]), chain.n == ROLLING_AXES
+        level = max(abs(float(axis[2])) for axis in chain.S[:3, 1:PLANAR_AXES].T)
+        if level > STRAIGHT or abs(abs(float(chain.S[2, 0])) - 1.0) > STRAIGHT:
+            raise InputError(NOT_IN_PLANE)
+        T = forward(chain, np.append(0.0, ready[1:]))
+        R_grasp, centre = T[:3, :3] @ T_tool_grasp[:3, :3], np.zeros(3)
+        outward = np.cross(across, UP)
+        place = T[:3, 3] + T[:3, :3] @ T_tool_grasp[:3, 3]
+        outward = math.copysign(1.0, float(outward @ place)) * outward
+        x, y = R_grasp[:, 0], R_grasp[:, 1]
+        if rolls:
+            x, centre = _roll_axis(chain, T_tool_grasp)
+            x, y = T[:3, :3] @ x, y - (y @ T[:3, :3] @ x) * T[:3, :3] @ x
+        pitch = math.atan2(-x[2], float(x @ outward))
+        R_hand = np.column_stack((x, y / np.linalg.norm(y), np.cross(x, y) / np.linalg.norm(y)))
+        closing = _level(outward, pitch).T @ R_hand[:, 1]
+        if abs(float(x @ across)) > STRAIGHT or (not rolls and abs(float(closing[2])) > STRAIGHT):
+            raise InputError(NOT_IN_PLANE)
+        if not rolls:
+            R_hand = R_hand @ so3.rotation_x(-math.atan2(closing[2], closing[1]))
+        return ArmPlane(
+            frozen(outward),
+            frozen(across),
+            math.copysign(1.0, float(chain.S[2, 0])),
+            frozen(R_hand.T @ T[:3, :3]),
+            frozen(centre),
+            float(across @ (T[:3, 3] + T[:3, :3] @ centre)),
+            rolls,
+        )
+
+    def rotation(self, pitch: float, roll: float) -> FloatArray:
+        """Return the rotation (3, 3) of the tool with ``pitch`` and ``roll`` of the hand [rad]."""
+        return np.asarray(_level(self.outward, pitch) @ so3.rotation_x(roll) @ self.R_hand_tool)
+
+    def angles(self, R: FloatArray) -> tuple[float, float]:
+        """Return pitch and roll of the hand [rad] with the tool at rotation `R` (3, 3)."""
+        H = _level(self.outward, 0.0).T @ R @ self.R_hand_tool.T
+        return math.atan2(-H[2, 0], H[0, 0]), math.atan2(-H[1, 2], H[1, 1])
+
+    def beside_at(self, R: FloatArray, inside: FloatArray) -> float:
+        """Return the distance [m] of a point of the tool from axis 1, along ``across``.
+
+        R: (3, 3) rotation of the tool. inside: (3,) the point in the frame of the tool [m].
+        """
+        return self.beside + float(self.across @ R @ (inside - self.centre))
+
+    def turn(self, p: FloatArray, beside: float) -> float:
+        """Return the turn [rad] about axis 1 that brings a point ``beside`` the plane to `p` (3,).
+
+        Raises InputError for a point too near to axis 1.
+        """
+        outward = math.hypot(p[0], p[1]) ** 2 - beside**2
+        if outward < 0.0:
+            raise InputError("it stands too near to axis 1, where the plane of the arm cannot be.")
+        at = math.sqrt(outward) * self.outward + beside * self.across
+        return wrapped(math.atan2(p[1], p[0]) - math.atan2(at[1], at[0]))
+
+
+def _roll_axis(chain: Chain, T_tool_grasp: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return direction and nearest point (3,) of the last axis in the frame of the tool [m].
+
+    The direction is that of the fingers. Raises InputError if they point beside it.
+    """
+    p, axis, v = chain.M[:3, 3], chain.S[:3, -1], chain.S[3:, -1]
+    R = chain.M[:3, :3].T
+    x, centre = R @ axis, R @ (np.cross(axis, v) + (axis @ p) * axis - p)
+    x = math.copysign(1.0, float(x @ T_tool_grasp[:3, 0])) * x
+    bend = math.acos(min(float(x @ T_tool_grasp[:3, 0]), 1.0))
+    if bend > MAX_BEND:
+        raise InputError(
+            "The hand of five axes grasps along its roll axis, and its fingers point "
+            f"{math.degrees(bend):.0f} deg beside it; the maximum is "
+            f"{math.degrees(MAX_BEND):.0f} deg."
+        )
+    return x, centre
+
+
+def _level(outward: FloatArray, pitch: float) -> FloatArray:
+    """Return the rotation (3, 3) of a hand with ``pitch`` [rad] in the plane along ``outward``."""
+    return so3.from_rpy(0.0, pitch, math.atan2(outward[1], outward[0]))

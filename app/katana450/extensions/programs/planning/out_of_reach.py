@@ -1,0 +1,282 @@
+"""Messages about places and paths out of reach: by how much, what binds, and what works."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+
+from katana450.arm.control.messages import axis_names
+from katana450.extensions.general_arms.tool_pose import ToolPose
+from katana450.extensions.programs.language.kinds import XYZ
+from katana450.extensions.programs.language.step_target import ScriptFrame
+from katana450.extensions.programs.planning.tool_planning import EXACT, AnyCurve, ToolPlanning
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import AnyBranch, Branch
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import (
+    ANGLE_WORTH_TELLING,
+    POSITION_WORTH_TELLING,
+    Projection,
+)
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.planning.checkpoint import checkpoint
+from katana450.tolerances import LIMIT_SLACK
+
+STEP = 0.1
+"""[mm] and [deg] Resolution of the suggested places."""
+
+WIDER = math.radians(5.0)
+"""[rad] Angle by which a limit is widened to find out whether it binds."""
+
+SAMPLES = 65
+"""Number of places of a path that are compared."""
+
+CLEAR_TURN = math.radians(1.0)
+"""[rad] Error of the orientation that is reported beside one of the position."""
+
+Reached = Callable[[DragTarget], bool]
+"""Returns whether the tool can be at a target."""
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPlace:
+    """The nearest place that the tool can take instead of a target.
+
+    Attributes:
+        pose: the place, in the numbers of the target.
+        projection: its posture, its errors, and what keeps the arm from coming nearer.
+        branch: the branch on which it was searched.
+        target: the target in the numbers of this branch.
+        priority: which part of the target is kept.
+    """
+
+    pose: DragTarget
+    projection: Projection
+    branch: AnyBranch
+    target: DragTarget
+    priority: Priority
+
+    @property
+    def errors(self) -> tuple[float, float, float]:
+        """The errors [m or rad] in the order of the priority, without differences by rounding."""
+        best = self.projection
+        position, roll = round(best.position_error, 9), round(best.roll_error, 9)
+        turn = round(best.rotation_error, 6)
+        if isinstance(self.target, ToolTarget):
+            turn = round(best.pitch_error, 9)
+        if self.priority in (Priority.PITCH, Priority.ORIENTATION):
+            return turn, position, roll
+        return position, turn, roll
+
+
+def nearest_place(
+    planning: ToolPlanning,
+    q: FloatArray,
+    target: DragTarget,
+    branch: AnyBranch | None,
+    priority: Priority,
+) -> NearestPlace:
+    """Return the nearest place to ``target``.
+
+    Args:
+        planning: that of the tool.
+        q: (n,) present joint angles [rad].
+        target: of the tool.
+        branch: the only branch that may be used; None for all.
+        priority: one of ``planning.priorities``.
+    """
+    here, places = planning.kinematics.branch_of(q), []
+    for there, wanted in planning.seen_from(q, target, branch):
+        best = planning.nearest(q, wanted, there, priority)
+        pose = planning.at(best.q)
+        if branch is None:
+            pose = planning.converted(pose, there, here)
+        places.append(NearestPlace(pose, best, there, wanted, priority))
+    return min(places, key=lambda place: place.errors)
+
+
+def unreached(
+    planning: ToolPlanning,
+    q: FloatArray,
+    target: DragTarget,
+    branch: AnyBranch | None,
+    frame: ScriptFrame,
+) -> str:
+    """Return why the tool cannot be at ``target``, by how much, and what it can reach instead.
+
+    Arguments as for `nearest_place`; ``frame``: the frame of the script.
+    """
+    orientation = planning.orientation
+    if isinstance(target, ToolTarget):
+        orientation = f"a pitch of {np.degrees(target.pitch):.1f} deg"
+    where = frame.words(target.position)
+    why = f"The tool {planning.state.tool} cannot be at {where} with {orientation}"
+    if frame.looks_like_metres(target.position):
+        return f"{why}. Lengths are in mm here; a length in metres has its unit, as in `0.3 m`."
+    there, kept = (
+        nearest_place(planning, q, target, branch, priority) for priority in planning.priorities
+    )
+    # Only the roll may be missed.
+    moved = there if there.errors[:2] == (0.0, 0.0) else kept
+
+    def reached(other: DragTarget) -> bool:
+        return planning.joints(q, other, branch) is not None
+
+    works = [*_turns(target, there, moved, frame, reached)]
+    for text, p in near_points(frame, moved.pose.position):
+        if reached(target.moved(frozen(p))):
+            works.append(f"at `{text}` with {planning.orientation}")
+            break
+    remedy = f" It can be {' or '.join(works)}." if works else ""
+    missed = _missed(moved)
+    if not missed:
+        # The nearest posture takes it, but on another branch.
+        return f"{why}: it is reached on the branch {moved.projection.branch} only.{remedy}"
+    return f"{why}: {missed}, because {binding(planning, moved)}.{remedy}"
+
+
+def farthest(
+    planning: ToolPlanning, q: FloatArray, curve: AnyCurve, branch: AnyBranch, frame: ScriptFrame
+) -> str:
+    """Return a sentence on the place of ``curve`` that is farthest out of reach, or ""."""
+    worst: tuple[float, NearestPlace] | None = None
+    for sigma in np.linspace(0.0, 1.0, SAMPLES).tolist():
+        checkpoint()
+        target = planning.target_on(curve, sigma)
+        place = nearest_place(planning, q, target, branch, planning.priorities[1])
+        missed = place.projection.position_error
+        if worst is None or missed > worst[1].projection.position_error:
+            worst = sigma, place
+    assert worst is not None
+    sigma, place = worst
+    missed = place.projection.position_error
+    if missed <= _smallest(place.target):
+        return ""
+    return (
+        f" Farthest out of reach is {frame.words(place.target.position)}, {100.0 * sigma:.0f} % "
+        f"along it: {millimetres(missed)}, because {binding(planning, place)}."
+    )
+
+
+def binding(planning: ToolPlanning, nearest: NearestPlace) -> str:
+    """Return in words what keeps the tool from coming nearer than ``nearest``."""
+    best, chain, causes = nearest.projection, planning.chain, []
+    for axis in _binding_axes(planning, nearest):
+        angle, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
+        limit = math.degrees(lower if angle - lower < upper - angle else upper)
+        name = axis_names(chain.names)[axis]
+        causes.append(f"axis {axis + 1}, {name}, is at its limit of {round(limit, 2):g} deg")
+    if best.axis1:
+        causes.append("axis 1 is in the way")
+    if not causes or best.reach:
+        causes.append(_links(planning, best.q))
+    return " and ".join(causes)
+
+
+def _binding_axes(planning: ToolPlanning, nearest: NearestPlace) -> tuple[int, ...]:
+    """Return the axes (from 0) at a limit without which the tool would come nearer."""
+    best, chain = nearest.projection, planning.chain
+
+    def binds(axis: int) -> bool:
+        wider = np.zeros(chain.n)
+        wider[axis] = WIDER
+        freed = replace(chain, lower=chain.lower - wider, upper=chain.upper + wider)
+        kinematics: Any = planning.kinematics
+        other = replace(planning, kinematics=replace(kinematics, chain=freed))
+        found = other.nearest(best.q, nearest.target, nearest.branch, nearest.priority)
+        return replace(nearest, projection=found).errors < nearest.errors
+
+    # At a corner of the limits, none alone may help.
+    return tuple(axis for axis in best.limits if binds(axis)) or best.limits
+
+
+def millimetres(length: float) -> str:
+    """Return a length [m] in mm: with one decimal from 1 mm, with two digits below."""
+    shown = 1e3 * length
+    return f"{shown:.1f} mm" if shown >= 1.0 else f"{shown:.2g} mm"
+
+
+def near(value: float) -> Iterator[float]:
+    """Yield the multiples of STEP beside ``value``, the nearer one first."""
+    low, high = math.floor(value / STEP), math.ceil(value / STEP)
+    for each in sorted({low, high}, key=lambda n: abs(n * STEP - value)):
+        yield round(each * STEP, 6)
+
+
+def near_points(frame: ScriptFrame, p: FloatArray) -> Iterator[tuple[str, FloatArray]]:
+    """Yield points near ``p`` (3,) [m] in {S}, whose numbers are short: as text, and in {S} [m]."""
+    for point in itertools.product(*(near(each) for each in frame.shown(p).tolist())):
+        place = ", ".join(f"{name}: {each:g}" for name, each in zip(XYZ, point, strict=True))
+        yield f"{{{place}}}", frame.point(np.array(point))
+
+
+def _smallest(target: DragTarget) -> float:
+    """Return the smallest distance [m] that is reported: a posture by search is less exact."""
+    return EXACT if isinstance(target, ToolTarget) else POSITION_WORTH_TELLING
+
+
+def _missed(nearest: NearestPlace) -> str:
+    """Return by how much the target is missed, in words; "" if it is not."""
+    best, missed = nearest.projection, []
+    if best.pitch_error > EXACT:
+        return (
+            f"this pitch is {math.degrees(best.pitch_error):.1f} deg beyond what the arm can have"
+        )
+    if best.position_error > _smallest(nearest.target):
+        missed.append(f"it is {millimetres(best.position_error)} out of reach")
+    if isinstance(nearest.target, ToolTarget):
+        roll = f"the roll is {math.degrees(best.roll_error):.1f} deg beyond what the arm can have"
+        return "".join(missed) or roll
+    if best.rotation_error > (CLEAR_TURN if missed else ANGLE_WORTH_TELLING):
+        missed.append(f"its orientation is {math.degrees(best.rotation_error):.3g} deg off")
+    return " and ".join(missed)
+
+
+def _links(planning: ToolPlanning, q: FloatArray) -> str:
+    """Return how the links keep the tool from coming nearer."""
+    if isinstance(planning.kinematics.branch_of(q), Branch):
+        # The canonical arm is stretched where its third angle is 0.
+        elbow = math.remainder(arm_of(planning.chain).angles(q)[2], math.tau)
+        if abs(elbow) <= LIMIT_SLACK:
+            return "the arm is stretched"
+    return "its links reach no farther"
+
+
+def _turns(
+    target: DragTarget,
+    there: NearestPlace,
+    moved: NearestPlace,
+    frame: ScriptFrame,
+    reached: Reached,
+) -> Iterator[str]:
+    """Yield texts to copy, each with an orientation that the tool can have at ``target``.
+
+    ``there``: the nearest place that keeps the position. ``moved``: the place in the message.
+    """
+    if isinstance(target, ToolTarget):
+        pose, rolled = cast(ToolTarget, there.pose), cast(ToolTarget, moved.pose)
+        for pitch in near(math.degrees(pose.pitch)):
+            if reached(replace(target, pitch=math.radians(pitch))):
+                yield f"with `pitch: {pitch:g}`"
+                break
+        missed = moved.projection.roll_error > EXACT
+        for roll in near(math.degrees(rolled.roll)) if missed else ():
+            if reached(replace(target, roll=math.radians(roll))):
+                yield f"with `roll: {roll:g}`"
+                break
+        return
+    best = there.projection
+    if len(best.q) < 6 or best.position_error > POSITION_WORTH_TELLING:
+        return
+    R = frame.T[:3, :3]
+    roll, pitch, yaw = np.round(np.degrees(so3.to_rpy(R @ best.T[:3, :3])), 1) + 0.0
+    turned = R.T @ so3.from_rpy(*np.radians((roll, pitch, yaw)))
+    if reached(replace(cast(ToolPose, target), R=frozen(turned))):
+        yield f"with `roll: {roll:g}, pitch: {pitch:g}, yaw: {yaw:g}`"

@@ -1,0 +1,345 @@
+"""A joint path that keeps the tool of any arm on a curve of poses, and the search for it.
+
+The path is followed from a posture: places on the curve, one after another. Each is found by
+Newton's method from the one before, and the step is halved until it surely stays on the branch: by
+Weyl's inequality no singular posture lies between two postures whose deciding matrices differ by
+less than the smallest singular value of one. A step is half of that at most. So a path ends before
+a singularity, as a drag does, and never leaps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from katana450.errors import InputError, PathError
+from katana450.extensions.general_arms.pose_equations import PoseEquations, PoseJets, RegularPosture
+from katana450.extensions.general_arms.regularity import WALL
+from katana450.extensions.programs.planning.curves import PoseCurve
+from katana450.extensions.programs.planning.tool_path import at_place, limit_refusal
+from katana450.maths.geometry import so3
+from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.path import CurvePath, joint_derivatives
+from katana450.maths.planning.polyline import PiecewisePolynomial
+from katana450.maths.planning.posture import JointJets
+
+FIRST_STEP: Final = 1.0 / 32.0
+"""[1] Largest step from place to place."""
+
+LEAST_STEP: Final = 2.0**-16
+"""[1] Smallest step; a curve that needs a smaller one comes to an edge of the branch."""
+
+LARGEST_TURN: Final = 0.2
+"""[rad] Maximum turn of a joint in one step."""
+
+BESIDE: Final = 1e-10
+"""[rad] Largest deviation of the polynomials from the exact joints, half-way between two places."""
+
+ROUNDS: Final = 8
+"""Maximum number of rounds that divide pieces whose polynomials deviate by more."""
+
+PARTS: Final = 8
+"""Number of parts of each piece in which the limits are checked."""
+
+TIMED_PIECES, TIMED_PARTS, PIECES_OF_JOIN = 12, 4, 6
+"""The number of pieces with which the timing begins, how many times it must look at the shortest
+piece, and the number of pieces that a join adds to it; see maths/planning/pacing.py."""
+
+LOOKS_PER_PIECE: Final = 16
+"""Number of places at which the timing looks in one of its pieces."""
+
+TAKES_PART: Final = 0.3
+"""[1] Component of a unit motion of the joints from which on a joint is named."""
+
+MOSTLY: Final = 0.7
+"""[1] Part of a lost motion that is a translation, from which on it counts as one."""
+
+SEPTIC: Final = np.array(
+    [
+        [35.0, -15.0, 2.5, -1.0 / 6.0],
+        [-84.0, 39.0, -7.0, 0.5],
+        [70.0, -34.0, 6.5, -0.5],
+        [-20.0, 10.0, -2.0, 1.0 / 6.0],
+    ]
+)
+"""The map from what a cubic lacks of value and three derivatives at 1 to the next four powers."""
+
+
+class Pieces(PiecewisePolynomial):
+    """Polynomials of seventh degree between places of sigma from 0 to 1."""
+
+    def __init__(self, places: FloatArray, terms: FloatArray) -> None:
+        """Take places (K,) and the terms (K - 1, 8, n) of each piece, from 0 of its own part."""
+        self._starts: list[float] = places[:-1].tolist()
+        self._terms = terms
+        self._total = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class PosePath(CurvePath):
+    """The joints that keep the tool on ``curve``.
+
+    At `places` the joint angles and their first three derivatives are exact. Between two places
+    each angle is the polynomial of seventh degree that they define; `CurveSearch` chooses the
+    places so that it is off by less than 1e-10 rad.
+
+    Attributes:
+        chain: the arm with its tool.
+        curve: the path of the tool.
+        places: (K,) rising from 0 to 1.
+        terms: (K - 1, 8, n) coefficients of each piece, from its own start, lowest power first.
+        narrow: places at which joints turn so fast that the timing must look closely.
+    """
+
+    chain: Chain
+    curve: PoseCurve
+    places: FloatArray
+    terms: FloatArray
+    narrow: tuple[float, ...] = ()
+    _pieces: Pieces = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        count = np.size(self.places)
+        places = finite_array(self.places, (count,), "The places of a path")
+        terms = finite_array(self.terms, (count - 1, 8, self.chain.n), "The terms of a path")
+        if count < 2 or places[0] != 0.0 or places[-1] != 1.0 or (np.diff(places) <= 0.0).any():
+            raise InputError("The places of a path must rise from 0 to 1.")
+        object.__setattr__(self, "places", frozen(places))
+        object.__setattr__(self, "terms", frozen(terms))
+        object.__setattr__(self, "_pieces", Pieces(self.places, self.terms))
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The joins of the curve, and the places at which the timing must look closely."""
+        return tuple(sorted({*self.curve.joins, *self.narrow}))
+
+    def joints(self, sigma: Jet) -> JointJets:
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
+        return self._pieces.at(sigma)
+
+    @property
+    def start(self) -> FloatArray:
+        """The joint angles (n,) [rad] at the start."""
+        return frozen(self.terms[0, 0])
+
+    @property
+    def end(self) -> FloatArray:
+        """The joint angles (n,) [rad] at the end."""
+        return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
+
+    def turned_off(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the angles (N,) [rad] between the tool at `q` (N, n) and at ``sigma`` (N,)."""
+        wanted = self.curve.at(Jet.variable(sigma)).T
+        if self.chain.n < 6:
+            axis = self.chain.S[:3, 0]
+            wanted[:, :3, :3] = [
+                so3.exp(axis * angle) @ R
+                for angle, R in zip(q[:, 0].tolist(), wanted[:, :3, :3], strict=True)
+            ]
+        pairs = zip(forward_batch(self.chain, q), wanted, strict=True)
+        return np.array([so3.angle(one[:3, :3], other[:3, :3]) for one, other in pairs])
+
+
+def septics(places: FloatArray, left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the terms (K - 1, 8, n) of the polynomials of seventh degree between ``places`` (K,).
+
+    ``left``, ``right``: (4, K - 1, n) value and three derivatives at the ends of each piece.
+    """
+    h = np.diff(places)[:, None]
+    powers = h ** np.arange(8.0)[:, None, None]
+    factors = np.array((1.0, 1.0, 2.0, 6.0))[:, None, None]
+    low = left * powers[:4] / factors
+    cubic = low[0] + low[1] + low[2] + low[3]
+    lacking = np.stack(
+        (
+            right[0] - cubic,
+            h * right[1] - (low[1] + 2.0 * low[2] + 3.0 * low[3]),
+            h**2 * right[2] - (2.0 * low[2] + 6.0 * low[3]),
+            h**3 * right[3] - 6.0 * low[3],
+        )
+    )
+    high = np.einsum("ij,jkn->ikn", SEPTIC, lacking)
+    found: FloatArray = (np.concatenate((low, high)) / powers).transpose(1, 0, 2)
+    return found
+
+
+class LostPathError(PathError):
+    """A curve that an arm can follow only in part.
+
+    Attributes:
+        sigma: the place up to which it can.
+    """
+
+    def __init__(self, text: str, point: Sequence[float], sigma: float) -> None:
+        """Name ``point`` in ``text``."""
+        super().__init__(text, point)
+        self.sigma = sigma
+
+
+class _Place(NamedTuple):
+    """A place on the curve, and the posture there."""
+
+    sigma: float
+    posture: RegularPosture
+
+
+@dataclass(frozen=True, eq=False)
+class CurveSearch:
+    """The search for the path of one arm along one curve.
+
+    Attributes:
+        equations: those of the arm.
+        curve: the curve of its tool.
+        q: (n,) joint angles at its start [rad].
+        slope: (k,) how far the locked joints turn along the whole curve [rad].
+    """
+
+    equations: PoseEquations
+    curve: PoseCurve
+    q: FloatArray
+    slope: FloatArray
+
+    def path(self) -> PosePath:
+        """Return the path.
+
+        Raises PathError where the arm cannot follow the curve: the place, why, and what to do.
+        """
+        places = self._places()
+        found = self._exact(
+            [each.sigma for each in places], np.array([each.posture.q for each in places])
+        )
+        self._refuse_limits(found)
+        return found
+
+    def _places(self) -> list[_Place]:
+        here = self._at(0.0, self.q)
+        if here is None or here.posture.least < WALL:
+            raise self._refusal(0.0, None if here is None else here.posture)
+        places, step, rate = [here], FIRST_STEP, np.zeros(len(self.q))
+        marks = [*self.curve.joins, 1.0]
+        while marks:
+            checkpoint()
+            here, end = places[-1], marks[0]
+            # No sliver is left before a mark.
+            sigma = end if here.sigma + 1.25 * step >= end else here.sigma + step
+            there = self._at(sigma, here.posture.q + (sigma - here.sigma) * rate)
+            if there is not None and self._leads(here.posture, there.posture):
+                rate = (there.posture.q - here.posture.q) / (sigma - here.sigma)
+                places.append(there)
+                step = min(2.0 * step, FIRST_STEP)
+                if sigma == end:
+                    del marks[0]
+                continue
+            step = 0.5 * min(step, sigma - here.sigma)
+            if step < LEAST_STEP:
+                raise self._refusal(here.sigma, here.posture)
+        return places
+
+    @staticmethod
+    def _leads(here: RegularPosture, there: RegularPosture) -> bool:
+        """Return whether a step stays on the branch, clear of its edge, and turns no joint far."""
+        return (
+            there.least >= WALL
+            and float(np.abs(there.q - here.q).max()) <= LARGEST_TURN
+            and float(np.linalg.norm(there.matrix - here.matrix)) <= 0.5 * here.least
+        )
+
+    def _at(self, sigma: float, guess: FloatArray) -> _Place | None:
+        """Return the place with the exact joints, from a guess (n,) of them; None without."""
+        q = guess.copy()
+        q[list(self.equations.locked)] = self._given(sigma)
+        found = self.equations.posture(q, self.curve.at(Jet.variable(sigma)).T[0])
+        return None if found is None else _Place(sigma, found)
+
+    def _given(self, sigma: float) -> FloatArray:
+        given: FloatArray = self.q[list(self.equations.locked)] + sigma * self.slope
+        return given
+
+    def _exact(self, sigma: list[float], q: FloatArray) -> PosePath:
+        """Return the path through the joints `q` (K, n) at ``sigma`` and more places."""
+        places = np.array(sigma)
+        for _ in range(ROUNDS):
+            checkpoint()
+            found = self._through(places, q)
+            middle = 0.5 * (places[:-1] + places[1:])
+            between = joint_derivatives(found, middle)[0]
+            exact = self._derivatives(middle, between)[0]
+            bad = np.abs(exact - between).max(axis=1) > BESIDE
+            if not bad.any():
+                break
+            order = np.argsort(np.concatenate((places, middle[bad])))
+            places = np.concatenate((places, middle[bad]))[order]
+            q = np.concatenate((q, exact[bad]))[order]
+        else:
+            found = self._through(places, q)
+        return found
+
+    def _through(self, places: FloatArray, q: FloatArray) -> PosePath:
+        # At a join the third derivative leaps: each piece takes that of its own side.
+        ends = np.concatenate((places[:-1], np.nextafter(places[1:], 0.0)))
+        d = self._derivatives(ends, np.concatenate((q[:-1], q[1:])))
+        count = len(places) - 1
+        terms = septics(places, d[:, :count], d[:, count:])
+        shortest = float(np.diff(places).min())
+        wanted = TIMED_PARTS / (LOOKS_PER_PIECE * shortest)
+        more = int(np.ceil((wanted - TIMED_PIECES) / PIECES_OF_JOIN)) - len(self.curve.joins)
+        narrow = np.linspace(0.0, 1.0, more + 2)[1:-1] if more > 0 else np.empty(0)
+        chain = self.equations.chain
+        return PosePath(chain, self.curve, frozen(places), frozen(terms), tuple(narrow.tolist()))
+
+    def _derivatives(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the exact joints near `q` (N, n) at ``sigma`` and three derivatives, (4, N, n)."""
+        pose: PoseJets = self.curve.at(Jet.variable(sigma))
+        zeros = np.zeros_like(sigma)
+        starts = self.q[list(self.equations.locked)].tolist()
+        given = [
+            Jet(start + slope * sigma, zeros + slope, zeros, zeros)
+            for start, slope in zip(starts, self.slope.tolist(), strict=True)
+        ]
+        joints = self.equations.solved(q, given, pose)
+        return np.stack([np.stack(each.derivatives()) for each in joints], axis=2)
+
+    def _refuse_limits(self, path: PosePath) -> None:
+        """Raise PathError where an axis exceeds its limit."""
+        edges = np.linspace(path.places[:-1], path.places[1:], PARTS, endpoint=False).T.ravel()
+        sigma = np.append(edges, 1.0)
+        q, qd = joint_derivatives(path, sigma)[:2]
+        refusal = limit_refusal(self.equations.chain, sigma, q, qd)
+        if refusal is not None:
+            place, why = refusal
+            remedy = "Shift the path, give it another orientation, or begin on another branch."
+            raise LostPathError(f"{why} {remedy}", self._point(place), place)
+
+    def _refusal(self, sigma: float, near: RegularPosture | None) -> LostPathError:
+        """Return the refusal of a curve that leads on from ``near``, at ``sigma``, to an edge."""
+        at, point = at_place(sigma), self._point(sigma)
+        if near is None:
+            return LostPathError(f"The tool is not at the start of the path, {at}.", point, sigma)
+        u, _, vt = np.linalg.svd(near.matrix)
+        last = min(near.matrix.shape) - 1
+        taking_part = np.flatnonzero(np.abs(vt[last]) > TAKES_PART).tolist()
+        axes = [self.equations.free[k] + 1 for k in taking_part]
+        if 1 not in axes and float(np.linalg.norm(u[-3:, last])) > MOSTLY:
+            text = (
+                f"The path leaves the reach of the arm {at}: its links come in line there. Keep "
+                "the path nearer to the arm, or give it another orientation."
+            )
+        else:
+            *first, end = map(str, axes)
+            named = f"axes {', '.join(first)} and {end}" if first else f"axis {end}"
+            text = (
+                f"The path comes to a singularity {at}: {named} can turn together there without "
+                "moving the tool, and would have to turn at once. Lead the path around that "
+                "place, give it another orientation, or use `move`, which keeps to no line."
+            )
+        return LostPathError(text, point, sigma)
+
+    def _point(self, sigma: float) -> list[float]:
+        return [float(np.asarray(each.c0)) for each in self.curve.at(Jet.variable(sigma))[:3]]

@@ -1,0 +1,1 @@
+"""Compilation of scripts to programs, their execution and simulation."""

@@ -1,0 +1,230 @@
+"""A program: a script that is planned completely, for one arm in one situation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from katana450.arm.control.state import State
+from katana450.caching import cached_property
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import FollowPlan, SetSpeed, Task, expected_time
+from katana450.extensions.programs.building.conditions import ProgramTime
+from katana450.extensions.programs.building.located_step import (
+    Conditional,
+    LocatedStep,
+    count,
+    numbered,
+)
+from katana450.extensions.programs.building.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.language.step_target import ScriptFrame
+from katana450.extensions.programs.run.compiler import Compiler, Report
+from katana450.extensions.programs.run.task_list import ConditionalJump
+from katana450.extensions.programs.script.script import Script
+from katana450.extensions.programs.steps.settings_steps import WaitUntil
+from katana450.maths.geometry.arrays import FloatArray
+
+
+class Alternatives(NamedTuple):
+    """The steps of an ``if``, by their indices in the script.
+
+    Attributes:
+        number: the step ``if``.
+        otherwise: the first step of ``else``; those before it belong to ``then``.
+        end: the first step after both.
+    """
+
+    number: int
+    otherwise: int
+    end: int
+
+
+class ExpectedTask(NamedTuple):
+    """A task of the predicted run: its index, and when it begins and ends at which speed.
+
+    Attributes:
+        number: its index.
+        begin, end: expected times since the run began [s].
+        speed: fraction of full speed.
+    """
+
+    number: int
+    begin: float
+    end: float
+    speed: float
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A compiled script.
+
+    Attributes:
+        name: name of the script.
+        speed: speed of all motions, as a fraction of full speed.
+        start: (5,) posture [rad] from which the program must start.
+        tasks: the actions in the order of their execution. Those of an ``if`` jump forward. Steps
+            after an ``if`` are there once for each situation in which they are planned.
+        steps: number of steps of the script, with those of all alternatives.
+        alternatives: the alternatives of each ``if``, in their order.
+        first: index of the task with which a run begins.
+    """
+
+    name: str
+    speed: float
+    start: FloatArray
+    tasks: tuple[Task, ...]
+    steps: int
+    alternatives: tuple[Alternatives, ...] = ()
+    first: int = 0
+
+    def next(self, number: int) -> tuple[int, ...]:
+        """Return the tasks that may follow the task ``number``.
+
+        The number of tasks stands for the end.
+        """
+        task = self.tasks[number]
+        if isinstance(task.action, ConditionalJump):
+            return tuple(dict.fromkeys((task.action.then, task.action.otherwise)))
+        return (number + 1 if task.after is None else task.after,)
+
+    def next_in(self, number: int, state: State, elapsed: float) -> int:
+        """Return the task that follows the task ``number`` in ``state``.
+
+        ``elapsed``: time since the program began [s].
+        """
+        action = self.tasks[number].action
+        if isinstance(action, ConditionalJump):
+            return action.then if action.holds(state, elapsed) else action.otherwise
+        return self.next(number)[0]
+
+    @cached_property
+    def duration(self) -> float:
+        """Expected duration [s] of the longest possible run, at the speeds of the program."""
+        return self.time_from(self.first, 1.0)
+
+    def time_from(
+        self, number: int, speed: float, left: float | None = None, allowed: float = 1.0
+    ) -> float:
+        """Return the expected time [s] from the task ``number`` to the end, of the longest run.
+
+        This is the one clock of a program: of its preview, its list of steps and its time left.
+
+        Args:
+            number: index of the task.
+            speed: fraction of full speed, until a task sets another.
+            left: expected time to the end of the task itself [s], if it has begun.
+            allowed: maximum fraction of full speed that a task may set.
+        """
+        latest = {number: (0.0, speed)}
+        for index in range(number, len(self.tasks)):
+            if index not in latest:
+                # It belongs to an alternative that is not taken.
+                continue
+            end, speed = latest[index]
+            action = self.tasks[index].action
+            if isinstance(action, SetSpeed):
+                speed = min(action.scale(self.speed), allowed)
+            end += expected_time(action, speed) if left is None or index > number else left
+            for following in self.next(index):
+                if following not in latest or end > latest[following][0]:
+                    latest[following] = end, speed
+        return latest[len(self.tasks)][0]
+
+    @property
+    def predicted(self) -> tuple[int, ...]:
+        """The tasks that are executed if all is as predicted, in their order."""
+        return tuple(each.number for each in self.schedule)
+
+    @cached_property
+    def schedule(self) -> tuple[ExpectedTask, ...]:
+        """The predicted tasks in their order, with their expected times."""
+        found: list[ExpectedTask] = []
+        number, elapsed, speed = self.first, 0.0, self.speed
+        while number < len(self.tasks):
+            action = self.tasks[number].action
+            if isinstance(action, SetSpeed):
+                speed = action.scale(self.speed)
+            begin, elapsed = elapsed, elapsed + expected_time(action, speed)
+            found.append(ExpectedTask(number, begin, elapsed, speed))
+            if isinstance(action, ConditionalJump):
+                holds = action.predicted
+                if isinstance(action.condition, ProgramTime):
+                    holds = action.condition.has(elapsed)
+                number = action.then if holds else action.otherwise
+            else:
+                number = self.next(number)[0]
+        return tuple(found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on the times of the script that its plans cannot keep."""
+        return tuple(
+            f"Line {task.line}, {task.name}: {task.action.note}"
+            for task in self.tasks
+            if isinstance(task.action, FollowPlan) and task.action.note
+        )
+
+    @property
+    def conditions(self) -> tuple[Task, ...]:
+        """The tasks that wait for a condition."""
+        return tuple(task for task in self.tasks if isinstance(task.action, WaitUntil))
+
+    @property
+    def rehearsed(self) -> Program:
+        """The program for a simulation in which nobody acts: all conditions count as true."""
+        tasks = [
+            replace(task, action=replace(task.action, assumed=True))
+            if isinstance(task.action, WaitUntil)
+            else task
+            for task in self.tasks
+        ]
+        return replace(self, tasks=tuple(tasks))
+
+
+def compiled(
+    script: Script,
+    plan_context: PlanContext,
+    state: State,
+    speed: float = 1.0,
+    report: Report = lambda _: None,
+    first_step: int = 0,
+) -> Program:
+    """Return ``script`` compiled to a program that starts from ``state``.
+
+    Args:
+        script: the script.
+        plan_context: the arm and its environment.
+        state: the state before the program: posture, fingers, tool frame, scene and water.
+        speed: fraction of the speed that the script sets.
+        report: function that is called with each stage of the planning as it begins.
+        first_step: index of the first step of the program, see ``Compiler.tasks``.
+
+    Raises:
+        ScriptError: a step is not possible; the error has its line.
+        InputError: the script needs an arm without gripper, and this arm has one.
+        CancelledError: the planning was cancelled.
+    """
+    if script.bare and plan_context.arm.gripper.moves:
+        raise InputError(
+            f"{script.name} needs an arm without its gripper (`gripper: none`). This server was "
+            "started with the gripper."
+        )
+    frame = ScriptFrame.of(plan_context.T_base_shoulder, in_base=script.in_base)
+    builder = PlanBuilder(plan_context, state, frame)
+    builder.state = builder.standing(state.setpoint)
+    tasks = Compiler(script, builder, report).tasks(first_step)
+    total_speed = script.speed * speed
+    steps, alternatives = count(script.steps), tuple(_alternatives(script.steps, 0))
+    return Program(script.name, total_speed, state.setpoint, tasks, steps, alternatives)
+
+
+def _alternatives(steps: Sequence[LocatedStep], first: int) -> Iterator[Alternatives]:
+    """Yield the alternatives of each ``if`` of ``steps``, which are numbered from ``first``."""
+    for number, located in numbered(steps, first):
+        step = located.step
+        if isinstance(step, Conditional):
+            otherwise = number + 1 + count(step.then)
+            yield Alternatives(number, otherwise, otherwise + count(step.otherwise))
+            yield from _alternatives(step.then, number + 1)
+            yield from _alternatives(step.otherwise, otherwise)

@@ -1,0 +1,229 @@
+"""Execution of a program as a pure fold over the states of the arm, on any clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.messages import finding_text, part
+from katana450.arm.control.state import Reason, State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import (
+    ACTION_TIMEOUT,
+    FollowPlan,
+    SetSpeed,
+    expected_time,
+)
+from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.task_list import ConditionalJump
+from katana450.extensions.programs.steps.grip_until import CloseUntil
+from katana450.server.api.answers import Progress
+
+FULL_SPEED = SetSpeed(1.0)
+"""The speed before any task."""
+
+
+class Phase(Enum):
+    """The phase of a run. Only RUNNING can change."""
+
+    RUNNING = "running"
+    DONE = "done"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Run:
+    """The progress of a run.
+
+    Attributes:
+        t: time of the last step [s].
+        number: index of the current task, from 0.
+        started: whether the commands of the task were given.
+        waited: time since then, without pauses [s].
+        blocked: time for which the arm has been blocked at rest [s].
+        phase: phase of the run.
+        why: reason of an early end.
+        single: whether the run pauses after the current step.
+        pauses: indices of the steps before which the run pauses.
+        tau: place on the plan of the current task that the arm reached last [s]; 0 on no plan.
+        speed: the last speed that a task has set.
+        elapsed: time since the run began, with pauses [s].
+        choices: index of each step ``if`` so far, and whether its condition held.
+        held: whether the fingers held an object at the last step.
+    """
+
+    t: float
+    number: int = 0
+    started: bool = False
+    waited: float = 0.0
+    blocked: float = 0.0
+    phase: Phase = Phase.RUNNING
+    why: str = ""
+    single: bool = False
+    pauses: frozenset[int] = frozenset()
+    tau: float = 0.0
+    speed: SetSpeed = FULL_SPEED
+    elapsed: float = 0.0
+    choices: tuple[tuple[int, bool], ...] = ()
+    held: bool = False
+
+
+def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple[cmd.Command, ...]]:
+    """Return the run after ``state``, and the commands to give now.
+
+    ``state`` must include all earlier commands. ``t`` is the present time [s] on the clock of
+    ``run.t``: an arm at rest publishes no new states, so the time of its newest state stands still.
+    """
+    if run.phase is not Phase.RUNNING:
+        return run, ()
+    dt = t - run.t
+    run = replace(run, t=t, tau=_tau(program, run, state), elapsed=run.elapsed + dt)
+    if state.stopped is not None:
+        return replace(run, phase=Phase.STOPPED, why="STOP was pressed."), ()
+    if any(finding.reason is Reason.INTERNAL for finding in state.findings):
+        return replace(
+            run, phase=Phase.FAILED, why="The arm's controller reported an internal error."
+        ), ()
+    if state.paused:
+        return run, ()
+    task = program.tasks[run.number]
+    if not run.started:
+        speed = task.action if isinstance(task.action, SetSpeed) else run.speed
+        run = replace(run, started=True, waited=0.0, blocked=0.0, speed=speed)
+        return run, task.action.commands(program.speed)
+    stands = state.blocked and state.motion.at_rest
+    run = replace(run, waited=run.waited + dt, blocked=run.blocked + dt if stands else 0.0)
+    try:
+        if run.blocked > ACTION_TIMEOUT:
+            raise InputError(f"The path is still blocked: {_met(state)} would collide.")
+        if run.held:
+            _check_slip(state)
+        done = task.action.done(state, run.waited)
+        more: tuple[cmd.Command, ...] = ()
+        if not done and isinstance(task.action, CloseUntil):
+            more = task.action.correction(state)
+    except InputError as error:
+        why = f"Line {task.line}, {task.name}: {error}"
+        return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
+    run = replace(run, held=state.held is not None)
+    if not done:
+        return run, more
+    number = program.next_in(run.number, state, run.elapsed)
+    if isinstance(task.action, ConditionalJump):
+        run = replace(run, choices=(*run.choices, (task.number, number == task.action.then)))
+    if number == len(program.tasks):
+        return replace(run, phase=Phase.DONE), ()
+    after = replace(run, number=number, started=False, tau=0.0)
+    step_after = program.tasks[after.number].number
+    if step_after != task.number and (run.single or step_after in run.pauses):
+        return replace(after, single=False), (cmd.Pause(),)
+    return after, ()
+
+
+def _tau(program: Program, run: Run, state: State) -> float:
+    """Return the place [s] on the plan of the current task; the last one if it was left."""
+    action, following = program.tasks[run.number].action, state.following
+    if not run.started or following is None or not isinstance(action, FollowPlan):
+        return run.tau
+    return following.tau if following.plan is action.plan else run.tau
+
+
+def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
+    """Return the expected time until ``run`` ends [s], without pauses and awaited conditions.
+
+    Of alternatives the longer one counts. ``allowed`` is the maximum fraction of full speed for the
+    tasks to come.
+    """
+    if run.phase is not Phase.RUNNING:
+        return 0.0
+    if not run.started:
+        # A command for the speed may still be on its way to the arm.
+        speed = min(run.speed.scale(program.speed), allowed)
+        return program.time_from(run.number, speed, allowed=allowed)
+    action, speed = program.tasks[run.number].action, state.speed
+    left = expected_time(action, speed)
+    if isinstance(action, FollowPlan):
+        rest = 1.0 - action.fraction(state, run.waited)
+        left = min(left, rest * action.plan.duration_at(speed))
+    else:
+        left = max(left - run.waited, 0.0)
+    return program.time_from(run.number, speed, left, allowed)
+
+
+def skipped(program: Program, run: Run) -> tuple[int, ...]:
+    """Return the steps, from 1, of the alternatives that ``run`` has not taken."""
+    held = dict(run.choices)
+    return tuple(
+        step + 1
+        for number, otherwise, end in program.alternatives
+        if number in held
+        for step in (range(otherwise, end) if held[number] else range(number + 1, otherwise))
+    )
+
+
+def _check_slip(state: State) -> None:
+    """Raise InputError if the object that the fingers held slides, or has slipped out of them."""
+    for finding in state.findings:
+        if finding.reason in (Reason.SLIDING, Reason.SLIPPED):
+            raise InputError(f"{finding_text(finding)}.")
+
+
+def _met(state: State) -> str:
+    """Return the two parts that would collide."""
+    met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
+    return " and ".join(map(part, met[0])) if met and met[0] else "something"
+
+
+def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:
+    """Return the run as ended by a person, and the commands that bring the arm to rest."""
+    if run.phase is not Phase.RUNNING:
+        return run, ()
+    return replace(run, phase=Phase.STOPPED, why=why), (cmd.Hold(), cmd.Resume())
+
+
+def ended(run: Run, phase: Phase, why: str) -> Run:
+    """Return the run with ``phase`` and ``why``; a run that has ended stays unchanged."""
+    return run if run.phase is not Phase.RUNNING else replace(run, phase=phase, why=why)
+
+
+def stepping(run: Run) -> tuple[Run, tuple[cmd.Command, ...]]:
+    """Return the run that continues to the end of the step, and its commands."""
+    return replace(run, single=True), (cmd.Resume(),)
+
+
+def task_fraction(program: Program, run: Run, state: State) -> float:
+    """Return the completed fraction of the current task, from 0 to 1."""
+    if run.started and run.phase is Phase.RUNNING:
+        return program.tasks[run.number].action.fraction(state, run.waited)
+    return float(run.phase is Phase.DONE)
+
+
+def progress(
+    program: Program, run: Run, state: State, by: str = "", allowed: float = 1.0
+) -> Progress:
+    """Return the progress of ``run`` in ``state``.
+
+    ``by`` is the name of its owner, and ``allowed`` the maximum fraction of full speed.
+    """
+    task = program.tasks[run.number]
+    status = run.phase.value
+    if run.phase is Phase.RUNNING and state.paused:
+        status = "paused"
+    elif run.phase is Phase.RUNNING and state.blocked:
+        status = "blocked"
+    return Progress(
+        name=program.name,
+        by=by,
+        status=status,
+        step=task.number + 1,
+        steps=program.steps,
+        line=task.line,
+        task=task.name,
+        fraction=task_fraction(program, run, state),
+        seconds=program.duration,
+        seconds_left=seconds_left(program, run, state, allowed),
+        why=run.why or " ".join(program.notes),
+        skipped=skipped(program, run),
+    )

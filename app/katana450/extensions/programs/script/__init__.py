@@ -1,0 +1,1 @@
+"""Scripts: their parts, files and scenes."""

@@ -1,0 +1,181 @@
+"""A script: its name, description, poses and steps, each with its line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from katana450.arm.control.commands import MIN_SPEED
+from katana450.extensions.programs.building.located_step import LocatedStep
+from katana450.extensions.programs.language.attached_files import FILE
+from katana450.extensions.programs.language.declaration import Declared, Kind, record
+from katana450.extensions.programs.language.fields import Fields
+from katana450.extensions.programs.language.kinds import (
+    RAW,
+    TEXT,
+    any_of,
+    choice,
+    mapping,
+    number,
+)
+from katana450.extensions.programs.language.places import PLACE
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import ScriptError, YamlValue
+from katana450.extensions.programs.language.source import read as read_text
+from katana450.extensions.programs.script.blocks import DEFINED, INNER_STEPS
+from katana450.extensions.programs.script.measures import MEASURES
+from katana450.extensions.programs.script.script_scene import SCENE, ScriptScene
+from katana450.extensions.programs.script.vocabulary import FILES, FRAME, context_of
+from katana450.extensions.programs.steps.settings_steps import Tool
+
+MAX_NAME_LENGTH = 40
+"""Maximum number of characters of a name."""
+
+
+def _name(value: YamlValue, _context: ScriptContext) -> str:
+    name = TEXT(value)
+    if len(name) > MAX_NAME_LENGTH or not name.isprintable():
+        raise value.wrong(f"A name has at most {MAX_NAME_LENGTH} characters, all on one line.")
+    return name
+
+
+def _tool(value: YamlValue, context: ScriptContext) -> LocatedStep:
+    return LocatedStep(Tool.read(value, context), value.line, value.column)
+
+
+ANY_NUMBER = number(-1e9, 1e9, about="Number")
+
+
+@dataclass(frozen=True)
+class Expectation(Declared):
+    """Bounds of a measure, both included."""
+
+    noun = "a bound"
+
+    at_least: Annotated[float, ANY_NUMBER] = -math.inf
+    at_most: Annotated[float, ANY_NUMBER] = math.inf
+
+
+BOUNDS = record(Expectation)
+
+
+def _expected(value: YamlValue, _context: ScriptContext) -> dict[str, tuple[float, float]]:
+    """Read the bounds of measures, by their names."""
+    fields = Fields(value, "what is expected")
+    bounds = {name: fields.take(name, BOUNDS, None) for name in MEASURES}
+    fields.done()
+    return {name: (b.at_least, b.at_most) for name, b in bounds.items() if b is not None}
+
+
+def _names(about: str, kind: Kind[object] | None = None) -> Kind[YamlValue]:
+    """Return the kind of a mapping of names, which ``context_of`` has read already."""
+    values = {} if kind is None else {"additionalProperties": kind.schema}
+    return Kind(RAW.read, {"type": "object", "description": about, **values})
+
+
+@dataclass(frozen=True)
+class Script(Declared):
+    """Lengths are in mm, angles in deg, times in s.
+
+    Attributes:
+        name: name, for display.
+        about: description, for display.
+        gripper: ``none`` if it needs an arm without its gripper.
+        frame: frame of its points, ``shoulder`` or ``base``.
+        tool: the step that selects the tool frame of its points; None to keep it.
+        speed: fraction of full speed.
+        scene: the scene that it needs; None for any.
+        own_steps: the steps in their order, all repetitions written out.
+        expected: minimum and maximum of measures, by name.
+
+    The steps know its other names already.
+    """
+
+    noun = "a script"
+
+    own_steps: Annotated[tuple[LocatedStep, ...], INNER_STEPS.named("steps")]
+    name: Annotated[
+        str,
+        Kind(_name, {**TEXT.schema, "maxLength": MAX_NAME_LENGTH}).about("Name of the script"),
+    ] = "Script"
+    about: Annotated[str, TEXT.about("Description for people")] = ""
+    gripper: Annotated[
+        str, choice("fitted", "none").about("none: for an arm without its gripper")
+    ] = "fitted"
+    frame: Annotated[
+        str,
+        FRAME.about("Frame of all points: shoulder, the {S} of the paper, or base, on the table"),
+    ] = "shoulder"
+    tool: Annotated[
+        LocatedStep | None,
+        Kind(_tool, TEXT.schema).about("Tool frame of all points: tcp, grasp or flange"),
+    ] = None
+    speed: Annotated[float, number(MIN_SPEED, 1.0, about="Fraction of full speed")] = 1.0
+    scene: Annotated[ScriptScene | None, SCENE] = None
+    include: Annotated[
+        YamlValue | None,
+        Kind(RAW.read, any_of("", FILE.schema, FILES.schema)).about(
+            "Files in the folder of the script, from which `let`, `poses` and `define` are taken"
+        ),
+    ] = None
+    let: Annotated[YamlValue | None, _names("Named values; later ones may use earlier ones")] = None
+    poses: Annotated[
+        YamlValue | None,
+        _names("Named places; later ones may use the names of earlier ones", PLACE),
+    ] = None
+    define: Annotated[
+        YamlValue | None,
+        _names("Named steps with parameters; each may call those above it", DEFINED),
+    ] = None
+    expected: Annotated[
+        Mapping[str, tuple[float, float]],
+        Kind(
+            _expected,
+            mapping(
+                "Bounds on measures; a simulation that misses one ends with status 1",
+                "",
+                {name: BOUNDS.about(about).schema for name, about in MEASURES.items()},
+            ),
+        ).named("expect"),
+    ] = field(default_factory=dict)
+
+    @property
+    def bare(self) -> bool:
+        """True if it needs an arm without its gripper."""
+        return self.gripper == "none"
+
+    @property
+    def in_base(self) -> bool:
+        """True if its points are in the base frame, not in {S}."""
+        return self.frame == "base"
+
+    @property
+    def steps(self) -> tuple[LocatedStep, ...]:
+        """The steps, the first of which may select the tool frame."""
+        return self.own_steps if self.tool is None else (self.tool, *self.own_steps)
+
+
+def parse(text: str) -> Script:
+    """Return ``text`` as a script. Raises ScriptError with all problems, line by line."""
+    value = read_text(text)
+    names = Fields(value, Script.noun)
+    context = context_of(names)
+    try:
+        script = Script.read(value, context)
+    except ScriptError as error:
+        problems = dict.fromkeys((*names.problems, *error.problems))
+        raise ScriptError(tuple(problems)) from error
+    if names.problems:
+        raise ScriptError(tuple(names.problems))
+    return script
+
+
+def is_script(text: str) -> bool:
+    """Return whether ``text`` is meant as a script, because it has steps."""
+    try:
+        value = read_text(text)
+    except ScriptError:
+        return False
+    return value.kind == "mapping" and any(name.held == "steps" for name, _ in value.fields)

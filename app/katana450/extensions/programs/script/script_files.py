@@ -1,0 +1,126 @@
+"""Scripts in folders: the library of the package, and the folder of a person."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from katana450.atomic import write_files, writer_of
+from katana450.errors import ConfigurationError, InputError
+from katana450.extensions import programs
+from katana450.extensions.programs.language.attached_files import attached
+from katana450.extensions.programs.language.source import MAX_BYTES
+
+LIBRARY = Path(programs.__file__).parent / "library"
+"""Folder of the scripts that come with the package."""
+
+ENDING = ".yaml"
+"""Suffix of script files."""
+
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
+"""Pattern of the names under which scripts can be saved."""
+
+MAX_SCRIPTS = 200
+"""Maximum number of scripts of a folder that are listed, in order of their names."""
+
+
+class Scripts:
+    """The scripts of the library and, if given, of one folder."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """Use ``folder`` too. Raises ConfigurationError if it is not a folder."""
+        if folder is not None and not folder.is_dir():
+            raise ConfigurationError(
+                f"--programs needs a folder of scripts; {folder} is not a folder."
+            )
+        self._folder = folder
+
+    @property
+    def keeps(self) -> bool:
+        """True if there is a folder to save in."""
+        return self._folder is not None
+
+    @property
+    def changed(self) -> int:
+        """Time of the last change in the folder [ns]; 0 without a folder."""
+        try:
+            return 0 if self._folder is None else self._folder.stat().st_mtime_ns
+        except OSError:
+            return 0
+
+    @property
+    def paths(self) -> Mapping[str, Path]:
+        """Paths of the scripts by name; those of the folder come first and have precedence."""
+        found = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
+        if self._folder is not None:
+            own = sorted(self._folder.glob(f"*{ENDING}"))[:MAX_SCRIPTS]
+            found = {**{path.stem: path for path in own}, **found}
+        return found
+
+    def text(self, name: str) -> str:
+        """Return the text of the script ``name``, with those of all files that it names.
+
+        The files are in the folder of the script or below. Raises InputError if a file cannot be
+        read.
+        """
+        path = self.paths.get(name)
+        if path is None:
+            raise InputError(f"The script {name!r} no longer exists.")
+        return script_text(path)
+
+    def save(self, name: str, text: str) -> Path:
+        """Save a new script in the folder and return its path. Raises InputError if that fails."""
+        if self._folder is None:
+            raise InputError("This server has no folder for scripts: keep the script elsewhere.")
+        path = self._folder / file_name(name)
+        if path.exists():
+            raise InputError(f"A script {name!r} exists already. Choose another name.")
+        write_files({path: writer_of(text.encode())})
+        return path
+
+
+def file_name(name: str) -> str:
+    """Return the file name of the script ``name``. Raises InputError for an invalid name."""
+    if not NAME.fullmatch(name):
+        raise InputError("The name of a script may have up to 40 letters, digits, blanks, - and _.")
+    return f"{name}{ENDING}"
+
+
+def _text_of(path: Path) -> str:
+    """Return the text of a script file. Raises InputError if it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1).decode("utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text: {error.reason}.") from error
+
+
+def script_text(path: Path) -> str:
+    """Return the text of a script file, with those of all files that it names.
+
+    Lines keep their numbers. Raises InputError if a file cannot be read.
+    """
+    return attached(_text_of(path), files_in(path.parent))
+
+
+def files_in(folder: Path) -> Callable[[str], str]:
+    """Return a function that returns the text of a file in ``folder`` or below, by its name.
+
+    It raises InputError for a file that cannot be read, or that a link leads out of the folder.
+    """
+    root = folder.resolve()
+
+    def opened(name: str) -> str:
+        found = (root / name).resolve()
+        if not found.is_relative_to(root):
+            raise InputError(f"{name} is not in the folder of the script.")
+        return _text_of(found)
+
+    return opened
+
+
+def _shown(path: Path) -> str:
+    return path.stem.replace("_", " ").capitalize()

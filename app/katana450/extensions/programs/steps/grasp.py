@@ -1,0 +1,349 @@
+"""The program step ``grasp``: plan how the fingers take an object where it stands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from katana450.arm.control.messages import part
+from katana450.arm.control.pouring import is_vessel
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import Reason, State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import MoveFingers, UseTool
+from katana450.extensions.programs.building.carry import APPROACHES
+from katana450.extensions.programs.building.conditions import Held
+from katana450.extensions.programs.building.finger_planning import with_fingers
+from katana450.extensions.programs.building.located_step import Conditional
+from katana450.extensions.programs.building.plan_builder import GraspInfo, PlanBuilder
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
+from katana450.extensions.programs.planning.approach import ABOVE, DOWN, FRONT, LOW, Approach
+from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.planning.clearance import SweptClearance
+from katana450.maths.planning.plan import JOIN_TOLERANCE, MARGIN, apart
+
+HEIGHT_FRACTIONS = {FRONT: (0.78, 0.95), ABOVE: (0.5, 0.7, 0.9, 1.05, 1.2)}
+"""[1] Heights of the grasp as fractions of the object's height, tried in this order. From the front
+the palm has room over the table only above the middle of the object.
+"""
+
+MIN_HEIGHT = 0.012
+"""[m] Minimum height of an object: the tips stay MARGIN over what it stands on, at most a step of
+``tip_distances`` more, and cover at least 4 mm of it.
+"""
+
+MAX_DISTANCE, DISTANCE_STEP = 0.03, 0.002
+"""[m] How far the tool moves away from an object, at most and by which steps, until the palm has
+room.
+"""
+
+PALM_CLEARANCE = MARGIN + 5e-4
+"""[m] Minimum distance between the palm and the grasped object."""
+
+JOINT_ROOM = math.radians(2.0)
+"""[rad] Distance to the joint limits that a grasp keeps, if one of its pitches can."""
+
+
+class Grip(NamedTuple):
+    """The place of a grasp on an object.
+
+    Attributes:
+        height: over the underside of the object [m].
+        distance: between the tool frame and the axis of the object there [m], at least.
+    """
+
+    height: float
+    distance: float = 0.0
+
+
+@dataclass
+class _Room:
+    """The distance to the joint limits that is kept [rad], and whether one was nearer."""
+
+    minimum: float
+    is_missed: bool = False
+
+
+@dataclass(frozen=True)
+class Grasp(Step, word="grasp"):
+    """Open, approach an object, and close the fingers on it.
+
+    Attributes:
+        name: name of the object.
+        side: FRONT or ABOVE; "" for the first with which this and all later steps succeed.
+        pitch: of the tool [rad]; None for the first with which this and all later steps succeed.
+        height: above the underside of the object [m]; None for HEIGHT_FRACTIONS of its height.
+    """
+
+    short = "name"
+
+    name: Object
+    side: Annotated[str, choice(FRONT, ABOVE).about("Side of the tool; found unless given")] = ""
+    pitch: Annotated[
+        float | None, angle(0.0, 90.0, "Pitch of the tool, deg; found unless given")
+    ] = None
+    height: Annotated[
+        float | None,
+        millimetres(1.0, 500.0, "Height above the underside, mm; found unless given"),
+    ] = None
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the grasp. Raises InputError if the object cannot be taken."""
+        scene_object = builder.scene_object(self.name)
+        if builder.state.grip is not None:
+            raise InputError("The hand already holds an object. Set it down first.")
+        if not scene_object.can_be_held:
+            raise InputError(
+                f"{self.name} cannot be held by the fingers. Set its `can_be_held` to true if they "
+                "may take it."
+            )
+        if self.height is None and scene_object.height < MIN_HEIGHT:
+            raise InputError(
+                f"{self.name} is {1e3 * scene_object.height:.1f} mm high, and the minimum is "
+                f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
+                "an object stands on."
+            )
+        hand = builder.hand
+        if hand.tool and builder.state.tool != hand.tool:
+            builder.plan_context.arm.chain_to(hand.tool)
+            builder.note(
+                f"grasp {self.name}: tool {hand.tool}",
+                UseTool(hand.tool),
+                replace(builder.state, tool=hand.tool),
+            )
+        opened = builder.plan_context.arm.gripper.opened
+        after = with_fingers(builder, opened)
+        builder.note(f"grasp {self.name}: open", MoveFingers(opened), after)
+        branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
+        # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
+        # would take the object with the hand upside down.
+        via_home = (False,) if branch_of(builder.q) == branch_of(ready) else (False, True)
+
+        def take(via: bool) -> None:
+            if via:
+                builder.move_to(ready, f"grasp {self.name}: home")
+            self._approach(builder, scene_object)
+
+        try:
+            builder.first(via_home, take)
+        except InputError as error:
+            raise error.after(f"{self.name} cannot be grasped at its place") from error
+
+    def _approach(self, builder: PlanBuilder, scene_object: SceneObject) -> None:
+        """Plan the grasp with the first approach that works. Raises InputError without one."""
+        chosen, room = self._approaches(builder, scene_object), _Room(JOINT_ROOM)
+        try:
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
+        except InputError:
+            if not room.is_missed:
+                raise
+            room = _Room(0.0)
+            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
+
+    def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> Sequence[Approach]:
+        """Return the approaches to try, in their order, without those that were given up."""
+        at = _point(builder, scene_object, 0.0)
+        turned = builder.direction(scene_object.T[:3, 0], in_base=True)
+        if self.pitch is not None:
+            return builder.hand.with_pitch(self.pitch, scene_object, at, turned)
+        found = builder.hand.approaches(scene_object, at, turned)
+        sides = [self.side] if self.side else list(found)
+        chosen = [each for side in sides for each in found.get(side, ())]
+        if not chosen:
+            raise InputError(_no_approach(scene_object, self.side))
+        remaining = [each for each in chosen if each not in builder.given_up]
+        # Without one in reach, the first gives the reason.
+        in_reach = [each for each in remaining if self._is_in_reach(builder, scene_object, each)]
+        return in_reach or remaining[:1]
+
+    def _is_in_reach(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
+    ) -> bool:
+        """Return whether the tool can be at one of the heights of a grasp."""
+        hand = builder.hand
+        return any(
+            hand.branches_to(
+                builder.q,
+                hand.before(_point(builder, scene_object, each.height), approach, each.distance),
+            )
+            for each in self._grips(builder, scene_object, approach)
+        )
+
+    def _grips(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
+    ) -> list[Grip]:
+        """Return the places of the grasp on the object, the best first."""
+        if self.height is not None:
+            return [Grip(self.height)]
+        fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
+        found = [Grip(fraction * scene_object.height) for fraction in fractions]
+        if scene_object.height < LOW:
+            middle = 0.5 * scene_object.height
+            found += [Grip(middle, each) for each in builder.hand.tip_distances]
+        return found
+
+    def _plan(
+        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: _Room
+    ) -> None:
+        """Plan approach and closing. Raises InputError if it is not possible."""
+
+        def plan_at(grip: Grip) -> None:
+            point = _point(builder, scene_object, grip.height)
+            target = builder.hand.before(point, approach, grip.distance)
+            builder.first(
+                builder.hand.branches_to(builder.q, target) or (None,),
+                lambda branch: self._plan_at(builder, scene_object, approach, grip, branch, room),
+            )
+
+        builder.first(self._grips(builder, scene_object, approach), plan_at)
+
+    def _plan_at(
+        self,
+        builder: PlanBuilder,
+        scene_object: SceneObject,
+        approach: Approach,
+        grip: Grip,
+        branch: AnyBranch | None,
+        room: _Room,
+    ) -> None:
+        """Plan the grasp at ``grip`` on ``branch``. Raises InputError if it is not possible."""
+        hand, point = builder.hand, _point(builder, scene_object, grip.height)
+        distance, q = _smallest_distance(builder, point, approach, grip.distance, branch)
+        # Before the path there, whose planning takes longer.
+        self._closed(builder, q)
+
+        def start_at(away: float) -> FloatArray:
+            before = hand.before(point, approach, distance + away)
+            start = builder.joints_of(before, hand.branch_at(q))
+            left = min(_joint_room(builder, start), _joint_room(builder, q))
+            if left < room.minimum:
+                room.is_missed = True
+                raise InputError(f"a joint would come within {math.degrees(left):.1f} deg.")
+            return start
+
+        start = builder.first(APPROACHES, start_at)
+        builder.move_to(start, f"grasp {self.name}: approach")
+        goal = hand.before(point, approach, distance)
+        builder.lead([builder.planning.line(builder.target, goal)], f"grasp {self.name}")
+        # With more than six axes, the pose alone is given.
+        if not hand.is_redundant and float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
+            raise InputError("the straight path to it ends in another posture than planned.")
+        closed, held = builder.plan_context.arm.gripper.closed, self._closed(builder, builder.q)
+        holding = "" if self._checked_later(builder.ahead) else self.name
+        builder.note(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
+        chosen = approach if self.pitch is None else None
+        builder.taken = GraspInfo(builder.target, chosen, scene_object)
+
+    def _closed(self, builder: PlanBuilder, q: FloatArray) -> State:
+        """Return the state at ``q`` (n,) [rad] in which the closed fingers hold the object.
+
+        Raises InputError if they do not, or are so near to something that they could not leave.
+        """
+        now = builder.state
+        builder.state = builder.standing(q)
+        try:
+            held = with_fingers(builder, builder.plan_context.arm.gripper.closed)
+        finally:
+            builder.state = now
+        if held.held is None or held.held.name != self.name:
+            raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
+        others = tuple(each for each in held.objects if each.name != self.name)
+        world = builder.plan_context.session.world_at(replace(held, objects=others))
+        nearest = None if world is None else _nearer(builder, world, held.x_setpoint, MARGIN)
+        if nearest is not None:
+            raise InputError(_too_near(nearest, MARGIN))
+        return held
+
+    def _checked_later(self, ahead: Sequence[object]) -> bool:
+        """Return whether an ``if`` of ``ahead`` asks whether the object is held, before a grasp."""
+        for step in ahead:
+            if isinstance(step, Conditional) and step.condition == Held(self.name):
+                return True
+            if isinstance(step, Grasp):
+                return False
+        return False
+
+
+def _point(builder: PlanBuilder, scene_object: SceneObject, height: float) -> FloatArray:
+    """Return the point (3,) [m] in {S} at ``height`` [m] over the underside of the object."""
+    return builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+
+
+def _joint_room(builder: PlanBuilder, q: FloatArray) -> float:
+    """Return the smallest distance [rad] of the joints ``q`` (5,) [rad] to their limits."""
+    chain = builder.chain
+    return float(np.minimum(q - chain.lower, chain.upper - q).min())
+
+
+def _why_not_held(state: State) -> str:
+    """Return why the closed fingers do not hold an object."""
+    if state.held is not None:
+        return f"they would close on {state.held.name}"
+    if any(finding.reason is Reason.LOPSIDED for finding in state.findings):
+        return "only one of them would touch it"
+    return "they close without touching it"
+
+
+def _too_near(nearest: Contact, minimum: float) -> str:
+    """Return that two bodies would be nearer than ``minimum`` [m]."""
+    one, other = map(part, nearest.parts)
+    away = apart(nearest.distance)
+    return f"{one} and {other} would {away}; the minimum is {1e3 * minimum:.1f} mm."
+
+
+def _no_approach(scene_object: SceneObject, side: str) -> str:
+    """Return why no approach from ``side`` suits the object."""
+    if is_vessel(scene_object):
+        return "a vessel is grasped from the front, because from above the wrist could not pour it."
+    return (
+        "its sides are turned too far, seen from the arm, so the fingers cannot hold it from the "
+        f"{side}. Grasp it from above, or turn it."
+    )
+
+
+def _nearer(
+    builder: PlanBuilder, world: CollisionWorld, x: FloatArray, minimum: float
+) -> Contact | None:
+    """Return the nearest contact at `x` (k,) of a pair that is nearer than ``minimum`` [m].
+
+    Pairs that are nearer at Home may be as near as there. None if all are far enough.
+    """
+    home = np.append(builder.plan_context.ready, x[-1])
+    placed, kept = world.at(x), SweptClearance.about(world, minimum, home).minimum
+    pairs = placed.nearer_than(kept)[0].tolist()
+    found = {pair: placed.distance(pair) for pair in pairs}
+    near = [pair for pair, distance in found.items() if distance < kept[pair]]
+    return placed.contact(min(near, key=found.__getitem__)) if near else None
+
+
+def _smallest_distance(
+    builder: PlanBuilder,
+    point: FloatArray,
+    approach: Approach,
+    least: float,
+    branch: AnyBranch | None,
+) -> tuple[float, FloatArray]:
+    """Return the smallest distance [m] of the tool before ``point`` at which the palm has room.
+
+    It is at least ``least`` [m]. The second value is the joints (n,) [rad] at that distance.
+    """
+
+    def joints_with_room(distance: float) -> tuple[float, FloatArray]:
+        q = builder.joints_of(hand.before(point, approach, distance), branch)
+        x = np.append(q, fingers)
+        nearest = None if world is None else _nearer(builder, world, x, PALM_CLEARANCE)
+        if nearest is not None:
+            raise InputError(_too_near(nearest, PALM_CLEARANCE))
+        return distance, q
+
+    hand, world, fingers = builder.hand, builder.world, builder.state.gripper_setpoint
+    distances = (least + np.arange(0.0, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP)).tolist()
+    return builder.first(distances, joints_with_room)

@@ -1,0 +1,269 @@
+"""The steps that lift an object and put it somewhere: ``pick``, ``place``, ``stack`` and others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from katana450.arm.control.pouring import BASIN, is_vessel
+from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
+from katana450.arm.control.support import check_carried, is_over, surface_below
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import MoveFingers
+from katana450.extensions.programs.building.carry import APPROACHES, carry
+from katana450.extensions.programs.building.finger_planning import with_fingers
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.language.declaration import Declared
+from katana450.extensions.programs.language.kinds import NAME, Object, ObjectName
+from katana450.extensions.programs.language.places import SPOT, Spot
+from katana450.extensions.programs.planning.approach import UP
+from katana450.extensions.programs.steps.grasp import Grasp
+from katana450.maths.geometry import se3
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.planning.plan import MARGIN
+
+RELEASE_HEIGHT = MARGIN + 2e-4
+"""[m] Height over its support at which the fingers release an object."""
+
+MAX_FALL = 0.01
+"""[m] Maximum height from which ``release`` lets an object fall."""
+
+LIFTS = (0.06, 0.04, 0.025, 0.015)
+"""[m] Heights to which an object is lifted, tried from the highest."""
+
+CARRY_HEIGHTS = (0.1, 0.07, 0.05, 0.03, 0.015)
+"""[m] Heights over its new place at which an object is brought there, tried from the highest."""
+
+
+@dataclass(frozen=True)
+class PlaceHeld(Step, word="place"):
+    """Put the held object down, and draw back.
+
+    It stands upright then.
+
+    Attributes:
+        at: its place; None for the middle of ``on``.
+        on: name of the object on which to place it; "" for whatever is below.
+        in_base: whether ``at`` is in the base frame instead of {S}.
+    """
+
+    noun = "a place step"
+    needs = ("at", "on")
+
+    at: Annotated[Spot | None, SPOT] = None
+    on: Annotated[str, NAME.about("Object that carries it; its middle without `at`")] = ""
+    in_base: bool = False
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of two heights."""
+        at = given.get("at")
+        if at is not None and "on" in given and not math.isnan(at.z):
+            yield "", "Give either `on` or the height z, which follows from `on`."
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the way and the release. Raises InputError if it is not possible."""
+        held = held_object(builder, "place")
+        spot = self._spot(builder, held)
+        try:
+            builder.first(
+                _over(builder, held, spot, None if self.at is None else self.at.yaw),
+                lambda low: _bring(builder, held, low),
+            )
+        except InputError as error:
+            raise error.after(f"{held.name} cannot be placed there") from error
+
+    def _spot(self, builder: PlanBuilder, held: SceneObject) -> FloatArray:
+        """Return the place (3,) [m] of the underside in the base frame. Raises InputError."""
+        at = np.zeros(3)
+        if self.on:
+            at = builder.scene_object(self.on).T[:3, 3]
+        if self.at is not None:
+            T = np.eye(4) if self.in_base else builder.plan_context.T_base_shoulder
+            at = T[:3, :3] @ np.nan_to_num((self.at.x, self.at.y, self.at.z)) + T[:3, 3]
+        if self.at is None or math.isnan(self.at.z):
+            high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
+            at = np.array((at[0], at[1], surface_below(_objects_around(builder), high)))
+        standing = _standing(held, at)
+        if self.on:
+            below = builder.scene_object(self.on)
+            if abs(surface_below([below], standing) - at[2]) > RELEASE_HEIGHT or at[2] <= 0.0:
+                raise InputError(
+                    f"{self.on} cannot carry {held.name} there: its top must be level, and the "
+                    f"middle of {held.name} over it."
+                )
+        _check_support(builder, standing)
+        return at
+
+
+@dataclass(frozen=True)
+class SetDown(Step, word="set_down"):
+    """Put the held object back to where it was grasped, and draw back."""
+
+    noun = "`set_down`"
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the motions. Raises InputError if nothing is held, or there is no room."""
+        taken = builder.taken
+        if builder.state.grip is None or taken is None:
+            raise InputError("The hand holds no object that this program grasped.")
+        at = taken.at
+        above = at.moved(at.position * (1, 1, 0) + builder.target.position * UP)
+        carry(builder, above, "back")
+        low = at.moved(at.position + RELEASE_HEIGHT * UP)
+        builder.lead([builder.planning.line(above, low)], "set down")
+        let_go(builder)
+
+
+@dataclass(frozen=True)
+class Release(Step, word="release"):
+    """Open the fingers on the held object where it is, and draw back.
+
+    The object stands on what is below it.
+    """
+
+    noun = "`release`"
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the release. Raises InputError if the object would fall, or there is no room."""
+        check_fall(builder, held_object(builder, "release"))
+        let_go(builder)
+
+
+def held_object(builder: PlanBuilder, step: str) -> SceneObject:
+    """Return the object between the fingers. Raises InputError with the remedy if there is none."""
+    for each in builder.state.objects:
+        if each.held:
+            return each
+    raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
+
+
+def check_fall(builder: PlanBuilder, held: SceneObject) -> None:
+    """Raise InputError if the held object would fall, or nothing carries it, if it is released."""
+    T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+    lifted = replace(held, T=T, held=False)
+    below = surface_below(_objects_around(builder), lifted)
+    _check_support(builder, _standing(held, np.append(T[:2, 3], below)))
+    fall = float(T[2, 3]) - below
+    if fall > MAX_FALL:
+        raise InputError(
+            f"{held.name} would fall {1e3 * fall:.0f} mm. Lower it to at most "
+            f"{1e3 * MAX_FALL:.0f} mm first, or use `place`."
+        )
+
+
+def _check_support(builder: PlanBuilder, standing: SceneObject) -> None:
+    """Raise InputError if nothing carries the object ``standing``, or an open vessel would."""
+    objects = _objects_around(builder)
+    for each in objects:
+        if (is_vessel(each) or each.name == BASIN) and is_over(standing, each):
+            raise InputError(
+                f"{each.name} is open at its top and cannot carry {standing.name}. Choose a place "
+                "beside it."
+            )
+    check_carried(builder.plan_context.session.environment.table, objects, standing)
+
+
+def _objects_around(builder: PlanBuilder) -> list[SceneObject]:
+    """Return the objects that the hand does not carry."""
+    return [each for each in builder.state.objects if not each.carried]
+
+
+def let_go(builder: PlanBuilder) -> None:
+    """Append the opening of the fingers and the retreat. Raises InputError without room."""
+    at, q, hand = builder.target, builder.q, builder.hand
+    opened = builder.plan_context.arm.gripper.opened
+    builder.note("let go", MoveFingers(opened), with_fingers(builder, opened))
+
+    def draw_back(away: float) -> None:
+        end = hand.retreat(q, away)
+        builder.lead([builder.planning.line(at, end)], "draw back")
+
+    try:
+        builder.first(APPROACHES, draw_back)
+    except InputError as error:
+        raise error.after("There is no room to draw back") from error
+    builder.taken = None
+
+
+def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
+    """Return the held object upright with its underside at ``at`` (3,) [m] in the base frame."""
+    return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
+
+
+def _bring(builder: PlanBuilder, held: SceneObject, low: DragTarget) -> None:
+    """Plan the way to ``low``, from above, and the release there. Raises InputError."""
+    name = f"place {held.name}"
+
+    def down_from(height: float, *, straight: bool) -> None:
+        above = low.moved(low.position + height * UP)
+        if straight:
+            carry(builder, above, f"{name}: carry")
+        else:
+            builder.move_to(builder.joints_of(above), f"{name}: carry")
+        builder.lead([builder.planning.line(builder.target, low)], f"{name}: lower")
+        let_go(builder)
+
+    try:
+        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=True))
+    except InputError:
+        # A way round obstacles may tilt the object, and a vessel would spill.
+        if is_vessel(held):
+            raise
+        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=False))
+
+
+def _over(
+    builder: PlanBuilder, held: SceneObject, spot: FloatArray, yaw: float | None
+) -> Sequence[DragTarget]:
+    """Return the tools that hold the object over ``spot`` with this ``yaw``; see `HandPlanning`."""
+    T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+    goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
+    return builder.hand.over(held, T_base_object, builder.q, goal, yaw)
+
+
+@dataclass(frozen=True)
+class Pick(Grasp, word="pick"):
+    """Grasp an object, and lift it."""
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan grasp and lifting. Raises InputError if it is not possible."""
+        super().build(builder)
+        at = builder.target
+
+        def lift(height: float) -> None:
+            raised = at.moved(at.position + height * UP)
+            builder.lead([builder.planning.line(at, raised)], f"lift {self.name}")
+
+        try:
+            builder.first(LIFTS, lift)
+        except InputError as error:
+            raise error.after(f"{self.name} cannot be lifted") from error
+
+
+@dataclass(frozen=True)
+class Stack(Declared):
+    """Pick an object and place it on the middle of another."""
+
+    noun = "a stack"
+
+    name: Object
+    on: ObjectName
+    in_base: bool = False
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of an object on itself."""
+        if given.get("name") is not None and given["name"] == given.get("on"):
+            yield "", f"{given['name']} cannot stand on itself."
+
+    @property
+    def steps(self) -> tuple[Step, Step]:
+        """Two steps, so that the object is picked in another way if it cannot be placed."""
+        return Pick(self.name), PlaceHeld(on=self.on, in_base=self.in_base)

@@ -1,0 +1,315 @@
+"""The step ``pour``: empty a vessel, or a part of it, into an object, planned from its place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+from numpy.polynomial.polynomial import polyval
+
+from katana450.arm.control.pouring import CUP, is_vessel
+from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import Action, SetSpeed, Wait
+from katana450.extensions.programs.building.carry import carry
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.building.vessel_turn import VesselTurn, turns_over
+from katana450.extensions.programs.language import kinds
+from katana450.extensions.programs.language.declaration import Kind
+from katana450.extensions.programs.language.expression import PLAIN
+from katana450.extensions.programs.language.kinds import NAME, ObjectName, number, whole
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import YamlValue
+from katana450.extensions.programs.planning.pour_tilt import (
+    RatedTilt,
+    RatePlan,
+    film_after,
+    tilt_for,
+)
+from katana450.extensions.programs.planning.tool_planning import AnyCurve
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.water.flow import VesselWater, Water
+from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
+
+MAX_DRAIN = 180.0
+"""[s] Maximum time to wait."""
+
+END_FLOW = 0.2 * ML
+"""[m^3/s] Flow at which a cup counts as emptied."""
+
+
+@dataclass(frozen=True)
+class Drain(Action):
+    """Wait until a tilted cup has poured enough.
+
+    Attributes:
+        vessel: name of the vessel.
+        rest: volume that stays in it with its film [fl]; None to wait until the flow ends.
+    """
+
+    vessel: str
+    rest: int | None = None
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether enough has flowed. Raises InputError if that takes too long."""
+        if state.poured is None:
+            raise InputError("There is no cup to pour.")
+        water = state.poured.water.vessel(self.vessel)
+        if water is None:
+            raise InputError(f"There is no {self.vessel} to pour.")
+        if self.rest is None:
+            return outflow(state.poured.water) < END_FLOW or waited > MAX_DRAIN
+        if waited > MAX_DRAIN:
+            left = (water.kept - self.rest) * FEMTOLITRE / ML
+            raise InputError(f"After {MAX_DRAIN:g} s, {left:.1f} ml have still to be poured.")
+        return water.kept <= self.rest
+
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the maximum time that has passed."""
+        return min(waited / MAX_DRAIN, 1.0)
+
+
+def outflow(water: Water) -> float:
+    """Return the flow over the lip in the last time step [m^3/s]."""
+    if not water.parcels or water.parcels[-1].age > 0.0:
+        return 0.0
+    newest = water.parcels[-1]
+    return newest.volume * FEMTOLITRE / newest.span
+
+
+POUR_PACE = 0.3
+"""[1] Fraction of the speed while pouring: slow enough for a thin, coherent stream."""
+
+PART_PACE = 0.12
+"""[1] Fraction of the speed while a part is poured: the water in the cup hardly swings."""
+
+MAX_POUR_PITCH = math.radians(60.0)
+"""[rad] Maximum pitch of the tool for a pour."""
+
+SHAKE_ANGLE = math.radians(25.0)
+"""[rad] Amplitude of a shake."""
+
+DRAIN_TIME = 1.5
+"""[s] Minimum time for the last water to run out."""
+
+PART_FLOW = 0.5 * ML
+"""[m^3/s] Flow with which the pour of a part ends: slow enough to end it in time."""
+
+LAST_FRACTION = 0.1
+"""[1] Fraction of all that is not poured at a given rate: so little flows as it can."""
+
+RATE_UNIT = "ml/s"
+"""Unit of a rate in a script."""
+
+REACTION_TIME = 0.25
+"""[s] Time in which a cup that turns back still pours at the same flow."""
+
+PART_TIME = 10.0
+"""[s] Duration of the pour of a part, for an estimate of the film on the wall."""
+
+SHAKES = 3
+"""Number of shakes after all is poured, unless given."""
+
+POURING = "pour"
+"""Name of the task that turns the cup over."""
+
+
+FLOW = number(
+    1.0, 50.0, RATE_UNIT, "Flow while pouring, ml/s, or a text such as 10 ml/s", lambda ml: ML * ml
+)
+
+
+def _rate(value: YamlValue, context: ScriptContext) -> float:
+    """Read a flow [m^3/s], as a number in ml/s or a text such as 10 ml/s."""
+    if isinstance(value.held, str) and value.held.endswith(RATE_UNIT):
+        with suppress(ValueError):
+            flow = float(value.held.removesuffix(RATE_UNIT))
+            value = replace(value, kind="number", number=flow, unit=PLAIN)
+    return FLOW(value, context)
+
+
+@dataclass(frozen=True)
+class Pour(Step, word="pour"):
+    """Carry a held vessel over an object, turn it over, shake it, and turn it back.
+
+    It stays upright until then. An arm of the five-axis family keeps the pitch of the grasp, and
+    turns it by the roll of its wrist; over another vessel the lip stays in its place. Other arms
+    tilt it about its lip; those with four axes do so in their plane.
+
+    Attributes:
+        into: name of the object.
+        source: name of the vessel in the hand; None for any.
+        volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
+            when the rest is left, kept so until then, and turned back.
+        rate: flow while pouring [m^3/s]; None to turn the cup evenly. Of all, the last
+            LAST_FRACTION flows faster.
+        shake: number of shakes after all is poured; None for SHAKES.
+    """
+
+    short = "into"
+
+    into: ObjectName
+    source: Annotated[
+        str | None, NAME.about("The vessel in the hand, for a check").named("from")
+    ] = None
+    volume: Annotated[
+        float | None,
+        kinds.volume(1.0, 1000.0, "How much to pour, ml; all unless given").named("ml"),
+    ] = None
+    rate: Annotated[float | None, Kind(_rate, FLOW.schema)] = None
+    shake: Annotated[
+        int | None, whole(0, 20, "Number of shakes after all is poured, 3 unless given")
+    ] = None
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of a part that is shaken out."""
+        if "volume" in given and given.get("shake"):
+            yield "shake", "A shaken cup does not keep the rest: leave out `shake` or `ml`."
+
+    @property
+    def shakes(self) -> int:
+        """The number of shakes."""
+        if self.shake is None:
+            return SHAKES if self.volume is None else 0
+        return self.shake
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the pour, turning either way. Raises InputError if it is not possible."""
+        vessel, below = self._vessel(builder), builder.scene_object(self.into)
+        if below.carried:
+            raise InputError(f"{self.into} is in the hand: name what stands below it.")
+        poured = builder.state.poured
+        water = None if poured is None else poured.water.vessel(vessel.name)
+        if poured is None or water is None:
+            raise InputError(f"There is no water in the {vessel.name}: `fill` it first.")
+        rest = self._rest(vessel, water)
+        volumes = {vessel.name: counted(rest)}
+        pouring = builder.plan_context.session.pouring
+        other = poured.water.vessel(self.into)
+        if pouring is not None and other is not None:
+            part = water.kept - counted(rest)
+            inside = pouring.water_environment(builder.state.objects).vessels[self.into].inside
+            room = counted(inside.capacity) - other.kept
+            if part > room:
+                raise InputError(
+                    f"{self.into} has room for {room / MILLILITRE:.1f} ml, which is less than the "
+                    f"{part / MILLILITRE:.1f} ml to pour; give a smaller `ml`."
+                )
+            volumes[self.into] = other.kept + part
+        level = builder.target
+        if isinstance(level, ToolTarget) and level.pitch > MAX_POUR_PITCH:
+            raise InputError(
+                f"The {vessel.name} is held from above, where the wrist cannot tilt it: pick it "
+                "with `side: front`."
+            )
+        try:
+            tilt, rated = self._tilt(builder, vessel, rest), self._rated(builder, vessel, rest)
+            builder.first(
+                turns_over(builder, vessel, below, tilt, is_rated=rated is not None),
+                lambda way: self._turned(builder, vessel, way, rated, rest),
+            )
+        except InputError as error:
+            message = f"The {vessel.name} cannot be emptied into {self.into}"
+            raise error.after(message) from error
+        builder.predict_water(volumes)
+
+    def _vessel(self, builder: PlanBuilder) -> SceneObject:
+        """Return the vessel in the hand. Raises InputError without it."""
+        held = next((each for each in builder.state.objects if each.held), None)
+        name = self.source or (held.name if held is not None and is_vessel(held) else CUP)
+        if held is None or held.name != name:
+            raise InputError(f"The {name} is not in the hand: `grasp: {name}` first.")
+        if not is_vessel(held):
+            raise InputError(f"{name} holds no water: only the cup and vessels are poured.")
+        return held
+
+    def _rest(self, vessel: SceneObject, water: VesselWater) -> float:
+        """Return the volume [m^3] that stays in it. Raises InputError for too little water."""
+        if self.volume is None:
+            return 0.0
+        held = water.kept * FEMTOLITRE
+        # The water is counted in whole femtolitres.
+        if counted(self.volume) > water.kept:
+            raise InputError(
+                f"The {vessel.name} holds {held / ML:.1f} ml at this step, which is less than "
+                f"{self.volume / ML:g} ml."
+            )
+        return max(held - self.volume, 0.0)
+
+    def _tilt(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> float | None:
+        """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup.
+
+        None if all of it is poured.
+        """
+        pouring = builder.plan_context.session.pouring
+        if self.volume is None or pouring is None:
+            return None
+        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
+        film = film_after(self.volume, rest, PART_TIME, inside)
+        return float(tilt_for(PART_FLOW, rest - film, inside))
+
+    def _turned(
+        self,
+        builder: PlanBuilder,
+        vessel: SceneObject,
+        way: VesselTurn,
+        rated: RatedTilt | None,
+        rest: float,
+    ) -> None:
+        """Append the motions of ``way`` with their pace, and the draining."""
+        fitted = None if rated is None else rated.fitted(way.angles(rated.tilts))
+        carry(builder, way.at, f"over {self.into}")
+        pace, end = POUR_PACE if self.volume is None else PART_PACE, way.end
+        builder.note("slowly", SetSpeed(pace), builder.state)
+        if rated is None or fitted is None:
+            builder.lead([way.line(0.0, end)], POURING)
+        else:
+            first, last = (float(polyval(place, fitted)) for place in (-1, 1))
+            curves = way.line(0.0, first), way.by(fitted), way.line(last, end)
+            self._pour_at_rate(builder, rated.duration, *curves)
+            end = end if self.volume is None else last
+        if self.shakes:
+            back = way.end - math.copysign(SHAKE_ANGLE, way.end)
+            builder.lead([way.line(end, back), way.line(back, end)] * self.shakes, "shake")
+        self._drain(builder, vessel, rest)
+        builder.lead([way.line(end, 0.0)], "turn back")
+
+    def _drain(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> None:
+        """Append the wait until the last water, or the part, has run out."""
+        if self.volume is None:
+            builder.note("drain", Wait(DRAIN_TIME), builder.state)
+            builder.note("drain", Drain(vessel.name), builder.state)
+        else:
+            left = counted(rest + PART_FLOW * REACTION_TIME)
+            builder.note("drain", Drain(vessel.name, left), builder.state)
+        builder.note("full speed", SetSpeed(1.0), builder.state)
+
+    def _pour_at_rate(
+        self, builder: PlanBuilder, duration: float, start: AnyCurve, turn: AnyCurve, end: AnyCurve
+    ) -> None:
+        """Append ``start``, ``turn`` in ``duration`` [s], and ``end`` if all is poured."""
+        builder.lead([start], POURING)
+        builder.note("at the rate", SetSpeed(1.0), builder.state)
+        builder.pace(turn, duration, "pour at the rate")
+        if self.volume is None:
+            builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
+            builder.lead([end], "pour the last")
+
+    def _rated(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> RatedTilt | None:
+        """Return the tilt over time for the rate; None if none is given."""
+        if self.rate is None:
+            return None
+        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        water = None if poured is None else poured.water.vessel(vessel.name)
+        assert pouring is not None
+        assert water is not None
+        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
+        held = water.kept * FEMTOLITRE
+        out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
+        return RatePlan.of(out, self.rate).tilts(held, inside)

@@ -1,0 +1,187 @@
+"""Steps that move no joint: gripper, waits, tool frame and speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from katana450 import tolerances
+from katana450.arm.control.commands import MIN_SPEED
+from katana450.arm.control.state import State
+from katana450.errors import InputError
+from katana450.extensions.programs.building.actions import (
+    Action,
+    MoveFingers,
+    SetSpeed,
+    UseTool,
+    Wait,
+)
+from katana450.extensions.programs.building.conditions import CONDITION, Condition
+from katana450.extensions.programs.building.finger_planning import finger_unit, with_fingers
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.language.declaration import Kind
+from katana450.extensions.programs.language.kinds import (
+    FINGER_PLACE,
+    TEXT,
+    ObjectName,
+    any_of,
+    choice,
+    number,
+)
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import YamlValue
+from katana450.extensions.programs.steps.place import check_fall
+
+MAX_PAUSE = 3600.0
+"""[s] Maximum duration of a wait."""
+
+
+def _finger_place(value: YamlValue, context: ScriptContext) -> float | str:
+    """Read ``open``, ``closed`` or a number. Raises ScriptError."""
+    if value.number is not None:
+        return FINGER_PLACE(value, context)
+    return choice("open", "closed")(value)
+
+
+FINGERS = Kind(
+    _finger_place,
+    any_of(
+        "open, closed, or the angle of the fingers, deg; mm if they slide",
+        *FINGER_PLACE.schema["anyOf"],
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Gripper(Step, word="gripper"):
+    """Open or close the fingers, or move them to an angle, deg, or a place, mm, if they slide.
+
+    Attributes:
+        to: ``open``, ``closed`` or a position [deg or mm].
+        holding: name of the object that they must hold then; "" for any or none.
+    """
+
+    noun = "a gripper step"
+    short = "to"
+
+    to: Annotated[float | str, FINGERS]
+    holding: ObjectName = ""
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the finger motion.
+
+        Raises InputError outside the range of the fingers, and if they would not hold what they
+        must.
+        """
+        fingers = builder.plan_context.arm.gripper
+        if not fingers.moves:
+            raise InputError("This arm has no fingers.")
+        ends = {"open": fingers.opened, "closed": fingers.closed}
+        unit, scale = finger_unit(builder)
+        angle = ends[self.to] if isinstance(self.to, str) else scale * self.to
+        if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:
+            low, high = fingers.lower / scale, fingers.upper / scale
+            raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
+        angle = fingers.clamp(angle)
+        held = with_fingers(builder, angle)
+        if self.holding and (held.held is None or held.held.name != self.holding):
+            instead = "nothing" if held.held is None else held.held.name
+            raise InputError(
+                f"The fingers would hold {instead} instead of {self.holding}, which has to stand "
+                "where they close."
+            )
+        if builder.state.held is not None and held.held is None:
+            check_fall(builder, builder.state.held)
+        builder.note("gripper", MoveFingers(angle, self.holding), held)
+        if held.grip is None:
+            builder.taken = None
+
+
+@dataclass(frozen=True)
+class TimedPause(Step, word="wait"):
+    """Wait, s."""
+
+    short = "seconds"
+
+    seconds: Annotated[float, number(0.0, MAX_PAUSE, "s")]
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the wait."""
+        if self.seconds:
+            builder.note("wait", Wait(self.seconds), builder.state)
+
+
+@dataclass(frozen=True)
+class Tool(Step, word="tool"):
+    """Tool frame of all later points: tcp, grasp or flange."""
+
+    short = "name"
+
+    name: Annotated[str, TEXT]
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the change of the tool frame. Raises InputError if it does not exist."""
+        builder.plan_context.arm.chain_to(self.name)
+        builder.note(
+            f"tool {self.name}", UseTool(self.name), replace(builder.state, tool=self.name)
+        )
+
+
+@dataclass(frozen=True)
+class Speed(Step, word="speed"):
+    """Fraction of full speed of all later motions."""
+
+    short = "value"
+
+    value: Annotated[float, number(MIN_SPEED, 1.0)]
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the change of the speed."""
+        builder.note(f"speed {self.value:g}", SetSpeed(self.value), builder.state)
+
+
+TIMEOUT = 60.0
+"""[s] Timeout unless the script gives one."""
+
+
+@dataclass(frozen=True, eq=False)
+class WaitUntil(Action):
+    """Wait at rest until ``condition`` holds, for at most ``timeout`` [s].
+
+    ``assumed``: whether it counts as true, for a simulation in which nobody makes it true.
+    """
+
+    condition: Condition
+    timeout: float
+    assumed: bool = False
+
+    def done(self, state: State, waited: float) -> bool:
+        """Return whether the condition holds. Raises InputError after the timeout."""
+        if self.assumed or self.condition.holds(state):
+            return True
+        if waited > self.timeout:
+            raise InputError(f"The condition did not hold within {self.timeout:g} s.")
+        return False
+
+    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
+        """Return the fraction of the timeout that has passed."""
+        return min(waited / self.timeout, 1.0)
+
+
+@dataclass(frozen=True)
+class WaitFor(Step, word="wait_for"):
+    """Wait at rest until one condition holds.
+
+    The steps after it are planned for the scene as it is when the script is planned. The program
+    fails after ``timeout`` [s].
+    """
+
+    condition: Annotated[Condition | None, CONDITION]
+    timeout: Annotated[float, number(0.01, MAX_PAUSE, "s", "s; 60 unless given")] = TIMEOUT
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Append the wait. Raises InputError if the condition can never hold."""
+        assert self.condition is not None
+        action = WaitUntil(self.condition.checked(builder), self.timeout)
+        builder.note(f"wait for {self.condition.awaited}", action, builder.state)

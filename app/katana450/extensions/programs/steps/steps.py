@@ -1,0 +1,27 @@
+"""All program steps by name: the modules of the steps enter their classes.
+
+To add a kind, write a class as ``Step`` describes it. List a new module here.
+"""
+
+from __future__ import annotations
+
+from katana450.extensions.programs.building.step import STEPS
+from katana450.extensions.programs.steps import (
+    grasp,
+    grip_until,
+    moves,
+    place,
+    pouring,
+    settings_steps,
+    table,
+    tool_moves,
+    trajectory,
+)
+
+MODULES = (
+    moves, tool_moves, settings_steps, table, grasp, grip_until, pouring, place,
+    trajectory,
+)  # fmt: skip
+"""The modules with steps."""
+
+__all__ = ["MODULES", "STEPS"]

@@ -1,0 +1,319 @@
+"""Steps that move the tool along a curve: lines, arcs, circles, screws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Annotated, Any
+
+import numpy as np
+
+from katana450.arm.control.session import TOOL_SPEED
+from katana450.errors import InputError
+from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.building.unfollowed import (
+    ANGLE,
+    arc_remedies,
+    line_remedies,
+    unfollowed,
+)
+from katana450.extensions.programs.language.kinds import (
+    DIRECTION,
+    LENGTH,
+    Angle,
+    Branch,
+    Direction,
+    Offset,
+    Orientation,
+    millimetres,
+    number,
+)
+from katana450.extensions.programs.language.places import (
+    ARC_PITCH,
+    ROOMIEST,
+    Blend,
+    Places,
+    Point,
+    Pose,
+)
+from katana450.extensions.programs.language.step_target import KEPT, Angles, StepTarget
+from katana450.extensions.programs.planning.tool_planning import AnyCurve
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.planning.path import Path
+
+LEVEL_TOLERANCE = 1e-6
+"""[1] Maximum horizontal component of the normal of a level circle."""
+
+
+Feed = Annotated[
+    float,
+    number(
+        0.1,
+        1e3 * TOOL_SPEED,
+        about="Speed of the tool point, mm/s; slower where limits require it",
+        convert=lambda feed: feed / 1e3,
+    ),
+]
+"""Maximum speed of the tool point [m/s]."""
+
+Climb = Annotated[float, LENGTH.about("Motion along the axis, mm")]
+"""Motion along an axis [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Step, word="line"):
+    """Move the tool point on a straight line, to a point or by an offset.
+
+    Its orientation changes evenly.
+
+    Attributes:
+        to: the end; None to keep the present one.
+        by: (3,) motion of the tool point [m]; None for that to the end.
+        angles: orientation at the end; that of ``to`` where it has none.
+        feed: maximum speed of the tool point [m/s].
+        in_base: whether ``by`` and ``angles`` are in the base frame, not in {S}.
+    """
+
+    excludes = ("to", "by")
+
+    to: Pose | None = None
+    by: Offset | None = None
+    angles: Orientation = KEPT
+    feed: Feed = TOOL_SPEED
+    in_base: bool = False
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the line. Raises InputError if the tool cannot follow it."""
+        start = builder.target
+        goal = StepTarget(in_base=self.in_base) if self.to is None else self.to
+        angles = self.angles.or_else(goal.angles)
+        end = builder.target_at(replace(goal, angles=angles))
+        if self.by is not None:
+            offset = builder.direction(self.by, in_base=self.in_base)
+            end = end.moved(frozen(start.position + offset))
+        line = builder.planning.line(start, end)
+        try:
+            builder.lead([line], "line", self.feed)
+        except InputError as error:
+            branch, frame = builder.branches(None)[0], builder.frame
+            if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
+                raise InputError(builder.unreached(end, branch)) from error
+            remedies = line_remedies(builder, start, end, error)
+            raise unfollowed(builder, error, line, branch, remedies) from error
+
+
+@dataclass(frozen=True)
+class Lines(Step, word="lines"):
+    """Move the tool point on straight lines through places, with rounded corners."""
+
+    noun = "lines"
+
+    through: Places
+    blend: Blend = 0.5
+    feed: Feed = TOOL_SPEED
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of places that are no points."""
+        places = given.get("through") or ()
+        if any(place.joints is not None or place.branch is not None for place in places):
+            yield "", "`lines` takes points only. Use `via` for joint angles and branches."
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the lines. Raises InputError if the tool cannot follow them."""
+        vias, planning = [builder.target], builder.planning
+        branch = builder.branches(None)[0]
+        for place_number, each in enumerate(self.through, start=1):
+            vias.append(builder.target_at(each, vias[-1]))
+            if planning.joints(builder.q, vias[-1], branch) is None:
+                raise InputError(f"Place {place_number}: {builder.unreached(vias[-1], branch)}")
+        if self.blend:
+            blend = np.full(len(vias) - 2, self.blend)
+            curves = [planning.lines(vias, blend)]
+        else:
+            curves = [planning.line(a, b) for a, b in pairwise(vias)]
+        builder.lead(curves, "lines", self.feed)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Turn(Step):
+    """The common part of arcs and circles.
+
+    Attributes:
+        centre: (3,) [m].
+        axis: (3,) unit vector; the normal of a circle.
+        pitch: [rad], ROOMIEST for the one farthest from the limits, or None to keep it.
+        roll, yaw: [rad]; None to keep one.
+        feed: maximum speed of the tool point along the curve [m/s].
+        in_base: whether centre, axis and angles are in the base frame, not in {S}.
+    """
+
+    centre: Point
+    axis: Direction
+    pitch: Annotated[float | str | None, ARC_PITCH] = None
+    roll: Angle | None = None
+    yaw: Angle | None = None
+    feed: Feed = TOOL_SPEED
+    in_base: bool = False
+
+    @property
+    def is_roomiest(self) -> bool:
+        """True if the pitch is the one farthest from the limits."""
+        return self.pitch == ROOMIEST
+
+    def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
+        """Return centre [m] and axis, each (3,), in {S}."""
+        centre = builder.point(self.centre, in_base=self.in_base)
+        return centre, builder.direction(self.axis, in_base=self.in_base)
+
+    def turned(self, builder: PlanBuilder) -> DragTarget:
+        """Return the present target with the orientation at the end of the curve."""
+        pitch = self.pitch if isinstance(self.pitch, float) else None
+        angles = Angles(pitch, self.roll, self.yaw)
+        return builder.target_at(StepTarget(angles=angles, in_base=self.in_base))
+
+    def follow(
+        self, builder: PlanBuilder, arc: AnyCurve, name: str, branch: AnyBranch | None = None
+    ) -> None:
+        """Move to the start of ``arc`` if the arm is not there, then along it."""
+        planning = builder.planning
+
+        def path(tried: AnyBranch) -> Path:
+            found = planning.roomiest(arc, tried) if self.is_roomiest else arc
+            return planning.path(builder.q, found, tried)
+
+        tool_path = builder.first(builder.branches(branch), path)
+        builder.move_to(tool_path.start, f"{name}: to its start")
+        builder.follow([tool_path], name, self.feed)
+
+    def follow_or_advise(
+        self,
+        builder: PlanBuilder,
+        arc: Callable[[DragTarget, float], AnyCurve],
+        end: DragTarget,
+        size: tuple[str, float],
+        branch: AnyBranch | None = None,
+    ) -> None:
+        """Follow ``arc`` to the orientation of ``end``. Raises InputError with what works instead.
+
+        ``arc`` gives the arc for a target and a fraction of its ``size``; see ``arc_remedies``.
+        """
+        name = "arc" if size[0] == ANGLE else "circle"
+
+        try:
+            self.follow(builder, arc(end, 1.0), name, branch)
+        except InputError as error:
+            if self.is_roomiest:
+                raise
+            first = builder.branches(branch)[0]
+            # Eight branches would take long.
+            tried = branch if isinstance(end, ToolTarget) else first
+
+            def build(target: DragTarget, fraction: float) -> None:
+                self.follow(builder, arc(target, fraction), name, tried)
+
+            remedies = arc_remedies(builder, end, build, size, error)
+            raise unfollowed(builder, error, arc(end, 1.0), first, remedies) from error
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arc(_Turn, word="arc"):
+    """Move the tool point round an axis from its present place.
+
+    Attributes:
+        angle: about the axis [rad].
+        climb: along the axis [m].
+    """
+
+    angle: Angle
+    climb: Climb = 0.0
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the arc. Raises InputError if the tool cannot follow it."""
+        start, end = builder.target, self.turned(builder)
+        centre, axis = self.seen(builder)
+        arc_of = builder.planning.arc
+
+        def arc(end: DragTarget, fraction: float) -> AnyCurve:
+            angle, climb = fraction * self.angle, fraction * self.climb
+            return arc_of(centre, axis, angle, climb, start, end)
+
+        self.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Circle(_Turn, word="circle"):
+    """Move to the highest point of a circle, then round it.
+
+    Attributes:
+        radius: [m].
+        turns: number of turns.
+    """
+
+    axis: Annotated[FloatArray, DIRECTION.named("normal")]
+    radius: Annotated[float, millimetres(0.1, 1000.0)]
+    turns: Annotated[float, number(-20.0, 20.0, about="Number of turns, 1 unless given")] = 1.0
+    branch: Branch = None
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of a circle without turns."""
+        if given.get("turns") == 0.0:
+            yield "turns", "`turns` must not be 0."
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the circle. Raises InputError if the tool cannot follow it."""
+        centre, normal = self.seen(builder)
+        up = builder.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
+        out = up - (up @ normal) * normal
+        if math.hypot(*out) < LEVEL_TOLERANCE:
+            # A level circle has no highest point: start at the point farthest in front.
+            ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
+            out = ahead - (ahead @ normal) * normal
+        turn, arc_of = math.tau * self.turns, builder.planning.arc
+
+        def arc(end: DragTarget, fraction: float) -> AnyCurve:
+            start = centre + fraction * self.radius / math.hypot(*out) * out
+            there = end.moved(frozen(start))
+            return arc_of(centre, normal, turn, 0.0, there, there)
+
+        size = "radius", 1e3 * self.radius
+        self.follow_or_advise(builder, arc, self.turned(builder), size, self.branch)
+
+
+@dataclass(frozen=True, eq=False)
+class Screw(Step, word="screw"):
+    """Move the tool about an axis and along it, as one rigid body.
+
+    Attributes:
+        point: (3,) of the axis [m].
+        axis: (3,) unit vector.
+        angle: about the axis [rad].
+        climb: along the axis [m].
+        in_base: whether point and axis are in the base frame, not in {S}.
+    """
+
+    needs = ("angle", "climb")
+
+    point: Point
+    axis: Direction
+    angle: Angle = 0.0
+    climb: Climb = 0.0
+    in_base: bool = False
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the screw. Raises InputError if the tool cannot follow it."""
+        axis = builder.direction(self.axis, in_base=self.in_base)
+        omega = self.angle * axis
+        v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis
+        branch = builder.branches(None)[0]
+        screw = builder.planning.screw(builder.q, np.append(omega, v))
+        try:
+            builder.lead([screw], "screw")
+        except InputError as error:
+            raise unfollowed(builder, error, screw, branch, iter(())) from error

@@ -1,0 +1,203 @@
+"""The step ``trajectory``: postures at given times, as a recording or another program has them."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from katana450.arm.control.session import TOOL_SPEED
+from katana450.errors import BlockedError, InputError
+from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_builder import CARRY, PlanBuilder, UntimedPath
+from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.language.attached_files import CSV, attached_file
+from katana450.extensions.programs.language.declaration import Kind
+from katana450.extensions.programs.language.kinds import (
+    LEAST_JOINTS,
+    MAX_ANGLE,
+    MAX_JOINTS,
+    any_of,
+    defined,
+    degrees,
+    list_of,
+    listed,
+    number,
+)
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import YamlValue
+from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath, recorded_scaling
+from katana450.maths.collision.clearance import STOP
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.planning.clearance import Sweep, SweptClearance
+from katana450.maths.planning.plan import apart, plan
+from katana450.maths.planning.scaling import Bounds
+
+CLEARANCE = STOP - 2e-4
+"""[m] Distance that a trajectory keeps. A moving arm keeps STOP by itself, and the spline through
+its recorded setpoints may pass a little nearer."""
+
+MAX_POSTURES = 1200
+"""Maximum number of postures of one step; the script's own size bounds their sum."""
+
+MAX_TIME = 24 * 3600.0
+"""[s] Maximum time of a posture."""
+
+TRAJECTORY = "trajectory"
+
+JOINT_COLUMN = re.compile(r"theta[1-9][0-9]?")
+"""Pattern of the name of a column with the angles of a joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class UntimedTrajectory(UntimedPath):
+    """A trajectory that is checked for contacts; it gets its own times, or slower ones."""
+
+    def timed(self) -> FollowPlan:
+        """Return the timed plan, with limited tool acceleration if an object is held."""
+        gentle = None if self.state.grip is None else CARRY
+        bounds = Bounds(self.arm.limits, TOOL_SPEED, gentle)
+        fingers = self.state.gripper_setpoint
+        made = plan(self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling)
+        (path,) = self.paths
+        assert isinstance(path, TrajectoryPath)
+        note = path.slowing(made.duration, bounds.joints.speed)
+        return FollowPlan(made, note=note)
+
+
+TIME = number(0.0, MAX_TIME, "s")
+JOINT = degrees(-MAX_ANGLE, MAX_ANGLE)
+
+
+def _row(value: YamlValue, _context: ScriptContext) -> tuple[float, ...]:
+    """Read a time [s] and the angles of all joints [deg]; the angles are returned in rad."""
+    if value.kind != "list" or not LEAST_JOINTS <= len(value.items) - 1 <= MAX_JOINTS:
+        raise value.wrong(
+            "Expected a time and the angles of all joints, such as [0.5, 0, -65, 85, 8, 0]."
+        )
+    time, *angles = value.items
+    return TIME(time), *map(JOINT, angles)
+
+
+POSTURE = defined(
+    "posture",
+    Kind(
+        _row,
+        list_of(
+            number(-MAX_TIME, MAX_TIME, about="A time, s, then the angles, deg").schema,
+            1 + LEAST_JOINTS,
+            1 + MAX_JOINTS,
+        ),
+    ),
+)
+POSTURES = listed(POSTURE, 2, MAX_POSTURES)
+
+
+def _rows(value: YamlValue, _context: ScriptContext) -> FloatArray:
+    """Read rows of one length."""
+    rows = POSTURES(value)
+    joints = len(rows[0]) - 1
+    for item, row in zip(value.items, rows, strict=True):
+        if len(row) != 1 + joints:
+            raise item.wrong(f"Expected a time and {joints} angles, as in the first row.")
+    return np.array(rows)
+
+
+def _rows_of_file(value: YamlValue, _context: ScriptContext) -> FloatArray:
+    """Read the times [s] and angles [rad] of a .csv file. Raises ScriptError with its row."""
+    file = attached_file(value, CSV)
+    lines = csv.DictReader(file.text.splitlines())
+    names = [name for name in lines.fieldnames or () if JOINT_COLUMN.fullmatch(name)]
+    joints = [f"theta{number}" for number in range(1, len(names) + 1)]
+    if "t" not in (lines.fieldnames or ()) or sorted(names) != sorted(joints):
+        raise file.at.wrong(
+            f"The first line of {file.name} must name the columns t, in s, and theta1, theta2 and "
+            "so on, in rad, as `katana450 record export` writes them."
+        )
+    rows = []
+    for row_number, line in enumerate(lines, start=2):
+        try:
+            row = tuple(float(line[name]) for name in ("t", *joints))
+        except (TypeError, ValueError):
+            row = (math.nan,)
+        if not all(map(math.isfinite, row)):
+            raise file.at.wrong(f"Line {row_number} of {file.name} is not a number in each column.")
+        rows.append(row)
+    if not 2 <= len(rows) <= MAX_POSTURES:
+        raise file.at.wrong(f"{file.name} has {len(rows)} rows, not 2 to {MAX_POSTURES}.")
+    return np.array(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class FollowTrajectory(Step, word="trajectory"):
+    """Move through postures at given times, on a smooth path, slower where limits require it.
+
+    The arm first moves to the first posture, on any path round obstacles.
+
+    Attributes:
+        through: (m, 1 + n) rows of a time [s], from any zero, and a posture [rad].
+        file: the same of a file.
+    """
+
+    needs = excludes = ("through", "file")
+
+    through: Annotated[FloatArray | None, Kind(_rows, POSTURES.schema)] = None
+    file: Annotated[
+        FloatArray | None,
+        Kind(
+            _rows_of_file,
+            any_of(
+                "A .csv file beside the script: t [s], theta1 and so on [rad]",
+                {"type": "string"},
+                {"type": "object"},
+            ),
+        ),
+    ] = None
+
+    def build(self, builder: PlanBuilder) -> None:
+        """Plan the way to the start, and the trajectory.
+
+        Raises BlockedError with the time at which two parts would meet, and InputError for a
+        posture beyond the limits, or of another number of joints.
+        """
+        rows = self.file if self.through is None else self.through
+        assert rows is not None
+        times, postures = frozen(rows[:, 0]), frozen(rows[:, 1:])
+        joints, given = builder.chain.n, postures.shape[1]
+        if given != joints:
+            raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
+        path = TrajectoryPath(builder.chain, times, postures)
+        builder.move_to(path.start, f"{TRAJECTORY}: approach")
+        _check_clear(builder, path)
+        arm, world = builder.plan_context.arm, builder.world
+        builder.note(
+            TRAJECTORY,
+            UntimedTrajectory(arm, world, builder.state, (path,)),
+            builder.standing(path.end),
+        )
+
+
+def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
+    """Raise BlockedError, with the time, unless all of ``path`` keeps CLEARANCE from everything."""
+    world, fingers = builder.world, builder.state.gripper_setpoint
+    if world is None:
+        return
+    sweep = Sweep(path)
+    room = SweptClearance.about(world, CLEARANCE, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
+    met = sweep.blocked(room, fingers)
+    if met is None:
+        return
+    x = sweep.at(met.sigma, fingers)
+    worst = room.worst(x)
+    raise BlockedError(
+        f"At {path.time(met.sigma):.2f} s of the trajectory, with the tool at {{point}}, {{parts}} "
+        f"would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. Move the "
+        "obstacle, or leave this part out.",
+        forward(path.chain, x[: path.chain.n])[:3, 3].tolist(),
+        parts=worst.parts,
+    )
