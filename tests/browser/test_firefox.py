@@ -76,10 +76,15 @@ def gripped(firefox: Firefox) -> tuple[float, float]:
 
 def test_drag_of_the_gizmo_moves_the_arm(firefox: Firefox, arm: Client, artefacts: Path) -> None:
     before = height(arm)
-    x, y = gripped(firefox)
-    firefox.drag([(x, y - step) for step in range(0, PULL + 1, 5)])
-    until(lambda: height(arm) > before + 0.02)
-    until(lambda: not arm.query(answers.State).moving)
+    # Drawing without a graphics card can keep Firefox from sending heartbeats, which pauses the arm
+    # on its way. The next drag continues.
+    for _ in range(3):
+        x, y = gripped(firefox)
+        firefox.drag([(x, y - step) for step in range(0, PULL + 1, 5)])
+        until(lambda: not arm.query(answers.State).moving)
+        if height(arm) > before + 0.02:
+            break
+    assert height(arm) > before + 0.02
     firefox.screenshot(artefacts / "firefox.png")
 
 

@@ -109,5 +109,5 @@ def assert_code_holds_the_address(page: ViserPage, server: AppServer, artefacts:
     page.page.click("#stop", trial=True)
     page.page.click("#phone form button")
     code.wait_for(state="hidden")
-    assert button.get_attribute("aria-expanded") == "false"
+    page.wait_until(lambda: button.get_attribute("aria-expanded") == "false", "it is closed")
     assert page.errors == []

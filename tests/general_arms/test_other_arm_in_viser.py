@@ -72,7 +72,6 @@ def test_gizmo_moves_and_turns_the_tool_and_the_map_is_shown(tmp_path: Path) -> 
     with AppServer((*APP, "--urdf", str(urdf), "--workspace", str(out))) as server:
         with connect(server.url) as arm:
             arm.ask(requests.Home(wait=30))
-            arm.ask(requests.ReleaseLease())
             T = pose(arm)
             T[:3, 3] += (0.03, 0.0, 0.02)
             T[:3, :3] = T[:3, :3] @ so3.rotation_z(0.3)

@@ -153,7 +153,7 @@ def test_selection_is_exported(page: Page, server: AppServer, tmp_path: Path) ->
     bag = zipfile.ZipFile(io.BytesIO(page.made("do=rosbag2")))
     assert sorted(bag.namelist()) == [
         "katana450/",
-        "katana450/katana450_0.mcap",
+        "katana450/katana450.mcap",
         "katana450/metadata.yaml",
     ]
     del server
