@@ -29,8 +29,9 @@ def test_server_that_records_nothing_says_so(own_page: ViserPage) -> None:
 
 @pytest.mark.long
 def test_person_chooses_a_name_and_saves_picture_and_link(
-    server: AppServer, open_page: OpenPage, tmp_path: Path, artefacts: Path
+    server: AppServer, own_page: ViserPage, open_page: OpenPage, tmp_path: Path, artefacts: Path
 ) -> None:
+    own_page.press_in_bar("Release")
     page, other = (open_page(server.url, nodes=("/arm",)) for _ in range(2))
     name, why = page.page.get_by_label("Your name"), page.page.locator("#own-name-why")
     number = bar(other, "name").partition(",")[0]
