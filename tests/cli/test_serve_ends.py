@@ -15,6 +15,7 @@ from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
+from ruckig import Ruckig
 
 from katana450.assembly import supervisor as supervisor_module
 from katana450.assembly.robot_session import find_robot
@@ -70,6 +71,32 @@ def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
     errors = capfd.readouterr().err
     assert "It fails with" in errors
     assert "leaked" not in errors
+
+
+def ended_amid_work(_config: object, _supervisor: SupervisorPipe) -> None:
+    holding = threading.Event()
+
+    def plan() -> None:
+        held = Ruckig(5, 0.01)
+        holding.set()
+        time.sleep(60.0)
+        del held
+
+    threading.Thread(target=plan, daemon=True).start()
+    holding.wait()
+    print("It ends.")
+
+
+def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
+    supervisor = Supervisor([child_spec("it", "It", ended_amid_work, None, 5.0)], threading.Event())
+    supervisor.start()
+    process = supervisor._children["it"].process
+    process.join(60.0)
+    supervisor.stop()
+    output = capfd.readouterr()
+    assert process.exitcode == 0
+    assert "It ends." in output.out
+    assert "leaked" not in output.err
 
 
 def never(_kept: object) -> Work:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import logging
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -185,9 +187,20 @@ def run_supervised(
     except Exception:
         log.critical("This process met an error.", exc_info=True)
     else:
-        return
-    # At once: Python would list all objects that the error still holds.
-    os._exit(1)
+        # Coverage, children and temporary folders end so.
+        atexit._run_exitfuncs()
+        _exit_now(0)
+    _exit_now(1)
+
+
+def _exit_now(status: int) -> None:
+    """End this process without the end of Python.
+
+    That lists the objects of libraries that an error, or a thread amid its work, still holds.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(status)
 
 
 def _end_after(supervisor: SupervisorPipe, failure: threading.ExceptHookArgs) -> None:
