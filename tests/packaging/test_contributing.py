@@ -8,12 +8,14 @@ import tomllib
 from pathlib import Path
 
 import katana450
+from docs import modes
 from katana450.arm.control.act import Traits
 from katana450.cli.core_commands import CORE_COMMANDS
 from katana450.extension import extensions
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = Path(katana450.__file__).parent
+TOUR = modes.FILE.read_text(encoding="utf-8")
 MAP = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
@@ -65,12 +67,20 @@ def test_map_has_the_layers_of_the_contract_from_top_to_bottom() -> None:
     assert drawn == layers
 
 
-def test_path_of_a_drag_names_files_that_exist_and_their_number() -> None:
-    path = MAP.partition("## A gizmo drag")[2].partition("## More")[0]
-    files = re.findall(r"^\d+\. `([\w/]+\.py)`", path, re.MULTILINE)
-    assert f"{len(files)} files below" in path
-    assert len(set(files)) == len(files)
-    assert all((PACKAGE / file).is_file() for file in re.findall(r"`([\w/]+\.py)`", path))
+def test_tour_names_files_that_exist_and_the_number_of_those_of_a_drag() -> None:
+    files = re.findall(r"`([\w/]+\.(?:py|js))`", TOUR)
+    assert len(files) > 30
+    assert all(
+        (ROOT if name.startswith("static") else PACKAGE).joinpath(name).is_file() for name in files
+    )
+    drag = TOUR.partition("## One drag")[2].partition("\n## ")[0]
+    numbered = re.findall(r"^\d+\. `([\w/]+\.py)`", drag, re.MULTILINE)
+    assert f"in {len(numbered)} files" in drag
+    assert len(set(numbered)) == len(numbered)
+
+
+def test_diagram_of_the_modes_is_that_of_the_table() -> None:
+    assert modes.content(TOUR) == TOUR, "run python -m docs.modes"
 
 
 def test_every_part_of_the_extensions_folder_is_described() -> None:
