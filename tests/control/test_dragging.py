@@ -131,7 +131,7 @@ def drag(chain: Chain, session: Session, trip: Trip, seed: int) -> Iterator[Stat
         if turning and number % 3 == 2:
             desired = current_target(session.require_arm(), state)
             turn = rng.normal(scale=trip.turns, size=2)
-            command: cmd.Command = cmd.Turn(desired.pitch + turn[0], desired.roll + turn[1])  # type: ignore[attr-defined]
+            command: cmd.Command = cmd.Turn(desired.pitch + turn[0], desired.roll + turn[1])
         else:
             target = np.clip(target + trip.way, -limit, limit)
             command = cmd.Position(target)

@@ -11,10 +11,10 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.general_arms.driven import begun, pose, run, session_of, settled
 from tests.general_arms.published_arms import FOUR, KR_6, PANDA, SEVEN, UR5E
 from tests.general_arms.test_random_drags import is_clear
@@ -66,7 +66,9 @@ def test_drag_with_a_clear_way_arrives(name: str) -> None:
     chain = SEVEN[drag.arm]
     tool, q = DrivenTool(chain), np.array(drag.start)
     state, since = State.standing(q, 0.0, 0.0, "tcp", tool.branch_of(q)), tool.target_at(q)
-    target = ToolPose(since.position + np.array(drag.move), so3.exp(np.array(drag.turn)) @ since.R)
+    target = ToolTarget(
+        since.position + np.array(drag.move), rotation=so3.exp(np.array(drag.turn)) @ since.R
+    )
     assert is_clear(tool, q, str(state.branch), (since, target))
     for _ in range(MAX_TICKS):
         found = tool.track(state, target, since)
@@ -75,7 +77,7 @@ def test_drag_with_a_clear_way_arrives(name: str) -> None:
         state = replace(state, goal=found.best.q)
         if found.since is None:
             break
-        assert isinstance(found.since, ToolPose)
+        assert found.since is not None
         since = found.since
     assert found.since is None
     assert found.beyond_gap is None

@@ -15,7 +15,6 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import describe_robot, find_arm
 from katana450.errors import InputError
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_builder import TICK, PlanContext
@@ -32,6 +31,7 @@ from katana450.extensions.recording.forms import FormError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.water.units import FEMTOLITRE, ML
@@ -212,7 +212,7 @@ def test_flow_follows_the_rate(name: str, ml: float, rate: float, tmp_path: Path
     assert water.water.spilled == 0
 
 
-START = ToolPose.of(
+START = ToolTarget.of(
     se3.from_rotation_translation(so3.from_rpy(0.3, 0.2, 0.1), np.array((0.5, 0.1, 0.4)))
 )
 TURN = PoseTurn(

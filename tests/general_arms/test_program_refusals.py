@@ -9,7 +9,6 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.building.plan_builder import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import Program, compiled
@@ -110,10 +109,9 @@ def test_no_path_changes_its_branch(chain: Chain) -> None:
     kinematics = made.plan_context.arm.kinematics
     for _ in range(12):
         start = made.target
-        assert isinstance(start, ToolPose)
         end = start.moved(start.position + rng.normal(size=3) * 2.5e-3 * length(chain))
         if chain.n >= 6:
-            end = replace(end, R=so3.exp(0.6 * rng.normal(size=3)) @ start.R)
+            end = replace(end, rotation=so3.exp(0.6 * rng.normal(size=3)) @ start.R)
         curve = made.planning.line(made.target, end)
         try:
             path = made.planning.path(made.q, curve, kinematics.branch_of(made.q))

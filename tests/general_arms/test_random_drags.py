@@ -14,11 +14,11 @@ from katana450.extensions.general_arms.branch_solver import near_turns
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
 from katana450.extensions.general_arms.regularity import NEAR
 from katana450.extensions.general_arms.swivel import SevenAxes
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 from tests.conftest import MANY_DRAGS
 from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
 
@@ -56,7 +56,7 @@ class Dragged(NamedTuple):
     seconds: float
 
 
-def on_branch(tool: DrivenTool, place: ToolPose, branch: str, q: FloatArray) -> FloatArray | None:
+def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -> FloatArray | None:
     """Return the posture of ``branch`` at ``place`` next to ``q``; None if there is none.
 
     Four axes turn the pose with axis 1, and seven keep their swivel.
@@ -76,7 +76,9 @@ def on_branch(tool: DrivenTool, place: ToolPose, branch: str, q: FloatArray) -> 
     return q
 
 
-def is_clear(tool: DrivenTool, q: FloatArray, branch: str, way: tuple[ToolPose, ToolPose]) -> bool:
+def is_clear(
+    tool: DrivenTool, q: FloatArray, branch: str, way: tuple[ToolTarget, ToolTarget]
+) -> bool:
     """Return whether ``branch`` has postures inside the limits all the way, without a leap.
 
     Only arms with a closed form can tell. The arm stands at the beginning of the way. Four and
@@ -120,7 +122,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
         turn = so3.exp(
             0.3 * rng.normal() * chain.S[:3, 3] if chain.n == 4 else 0.3 * rng.normal(size=3)
         )
-        target = ToolPose(since.position + 0.08 * rng.normal(size=3), turn @ since.R)
+        target = ToolTarget(since.position + 0.08 * rng.normal(size=3), rotation=turn @ since.R)
         way_is_clear = (
             exact
             and priority is Priority.POSE
@@ -138,7 +140,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
             state = replace(state, goal=goal)
             if found.since is None:
                 break
-            assert isinstance(found.since, ToolPose)
+            assert found.since is not None
             since = found.since
         since = target
         exact = found.best.position_error < 1e-6 and found.best.rotation_error < 1e-6

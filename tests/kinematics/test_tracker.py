@@ -85,7 +85,7 @@ def arrived(
             target,
             branch=FRONT_UP,
             priority=priority,
-            since=tracked.since,  # type: ignore[arg-type]
+            since=tracked.since,
         )
     assert tracked.since is None
     return tracked
@@ -311,7 +311,7 @@ def test_out_of_reach_the_tool_does_not_move_away() -> None:
         was = math.dist(forward(chain, q)[:3, 3], target.position)
         tracked = track(chain, q, target, branch=branch, since=since)
         while tracked.since is not None:
-            tracked = track(chain, tracked.best.q, target, branch=branch, since=tracked.since)  # type: ignore[arg-type]
+            tracked = track(chain, tracked.best.q, target, branch=branch, since=tracked.since)
         assert tracked.best.position_error <= was + 1e-8
         q, since = tracked.best.q, target
 

@@ -15,14 +15,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import run_state_machine_as_test
-from msgspec import Struct
+from msgspec import Struct, msgpack
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.act import classes_of
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.modes import IDLE
+from katana450.arm.control.modes import IDLE, Target, Tracking
 from katana450.arm.control.pouring import MotionWithWater, VesselMotion
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
@@ -50,6 +50,7 @@ from katana450.extensions.recording.codec import (
     recorded_classes,
 )
 from katana450.extensions.recording.digest import Digester
+from katana450.extensions.recording.former_forms import target_content
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.shared_values import key_of
 from katana450.maths.geometry.arrays import FloatArray
@@ -419,6 +420,22 @@ SAMPLE = {"is": "Servo", "q": [0.1, 0.2], "qd": None, "gripper": None}
 def test_commands_of_older_versions_are_read(form: dict[str, Any], expected: cmd.Command) -> None:
     command = Codec().decoded(cmd.Command, form)
     assert text_of(command) == text_of(expected)
+
+
+def test_target_of_an_older_version_is_read_and_has_its_digest(state: State) -> None:
+    """Poses were a class of their own, and targets of five axes had no rotation."""
+    form = {"is": "ToolPose", "position": [0.1, 0.2, 0.3], "R": np.eye(3).tolist()}
+    pose = Codec().decoded(Target, form)
+    np.testing.assert_array_equal(pose.T[:3], np.column_stack((np.eye(3), (0.1, 0.2, 0.3))))
+    assert target_content(pose) == ("ToolPose", {"position": pose.position, "R": pose.R})
+    five = Codec().decoded(
+        Target, {"is": "ToolTarget", "position": [1, 2, 3], "pitch": 0.1, "roll": 0.2}
+    )
+    content = {"position": five.position, "pitch": 0.1, "roll": 0.2}
+    assert target_content(five) == ("ToolTarget", content)
+    drag = replace(state, mode=Tracking(five, five))
+    former = msgpack.encode({"target": content}, enc_hook=lambda value: value.tobytes())
+    assert former[1:] in Digester().content(drag)
 
 
 @given(st.floats(0.0, 300.0))

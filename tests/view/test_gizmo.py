@@ -65,5 +65,5 @@ def test_rings_turn_the_tool_of_their_arm(
         else:
             now = arm.kinematics.target_at(state.goal)
             turns = {"pitch": (0.1, 0.0), "roll": (0.0, 0.1)}[ring]
-            after = (command.pitch - now.pitch, command.roll - now.roll)  # type: ignore[attr-defined]
+            after = (command.pitch - now.pitch, command.roll - now.roll)
             assert after == pytest.approx(turns, abs=1e-9)

@@ -20,7 +20,7 @@ from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.solution import Solution
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import singular_values
 
 
@@ -92,14 +92,14 @@ def branch_named(arm: ArmModel, name: str) -> AnyBranch:
     raise InputError(f"This arm has no branch {name!r}; its branches are {names}.")
 
 
-def current_target(arm: ArmModel, state: State) -> DragTarget:
+def current_target(arm: ArmModel, state: State) -> ToolTarget:
     """Return the target that a drag starts from: the present tool target, or that of the goal."""
     if not isinstance(state.target, JointTarget | PoseTarget):
         return state.target
     return arm.kinematics_to(state.tool).target_at(state.goal)
 
 
-def target_on_branch(arm: ArmModel, state: State, branch: AnyBranch) -> DragTarget:
+def target_on_branch(arm: ArmModel, state: State, branch: AnyBranch) -> ToolTarget:
     """Return the present target in the numbers of ``branch``."""
     kinematics = arm.kinematics_to(state.tool)
     return kinematics.target_on(state, current_target(arm, state), branch)

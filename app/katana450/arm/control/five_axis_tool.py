@@ -19,7 +19,7 @@ from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch, branc
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget, pitched_frame
+from katana450.maths.kinematics.tool import ToolTarget, pitched_frame
 from katana450.maths.kinematics.turns import in_limits_turns
 from katana450.maths.motion.limiter import Limits
 
@@ -44,37 +44,37 @@ class FiveAxisTool(FiveAxisKinematics):
         """Return `branch.branch_of`."""
         return branch_of(self.chain, q)
 
-    def target_at(self, q: FloatArray) -> DragTarget:
+    def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the five freedoms of the tool at `q` (5,) [rad]."""
         return ToolTarget.at(self.chain, q)
 
-    def turned(self, _state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
+    def turned(self, _state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
         """Return ``target`` with the pitch and roll of ``command``."""
         turn = cast(Turn, command)
         return ToolTarget(target.position, turn.pitch, turn.roll)
 
-    def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:
+    def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then pitch and roll [rad]."""
-        moved, five = step.by[:3], cast(ToolTarget, target)
+        moved = step.by[:3]
         if step.frame is velocity.JogFrame.TOOL:
             moved = forward(self.chain, state.goal)[:3, :3] @ moved
-        pitch, roll = five.pitch + float(step.by[3]), five.roll + float(step.by[4])
-        return ToolTarget(frozen(five.position + moved), pitch, roll)
+        pitch, roll = target.pitch + float(step.by[3]), target.roll + float(step.by[4])
+        return ToolTarget(frozen(target.position + moved), pitch, roll)
 
-    def target_on(self, state: State, target: DragTarget, branch: AnyBranch) -> DragTarget:
+    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:
         """Return ``target`` for the shoulder of ``branch``: its plane may face the other way."""
         same = _five(branch).shoulder == _five(state.branch).shoulder
-        return target if same else cast(ToolTarget, target).turned_round()
+        return target if same else target.turned_round()
 
-    def track(self, state: State, target: DragTarget, since: DragTarget) -> tracker.Tracked:
+    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> tracker.Tracked:
         """Return `tracker.track`."""
         return tracker.track(
             self.chain,
             state.goal,
-            cast(ToolTarget, target),
+            target,
             branch=_five(state.branch),
             priority=state.priority,
-            since=cast(ToolTarget, since),
+            since=since,
         )
 
     def project(self, state: State, T: FloatArray, branch: AnyBranch) -> projection.Projection:
@@ -82,10 +82,9 @@ class FiveAxisTool(FiveAxisKinematics):
         where, priority = _five(branch), state.priority
         return projection.project(self.chain, T, branch=where, q_hint=state.goal, priority=priority)
 
-    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> projection.Projection:
+    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> projection.Projection:
         """Return `tracker.leap`."""
-        five = cast(ToolTarget, target)
-        return tracker.leap(self.chain, state.goal, five, _five(branch), state.priority)
+        return tracker.leap(self.chain, state.goal, target, _five(branch), state.priority)
 
     def losses(
         self, state: State, best: projection.Projection, *, yaw_was_given: bool

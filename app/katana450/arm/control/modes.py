@@ -13,7 +13,7 @@ import numpy as np
 from katana450.arm.control.following import Following
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
@@ -33,7 +33,7 @@ class PoseTarget:
     T: FloatArray
 
 
-Target = JointTarget | DragTarget | PoseTarget
+Target = JointTarget | ToolTarget | PoseTarget
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,8 @@ class Tracking:
             path.
     """
 
-    target: DragTarget
-    since: DragTarget
+    target: ToolTarget
+    since: ToolTarget
     let_go: bool = False
 
 

@@ -31,7 +31,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
@@ -333,7 +333,7 @@ class State:
         return self.intent.stream if isinstance(self.intent, Servoing) else None
 
     @property
-    def since(self) -> DragTarget | None:
+    def since(self) -> ToolTarget | None:
         """Target up to which a drag has been followed along its path; None without a drag."""
         return self.intent.since if isinstance(self.intent, Tracking) else None
 

@@ -12,7 +12,7 @@ from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
@@ -41,19 +41,19 @@ class ToolKinematics(Kinematics, Protocol):
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the branch of the joint angles `q` (n,) [rad]."""
 
-    def target_at(self, q: FloatArray) -> DragTarget:
+    def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the target at which the tool is with the joints at `q` (n,) [rad]."""
 
-    def turned(self, state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
+    def turned(self, state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
         """Return ``target`` with the orientation of ``command``, which is a `turn`."""
 
-    def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:
+    def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``."""
 
-    def target_on(self, state: State, target: DragTarget, branch: AnyBranch) -> DragTarget:
+    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:
         """Return ``target``, given on the branch of ``state``, in the numbers of ``branch``."""
 
-    def track(self, state: State, target: DragTarget, since: DragTarget) -> Tracked:
+    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, as far as one tick allows.
 
         It stays on its branch and never leaps. ``since`` is the target up to which the path of the
@@ -63,7 +63,7 @@ class ToolKinematics(Kinematics, Protocol):
     def project(self, state: State, T: FloatArray, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch``, inside the limits, nearest to the pose `T` (4, 4)."""
 
-    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
+    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``, at any distance."""
 
     def losses(self, state: State, best: Projection, *, yaw_was_given: bool) -> tuple[Finding, ...]:

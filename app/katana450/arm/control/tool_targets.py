@@ -27,7 +27,7 @@ from katana450.arm.control.tool_commands import StepTool, TurnCommand
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 
 KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, Reason.WAITING, *CAUSES, *GRIPPER_REASONS)
 """The reasons that a jog keeps; it computes all others again."""
@@ -41,7 +41,7 @@ def with_pose_target(arm: ArmModel, state: State, target: PoseTarget) -> State:
     return with_goal(state, best.q, findings, Positioning(target))
 
 
-def dragged(arm: ArmModel, state: State, target: DragTarget, *, let_go: bool = False) -> State:
+def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
     """Return ``state`` that tracks ``target`` from now on, along the path of the drag.
 
     let_go: whether the drag has ended already.

@@ -16,9 +16,9 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.regularity import NEAR, WALL, Regularity
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import HOP
 
 Angles = tuple[float, ...]
@@ -105,7 +105,7 @@ class Descent:
         chain = self.search.chain
         return 0.5 * (chain.lower + chain.upper)
 
-    def goal(self, target: ToolPose) -> tuple[float, ...]:
+    def goal(self, target: ToolTarget) -> tuple[float, ...]:
         """Return ``target`` as `Numerical` reads it."""
         return self.search.goal(target.T)
 

@@ -26,7 +26,6 @@ from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.extensions.general_arms.ready_posture import ready_posture
 from katana450.extensions.general_arms.regularity import WALL, Regularity
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -35,7 +34,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projection
 from katana450.maths.kinematics.solution import Solutions
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
@@ -107,44 +106,44 @@ class DrivenTool:
         """Return the name of the branch of `q` (n,) [rad]."""
         return self._branches.branch_of(q)
 
-    def target_at(self, q: FloatArray) -> ToolPose:
+    def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the pose of the tool at `q` (n,) [rad]."""
         return self._seen(forward(self.chain, q), q)
 
-    def turned(self, state: State, target: DragTarget, command: TurnCommand) -> DragTarget:
+    def turned(self, state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
         """Return ``target`` with the rotation of ``command``."""
         assert isinstance(command, Orient)
-        return ToolPose(target.position, frozen(self._pan(state.goal).T @ command.R))
+        return ToolTarget(target.position, rotation=frozen(self._pan(state.goal).T @ command.R))
 
-    def stepped(self, state: State, target: DragTarget, step: StepTool) -> DragTarget:
+    def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then a rotation vector [rad]."""
-        pose, pan, by = _pose(target), self._pan(state.goal), step.by
+        pan, by = self._pan(state.goal), step.by
         R = np.eye(3)
         if step.frame is JogFrame.TOOL:
             R = forward(self.chain, state.goal)[:3, :3]
-        turned = so3.exp(R @ by[3:]) @ pan @ pose.R
-        return ToolPose(frozen(pose.position + R @ by[:3]), frozen(pan.T @ turned))
+        turned = so3.exp(R @ by[3:]) @ pan @ target.R
+        return ToolTarget(frozen(target.position + R @ by[:3]), rotation=frozen(pan.T @ turned))
 
     def _pan(self, q: FloatArray) -> FloatArray:
         """Return the rotation (3, 3) that axis 1 gives to targets of fewer than six axes."""
         return so3.exp(self.chain.S[:3, 0] * float(q[0])) if self.chain.n < 6 else np.eye(3)
 
-    def target_on(self, state: State, target: DragTarget, branch: AnyBranch) -> DragTarget:  # noqa: ARG002
+    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:  # noqa: ARG002
         """Return ``target``: a pose is the same on every branch."""
         return target
 
-    def track(self, state: State, target: DragTarget, since: DragTarget) -> Tracked:
+    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, see `PoseTracker`."""
-        pose, branch = _pose(target), str(state.branch)
-        found = self._tracker.track(state.goal, pose, _pose(since), branch, state.priority)
-        best = self._projected(found.q, pose, branch, state.priority)
+        branch = str(state.branch)
+        found = self._tracker.track(state.goal, target, since, branch, state.priority)
+        best = self._projected(found.q, target, branch, state.priority)
         if found.since is not None or found.beyond_gap is None:
             return Tracked(best, since=found.since)
-        ahead = self._projected(found.beyond_gap, pose, branch, state.priority)
+        ahead = self._projected(found.beyond_gap, target, branch, state.priority)
         return Tracked(best, beyond_gap=ahead)
 
     def _projected(
-        self, q: FloatArray, target: ToolPose, branch: str, priority: Priority
+        self, q: FloatArray, target: ToolTarget, branch: str, priority: Priority
     ) -> Projection:
         T = np.array(target.T)
         T[:3, :3] = self._pan(q) @ T[:3, :3]
@@ -158,19 +157,18 @@ class DrivenTool:
         """
         return self._nearest(state, T, branch, partial(self._seen, T))
 
-    def leap(self, state: State, target: DragTarget, branch: AnyBranch) -> Projection:
+    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``."""
-        pose = _pose(target)
-        T = np.array(pose.T)
+        T = np.array(target.T)
         T[:3, :3] = self._pan(state.goal) @ T[:3, :3]
-        return self._nearest(state, T, branch, lambda _q: pose)
+        return self._nearest(state, T, branch, lambda _q: target)
 
     def _nearest(
         self,
         state: State,
         T: FloatArray,
         branch: AnyBranch,
-        target_at: Callable[[FloatArray], ToolPose],
+        target_at: Callable[[FloatArray], ToolTarget],
     ) -> Projection:
         """Return the posture on ``branch`` nearest to the target, which `q` (n,) may turn.
 
@@ -215,14 +213,14 @@ class DrivenTool:
             starts.append(self.chain.clamp(state.goal))
         return starts
 
-    def _descended(self, q: FloatArray, pose: ToolPose, priority: Priority) -> FloatArray:
+    def _descended(self, q: FloatArray, pose: ToolTarget, priority: Priority) -> FloatArray:
         descent = self._tracker.descent
         end = descent.run(descent.goal(pose), tuple(q.tolist()), priority, SEARCH_EFFORT)
         return np.array(end.q)
 
-    def _seen(self, T: FloatArray, q: FloatArray) -> ToolPose:
+    def _seen(self, T: FloatArray, q: FloatArray) -> ToolTarget:
         """Return the pose `T` (4, 4) as a target with axis 1 as at `q` (n,) [rad]."""
-        return ToolPose(frozen(T[:3, 3]), frozen(self._pan(q).T @ T[:3, :3]))
+        return ToolTarget(frozen(T[:3, 3]), rotation=frozen(self._pan(q).T @ T[:3, :3]))
 
     def losses(
         self,
@@ -245,7 +243,7 @@ class DrivenTool:
         at_edge = False
         if max(best.position_error, best.rotation_error) > POSITION_WORTH_TELLING:
             descent = self._tracker.descent
-            look = descent.look(descent.goal(ToolPose.of(best.T)), tuple(best.q.tolist()))
+            look = descent.look(descent.goal(ToolTarget.of(best.T)), tuple(best.q.tolist()))
             at_edge = look.least <= AT_EDGE
         return tuple(losses_of(self.chain, best, priority, at_edge=at_edge, gap=gap))
 
@@ -298,11 +296,6 @@ class DrivenTool:
     def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return `ready_posture`."""
         return ready_posture(self._tracker.descent, T_base_shoulder)
-
-
-def _pose(target: DragTarget) -> ToolPose:
-    assert isinstance(target, ToolPose)
-    return target
 
 
 def _misses(found: Projection, priority: Priority) -> tuple[float, ...]:

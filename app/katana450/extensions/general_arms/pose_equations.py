@@ -21,9 +21,9 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.descent import Descent, Look
 from katana450.extensions.general_arms.regularity import Regularity
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, sin_cos
 from katana450.maths.planning.posture import JointJets, ThreeJets
 
@@ -146,7 +146,7 @@ class PoseEquations:
 
     def least(self, q: FloatArray) -> float:
         """Return the smallest singular value of the deciding matrix at `q` (n,) [rad]."""
-        goal = self.descent.goal(ToolPose.of(np.eye(4)))
+        goal = self.descent.goal(ToolTarget.of(np.eye(4)))
         return Regularity.least(self._linear(self.descent.look(goal, tuple(q.tolist())))[2])
 
     def posture(self, q: FloatArray, wanted: FloatArray) -> RegularPosture | None:
@@ -154,7 +154,7 @@ class PoseEquations:
 
         None if Newton's method does not lead there.
         """
-        goal = self.descent.goal(ToolPose.of(wanted))
+        goal = self.descent.goal(ToolTarget.of(wanted))
         angles = q.tolist()
         for _ in range(STEPS if self.is_exact else LOOSE_STEPS):
             look = self.descent.look(goal, tuple(angles))

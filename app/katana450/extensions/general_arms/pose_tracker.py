@@ -19,11 +19,11 @@ from katana450 import tolerances
 from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.descent import Angles, Descent
 from katana450.extensions.general_arms.regularity import NEAR, WALL
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import DRAG_STRIDE, HOP, MAX_PATH_LENGTH, MIN_LEAP_GAIN
 
 MAX_EFFORT: Final = 20
@@ -57,7 +57,7 @@ class Pursued:
     """
 
     q: FloatArray
-    since: ToolPose | None = None
+    since: ToolTarget | None = None
     beyond_gap: FloatArray | None = None
 
 
@@ -74,7 +74,7 @@ class PoseTracker:
         return self.descent.search.chain
 
     def track(
-        self, q: FloatArray, target: ToolPose, since: ToolPose, branch: str, priority: Priority
+        self, q: FloatArray, target: ToolTarget, since: ToolTarget, branch: str, priority: Priority
     ) -> Pursued:
         """Return the goal moved on from `q` (n,) [rad] on ``branch`` towards ``target``."""
         here, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
@@ -96,8 +96,8 @@ class PoseTracker:
     def _advanced(
         self,
         q: Angles,
-        start: ToolPose,
-        stop: ToolPose,
+        start: ToolTarget,
+        stop: ToolTarget,
         branch: str,
         priority: Priority,
         effort: int,
@@ -124,14 +124,14 @@ class PoseTracker:
             return q, effort, True
         return end.q, effort, end.ended
 
-    def _is_led_along_edge(self, q: Angles, stop: ToolPose, priority: Priority) -> bool:
+    def _is_led_along_edge(self, q: Angles, stop: ToolTarget, priority: Priority) -> bool:
         """Return whether steps of seven axes towards ``stop`` ended at the edge of the branch."""
         if self.branches.swivel is None or priority is not Priority.POSE:
             return False
         now = self.descent.look(self.descent.goal(stop), q)
         return now.least < NEAR and float(np.abs(now.error).max()) > EXACT
 
-    def _with_its_swivel(self, q: Angles, stop: ToolPose, branch: str) -> Angles | None:
+    def _with_its_swivel(self, q: Angles, stop: ToolTarget, branch: str) -> Angles | None:
         """Return the posture of ``branch`` at ``stop`` with the swivel of `q`; None without a way.
 
         On the way every posture is inside the limits, clear of the edge, and a hop from the last.
@@ -139,7 +139,7 @@ class PoseTracker:
         here = np.array(q)
         if not self._takes(stop, self.branches.at_its_swivel(stop.T[None], branch, here)[0]):
             return None
-        start = ToolPose.of(forward(self.chain, here))
+        start = ToolTarget.of(forward(self.chain, here))
         places = [
             *(start.towards(stop, k / SWIVEL_SAMPLES) for k in range(1, SWIVEL_SAMPLES)),
             stop,
@@ -151,7 +151,7 @@ class PoseTracker:
         leads = np.abs(steps).max() <= HOP and all(map(self._takes, places, postures))
         return tuple(self.chain.clamp(postures[-1]).tolist()) if leads else None
 
-    def _takes(self, place: ToolPose, q: FloatArray) -> bool:
+    def _takes(self, place: ToolTarget, q: FloatArray) -> bool:
         """Return whether `q` (n,) takes the pose inside the limits, clear of the edge."""
         if not (np.isfinite(q).all() and self.chain.within_limits(q)):
             return False
@@ -161,7 +161,7 @@ class PoseTracker:
     def _leaves(self, q: Angles, branch: str) -> bool:
         return self.branches.branch_of(np.array(q)) != branch
 
-    def _exact(self, place: ToolPose, branch: str, q: Angles) -> Angles | None:
+    def _exact(self, place: ToolTarget, branch: str, q: Angles) -> Angles | None:
         """Return the posture of ``branch`` at ``place`` inside the limits; None without one."""
         near = np.array(q)
         found = self.branches.on_branch(place.T, branch, near)
@@ -172,7 +172,7 @@ class PoseTracker:
         return angles if now.square <= EXACT * EXACT else None
 
     def _beyond(
-        self, q: FloatArray, target: ToolPose, branch: str, priority: Priority
+        self, q: FloatArray, target: ToolTarget, branch: str, priority: Priority
     ) -> FloatArray | None:
         """Return the exact posture of the branch for ``target``, if `q` (n,) misses it."""
         goal = self.descent.goal(target)

@@ -33,7 +33,6 @@ from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.regularity import Regularity
 from katana450.extensions.general_arms.swivel import SevenAxes
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.reachability.reachability import (
     BoolArray,
     IntArray,
@@ -46,6 +45,7 @@ from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 
 Solver = ClosedForm | SevenAxes | Numerical
 """The kinematics of arms outside the five-axis family."""
@@ -171,7 +171,7 @@ class PointSearch:
         q, points = self._table
         if not len(q):
             return False
-        goal = self._descent.goal(ToolPose.of(se3.from_rotation_translation(np.eye(3), point)))
+        goal = self._descent.goal(ToolTarget.of(se3.from_rotation_translation(np.eye(3), point)))
         far = ((points - point) ** 2).sum(axis=1)
         for start in q[np.argsort(far, kind="stable")[:STARTS]].tolist():
             end = self._descent.run(goal, tuple(start), Priority.POSITION, EFFORT).q

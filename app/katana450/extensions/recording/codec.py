@@ -27,7 +27,6 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.planning.curves import (
     Curve,
     Linear,
@@ -45,7 +44,7 @@ from katana450.extensions.programs.planning.curves import (
 from katana450.extensions.programs.planning.pose_path import PosePath
 from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath
-from katana450.extensions.recording.former_forms import FORMER, command_form, upgraded
+from katana450.extensions.recording.former_forms import CLASSES, FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (
     MAX_INT,
     MAX_ITEMS,
@@ -57,7 +56,6 @@ from katana450.extensions.recording.forms import (
     shown,
 )
 from katana450.extensions.recording.shared_values import SharedValues
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Plan, Segment
@@ -67,7 +65,6 @@ MEMBERS: Final[Mapping[Any, Any]] = {
     Curve: ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn,
     PoseCurve: TurnedCurve | PoseTurn | PoseLines,
     Callable: Linear | Swing,
-    DragTarget: ToolTarget | ToolPose,
     Command: Union[classes_of(Command)],  # noqa: UP007
 }
 """The types that a field may hold whose type is a base or a protocol, by that type."""
@@ -299,7 +296,7 @@ def _union(parts: Iterable[Any]) -> TextForm:
             name = form.get(TAG)
             # Before a field had several types, its objects had no tag.
             fit = [record for record in records.values() if record.has_form_of(form)]
-            record = records.get(name) if isinstance(name, str) else None
+            record = records.get(CLASSES.get(name, name)) if isinstance(name, str) else None
             if name is None and len(fit) == 1:
                 record = fit[0]
             if record is None:

@@ -16,10 +16,10 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control.following import Following
-from katana450.arm.control.modes import Leaving, Mode, Positioning
+from katana450.arm.control.modes import Leaving, Mode, Positioning, Tracking
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.extensions.recording.former_forms import poured_content
+from katana450.extensions.recording.former_forms import poured_content, target_content
 from katana450.extensions.recording.forms import FormError
 
 DIGEST_DIGITS = 10
@@ -83,5 +83,8 @@ def _mode(mode: Mode) -> tuple[Any, ...]:
             return name, _mode(along), _mode(then)
         case Positioning(target=target, beyond_gap=beyond, detour=detour):
             span = None if detour is None else detour.span
-            return name, type(target).__name__, target, beyond, span
+            return name, *target_content(target), beyond, span
+        case Tracking():
+            target, since = target_content(mode.target)[1], target_content(mode.since)[1]
+            return name, {"target": target, "since": since, "let_go": mode.let_go}
     return name, mode

@@ -11,8 +11,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from katana450.arm.control.act import tag_of
+from katana450.arm.control.modes import Target
 from katana450.arm.control.pouring import CUP, MotionWithWater
 from katana450.extensions.recording.forms import FormError, shown
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.units import ML
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}
@@ -24,6 +26,9 @@ OF_CUP = ("volume", "T", "slosh", "film", "wetted")
 WRITTEN = ("cup", "T_base_cup", "slosh", "film", "wetted")
 OF_MOTION = ("course", "middle", "velocity")
 
+
+CLASSES: Mapping[str, str] = {"ToolPose": "ToolTarget"}
+"""Present names of classes that had another one."""
 
 COMMANDS: Mapping[str, str] = {
     **{"SetJoint": "joint", "SetJoints": "joints", "MoveTool": "position", "SetPose": "pose"},
@@ -79,6 +84,8 @@ def _millilitres(volume: float) -> float:
 
 def upgraded(kind: type, form: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return ``form`` of a value of ``kind`` as it is written now. Raises FormError."""
+    if kind is ToolTarget and "R" in form:
+        return {"position": form.get("position"), "rotation": form["R"]}
     if kind is not MotionWithWater or "motions" in form:
         return form
     whole, water = dict(form), form.get("water")
@@ -88,6 +95,16 @@ def upgraded(kind: type, form: Mapping[str, Any]) -> Mapping[str, Any]:
     cup = {now: water.pop(name) for name, now in zip(WRITTEN, OF_CUP, strict=True) if name in water}
     motion = {name: whole.pop(name) for name in OF_MOTION if name in whole}
     return whole | {"water": water | {"vessels": [{"name": CUP} | cup]}, "motions": [motion]}
+
+
+def target_content(target: Target) -> tuple[str, Any]:
+    """Return the content of a target for a digest, with the classes of older versions."""
+    if not isinstance(target, ToolTarget):
+        return type(target).__name__, target
+    if target.is_pitched:
+        position, pitch, roll = target.position, target.pitch, target.roll
+        return "ToolTarget", {"position": position, "pitch": pitch, "roll": roll}
+    return "ToolPose", {"position": target.position, "R": target.R}
 
 
 def poured_content(poured: MotionWithWater | None) -> dict[str, Any] | None:

@@ -15,7 +15,6 @@ from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.scene_objects import Environment, SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.recording.messages import (
     UPRIGHT,
     JointMessage,
@@ -221,13 +220,11 @@ def _target(state: State) -> TargetMessage:
     match state.target:
         case JointTarget(q=q):
             return TargetMessage(q=_rounded(q, DIGITS))
-        case PoseTarget(T=T) | ToolPose(T=T):
-            return TargetMessage(T=[_rounded(row, DIGITS) for row in T])
-        case ToolTarget(position=position, pitch=pitch, roll=roll):
+        case ToolTarget(position=position, pitch=pitch, roll=roll, is_pitched=True):
             # As in the command, which makes the file smaller.
             return TargetMessage(position=position.tolist(), pitch=pitch, roll=roll)
-        case target:
-            return TargetMessage(position=target.position.tolist())
+        case PoseTarget(T=T) | ToolTarget(T=T):
+            return TargetMessage(T=[_rounded(row, DIGITS) for row in T])
 
 
 def _time(t: float) -> TimeMessage:

@@ -1,13 +1,13 @@
-"""Targets of a drag; that of a five-axis arm has as many numbers as the arm has axes."""
+"""The target of a tool: its point, and the freedoms of its orientation that count."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
@@ -38,36 +38,53 @@ def pitched_frame(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     return R
 
 
-class DragTarget(Protocol):
-    """A target that a drag moves: `ToolTarget`, or that of an arm outside the five-axis family.
+@dataclass(frozen=True, eq=False)
+class ToolTarget:
+    """A target of the tool, in the freedoms that its arm has.
+
+    A five-axis arm of the family chooses pitch and roll. The yaw follows from the arm: the roll
+    axis lies in the plane that turns with axis 1. Every other arm has a rotation as its target.
 
     Attributes:
         position: the tool point (3,) [m] in {S}.
-    """
-
-    @property
-    def position(self) -> FloatArray: ...  # noqa: D102
-
-    def moved(self, position: FloatArray) -> DragTarget:
-        """Return the target with another `position` (3,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class ToolTarget:
-    """The five freedoms of the arm's tool: ``position`` (3,) [m] in {S}, pitch and roll [rad].
-
-    Pitch is the angle of the roll axis below the horizontal, and roll the turn about it: for the
-    Katana theta2 + theta3 + theta4 and theta5. The yaw follows from the arm: the roll axis lies in
-    the plane that turns with axis 1.
+        pitch: angle of the roll axis below the horizontal [rad], for the Katana theta2 + theta3 +
+            theta4.
+        roll: turn about the roll axis [rad], for the Katana theta5.
+        rotation: rotation (3, 3) of the tool in {S}; None if pitch and roll count. For an arm with
+            fewer than six axes it is that with axis 1 at zero. So the tool keeps it in the frame
+            that turns with axis 1, like the pitch of a five-axis arm; the turn of axis 1 follows
+            from the position.
     """
 
     position: FloatArray
-    pitch: float
-    roll: float
+    pitch: float = 0.0
+    roll: float = 0.0
+    rotation: FloatArray | None = None
+
+    @staticmethod
+    def of(T: FloatArray) -> ToolTarget:
+        """Return the target that is the whole pose `T` (4, 4)."""
+        return ToolTarget(frozen(T[:3, 3]), rotation=frozen(T[:3, :3]))
+
+    @property
+    def is_pitched(self) -> bool:
+        """True if its orientation is the pitch and roll of a five-axis arm."""
+        return self.rotation is None
+
+    @property
+    def R(self) -> FloatArray:
+        """The rotation (3, 3) of a target that is not pitched."""
+        assert self.rotation is not None
+        return self.rotation
+
+    @cached_property
+    def T(self) -> FloatArray:
+        """The pose (4, 4) of a target that is not pitched."""
+        return se3.from_rotation_translation(self.R, self.position)
 
     @staticmethod
     def at(chain: Chain, q: FloatArray) -> ToolTarget:
-        """Return the target at which the tool is with the joints at `q` (5,) [rad]."""
+        """Return the target at which the tool of a five-axis arm is at `q` (5,) [rad]."""
         return ToolTarget(frozen(forward(chain, q)[:3, 3]), *pitch_and_roll(chain, q))
 
     def canonical(self, arm: FiveAxisArm, priority: Priority) -> CanonicalTarget:
@@ -106,9 +123,23 @@ class ToolTarget:
         return replace(self, position=position)
 
     def towards(self, other: ToolTarget, fraction: float) -> ToolTarget:
-        """Return the target at `fraction` (0 to 1) of the straight path to `other`."""
-        return ToolTarget(
-            frozen(self.position + fraction * (other.position - self.position)),
-            self.pitch + fraction * (other.pitch - self.pitch),
-            self.roll + fraction * (other.roll - self.roll),
-        )
+        """Return the target at `fraction` (0 to 1) of the straight path to `other`.
+
+        Pitch and roll change evenly, or the tool turns about one axis.
+        """
+        position = frozen(self.position + fraction * (other.position - self.position))
+        if self.is_pitched:
+            pitch = self.pitch + fraction * (other.pitch - self.pitch)
+            return ToolTarget(position, pitch, self.roll + fraction * (other.roll - self.roll))
+        turn = so3.log(other.R @ self.R.T)
+        return ToolTarget(position, rotation=frozen(so3.exp(fraction * turn) @ self.R))
+
+    def apart(self, other: ToolTarget) -> tuple[float, float]:
+        """Return the distance [m] and the angle [rad] between two targets of one arm.
+
+        The angle is the larger difference of pitch and roll, or that of the rotations.
+        """
+        distance = math.dist(self.position, other.position)
+        if self.is_pitched:
+            return distance, max(abs(self.pitch - other.pitch), abs(self.roll - other.roll))
+        return distance, so3.angle(self.R, other.R)

@@ -31,7 +31,7 @@ from katana450.maths.kinematics.projection import (
     Projection,
     measured,
 )
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
 HOP: Final = 0.1
@@ -87,7 +87,7 @@ class Tracked:
 
     best: Projection
     beyond_gap: Projection | None = None
-    since: DragTarget | None = None
+    since: ToolTarget | None = None
 
     def leap_ahead(self) -> tuple[int, float]:
         """Return the axis (from 0) that would leap farthest to the pose beyond the gap.
@@ -189,12 +189,8 @@ def _near(arm: FiveAxisArm, target: ToolTarget) -> ToolTarget:
 def _stops(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
     """Return the stops on the path of the drag, without its ends."""
     since, target = _near(arm, since), _near(arm, target)
-    strides = max(
-        math.dist(since.position, target.position) / DRAG_STRIDE,
-        abs(target.pitch - since.pitch) / HOP,
-        abs(target.roll - since.roll) / HOP,
-    )
-    count = math.ceil(min(strides, MAX_PATH_LENGTH))
+    distance, angle = since.apart(target)
+    count = math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH))
     return (since.towards(target, i / count) for i in range(1, count))
 
 

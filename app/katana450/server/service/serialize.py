@@ -24,7 +24,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
@@ -193,7 +192,7 @@ class _Tool(NamedTuple):
         T = forward(kinematics.chain, now.q).tolist()
         target = kinematics.target_at(now.q)
         speed = kinematics.tool_speed(now.setpoint, now.motion.qd)
-        if isinstance(target, ToolTarget):
+        if target.is_pitched:
             return cls(T, target.pitch, target.roll, speed)
         return cls(T, None, None, speed)
 

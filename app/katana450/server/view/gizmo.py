@@ -246,7 +246,7 @@ class Gizmo:
         if event.phase == "start":
             state = self._current()
             target = state.target
-            if isinstance(target, ToolTarget):
+            if isinstance(target, ToolTarget) and target.is_pitched:
                 pitch, roll = target.pitch, target.roll
             else:
                 chain = self._arm.chain_to(state.tool)

@@ -8,16 +8,15 @@ import numpy as np
 
 from katana450.extensions.programs.building.plan_builder import PlanBuilder
 from katana450.extensions.programs.planning.approach import UP
-from katana450.extensions.programs.planning.hand_planning import difference
 from katana450.extensions.programs.planning.tool_planning import AnyCurve
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.plan import JOIN_TOLERANCE
 
 APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
 """[m] Distances of approach and retreat of the open fingers, tried from the farthest."""
 
 
-def carry(builder: PlanBuilder, to: DragTarget, name: str) -> None:
+def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
     """Move the tool to ``to``: vertically, then about axis 1, then radially.
 
     The tool keeps its present orientation up to the last part. An object that is held upright stays
@@ -37,7 +36,7 @@ def carry(builder: PlanBuilder, to: DragTarget, name: str) -> None:
         curves.append(planning.line(at, raised))
     if abs(turn) > JOIN_TOLERANCE:
         curves.append(planning.arc(np.zeros(3), UP, turn, 0.0, raised, over))
-    if difference(over, to) > JOIN_TOLERANCE:
+    if max(over.apart(to)) > JOIN_TOLERANCE:
         curves.append(planning.line(over, to))
     if curves:
         builder.lead(curves, name)

@@ -28,7 +28,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.path import Path, joint_derivatives
@@ -85,7 +85,7 @@ class GraspInfo:
         before: the object as it stood before.
     """
 
-    at: DragTarget
+    at: ToolTarget
     chosen: Approach | None
     before: SceneObject
 
@@ -195,7 +195,7 @@ class PlanBuilder:
         return self._hands[tool]
 
     @property
-    def target(self) -> DragTarget:
+    def target(self) -> ToolTarget:
         """The present target of the tool, of any arm."""
         return self.planning.at(self.q)
 
@@ -365,7 +365,7 @@ class PlanBuilder:
             return q
         return self.joints_of(self.target_at(place), place.branch)
 
-    def target_at(self, place: StepTarget, now: DragTarget | None = None) -> DragTarget:
+    def target_at(self, place: StepTarget, now: ToolTarget | None = None) -> ToolTarget:
         """Return the target at ``place``, which has no joints; ``now`` gives absent values."""
         now = self.target if now is None else now
         p = now.position
@@ -374,7 +374,7 @@ class PlanBuilder:
         R = self.plan_context.T_base_shoulder[:3, :3] if place.in_base else np.eye(3)
         return self.planning.oriented(now.moved(p), place.angles, R)
 
-    def joints_of(self, target: DragTarget, branch: AnyBranch | None = None) -> FloatArray:
+    def joints_of(self, target: ToolTarget, branch: AnyBranch | None = None) -> FloatArray:
         """Return the joints (n,) [rad] for ``target``, on the present branch if possible.
 
         Raises InputError with the nearest places.
@@ -385,7 +385,7 @@ class PlanBuilder:
             raise InputError("" if self._brief else self.unreached(target, branch))
         return found
 
-    def unreached(self, target: DragTarget, branch: AnyBranch | None) -> str:
+    def unreached(self, target: ToolTarget, branch: AnyBranch | None) -> str:
         """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
         T = self.plan_context.T_base_shoulder
         frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame

@@ -15,7 +15,7 @@ from katana450.extensions.programs.planning.pose_path import LostPathError
 from katana450.extensions.programs.planning.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
 
 ANGLE = "angle"
@@ -68,7 +68,7 @@ def unfollowed(
 
 
 def line_remedies(
-    builder: PlanBuilder, start: DragTarget, end: DragTarget, refused: InputError
+    builder: PlanBuilder, start: ToolTarget, end: ToolTarget, refused: InputError
 ) -> Iterator[str]:
     """Yield texts to copy, with each of which the line from ``start`` to ``end`` is possible.
 
@@ -76,7 +76,7 @@ def line_remedies(
     """
     line = builder.planning.line
 
-    def possible(tried: DragTarget) -> bool:
+    def possible(tried: ToolTarget) -> bool:
         return _possible(builder, lambda: builder.lead([line(start, tried)], "line"))
 
     for pitch in _other_pitch(end, possible):
@@ -98,8 +98,8 @@ def line_remedies(
 
 def arc_remedies(
     builder: PlanBuilder,
-    end: DragTarget,
-    build: Callable[[DragTarget, float], None],
+    end: ToolTarget,
+    build: Callable[[ToolTarget, float], None],
     size: tuple[str, float],
     refused: InputError,
 ) -> Iterator[str]:
@@ -114,7 +114,7 @@ def arc_remedies(
         refused: why the whole arc is not possible.
     """
 
-    def possible(target: DragTarget, fraction: float) -> bool:
+    def possible(target: ToolTarget, fraction: float) -> bool:
         return _possible(builder, lambda: build(target, fraction))
 
     for other in _other_pitch(end, lambda target: possible(target, 1.0)):
@@ -138,17 +138,17 @@ def _farthest(possible: Callable[[float], bool]) -> float:
     return reached
 
 
-def _between(start: DragTarget, end: DragTarget, fraction: float) -> FloatArray:
+def _between(start: ToolTarget, end: ToolTarget, fraction: float) -> FloatArray:
     """Return the point (3,) [m] at ``fraction`` of the line."""
     return frozen(start.position + fraction * (end.position - start.position))
 
 
-def _other_pitch(end: DragTarget, possible: Callable[[DragTarget], bool]) -> Iterator[float]:
+def _other_pitch(end: ToolTarget, possible: Callable[[ToolTarget], bool]) -> Iterator[float]:
     """Yield the pitch [deg] nearest to that of ``end`` that is ``possible``, if there is one.
 
     Only targets of five axes have a pitch that can be changed alone.
     """
-    if not isinstance(end, ToolTarget):
+    if not end.is_pitched:
         return
     here = math.degrees(end.pitch)
     tried = np.arange(-MAX_PITCH, MAX_PITCH + PITCH_STEP, PITCH_STEP).tolist()

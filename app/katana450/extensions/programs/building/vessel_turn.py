@@ -18,14 +18,13 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.building.plan_builder import PlanBuilder
 from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.planning.curves import PoseTurn, ToolLine, ToolTurn
 from katana450.extensions.programs.planning.tool_planning import AnyCurve, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 
 EMPTY_TILT: Final = math.radians(120.0)
 """[rad] Tilt of a cup that is emptied about its lip: past its side. It is not tilted farther."""
@@ -62,7 +61,7 @@ class VesselTurn(ABC):
         end: angle at the end of the pour.
     """
 
-    at: DragTarget
+    at: ToolTarget
     end: float
 
     @abstractmethod
@@ -86,12 +85,12 @@ class Tilting(VesselTurn):
         at: the tool with the cup upright.
         lip: (3,) the point of the lip about which the cup tilts [m].
         axis: unit vector (3,), level, about which it does.
-        axis_in_pose: the same in the frame of the rotation of a `ToolPose`.
+        axis_in_pose: the same in the frame of the rotation of a `ToolTarget`.
         planning: that of the tool.
         end: angle at the end of the pour.
     """
 
-    at: ToolPose
+    at: ToolTarget
     lip: FloatArray
     axis: FloatArray
     axis_in_pose: FloatArray
@@ -109,9 +108,11 @@ class Tilting(VesselTurn):
         one, other = (self._tilted(tilt) if tilt else self.at for tilt in (start, end))
         return self.planning.arc(self.lip, self.axis, end - start, 0.0, one, other)
 
-    def _tilted(self, tilt: float) -> ToolPose:
+    def _tilted(self, tilt: float) -> ToolTarget:
         position = self.lip + so3.exp(tilt * self.axis) @ (self.at.position - self.lip)
-        return ToolPose(frozen(position), frozen(so3.exp(tilt * self.axis_in_pose) @ self.at.R))
+        return ToolTarget(
+            frozen(position), rotation=frozen(so3.exp(tilt * self.axis_in_pose) @ self.at.R)
+        )
 
     def by(self, angles: FloatArray) -> AnyCurve:
         """Return the `PoseTurn`."""
@@ -176,7 +177,7 @@ def turns_over(
     Raises InputError for a tilt that the arm cannot give it, and out of reach.
     """
     level = builder.target
-    if not isinstance(level, ToolTarget):
+    if not level.is_pitched:
         if tilt is not None and tilt > EMPTY_TILT and not is_rated:
             raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
         yield from _about_the_lip(builder, held, below, tilt)
@@ -207,7 +208,6 @@ def _about_the_lip(
             # The cup turns with the arm on the way to the basin.
             moved = so3.rotation_z(turn) @ (level.position - cup)
             at = hand.turned(level, lip - held.extent[0] * toward + moved, turn)
-            assert isinstance(at, ToolPose)
             end = EMPTY_TILT if tilt is None else tilt
             yield Tilting(at, frozen(lip), axis, axis_in_pose, builder.planning, end)
 

@@ -3,7 +3,7 @@
 Each curve is a formula of sigma, which runs from 0 to 1, and is evaluated on jets. Every place on
 it is therefore exact, and so are its derivatives. The five-axis family has curves of the tool
 point, pitch and roll. Other arms have curves of poses: of fewer than six axes their rotations are
-those with axis 1 at zero, as in `ToolPose`. Lengths in m, angles in rad, frame {S}.
+those with axis 1 at zero, as in `ToolTarget`. Lengths in m, angles in rad, frame {S}.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.pose_equations import PoseJets
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -264,7 +263,7 @@ def screw_points(p: FloatArray, twist: FloatArray) -> ToolLine | ToolArc:
     omega, v = twist[:3], twist[3:]
     turn = math.hypot(*omega)
     if turn == 0.0:
-        return ToolLine(ToolTarget(p, 0.0, 0.0), ToolTarget(p + v, 0.0, 0.0))
+        return ToolLine(ToolTarget(p), ToolTarget(p + v))
     centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
     return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
 
@@ -418,7 +417,7 @@ class PoseTurn(_OneFormula):
         axis_in_pose: the axis in the frame of the rotation of ``start``; None if it is the same.
     """
 
-    start: ToolPose
+    start: ToolTarget
     point: FloatArray
     axis: FloatArray
     angles: FloatArray
@@ -463,7 +462,7 @@ class PoseLines(_Legs):
             1.
     """
 
-    vias: tuple[ToolPose, ...]
+    vias: tuple[ToolTarget, ...]
     blend: FloatArray
     _line: Polyline = field(init=False, repr=False)
 

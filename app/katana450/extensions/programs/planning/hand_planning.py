@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple, cast
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.planning.approach import (
     ABOVE,
     DOWN,
@@ -37,7 +36,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
 FREE_AXES: Final = 6
@@ -91,7 +90,7 @@ class TiltDirection(NamedTuple):
     Attributes:
         turn: turn about axis 1 that brings the cup there [rad].
         toward: (3,) unit vector, level, from the middle of the rim to the lip, in {S}.
-        in_pose: the same in the frame of the rotation of a `ToolPose`.
+        in_pose: the same in the frame of the rotation of a `ToolTarget`.
     """
 
     turn: float
@@ -192,7 +191,7 @@ class HandPlanning:
             ]
         return possible
 
-    def before(self, middle: FloatArray, approach: Approach, back: float) -> DragTarget:
+    def before(self, middle: FloatArray, approach: Approach, back: float) -> ToolTarget:
         """Return the tool at which the hand is ``back`` [m] before ``middle`` (3,) [m]."""
         inside = (self.T_tool_grasp @ (back, approach.shift, 0.0, 1.0))[:3]
         if self.plane is None:
@@ -204,12 +203,12 @@ class HandPlanning:
             turn = self.plane.turn(middle, self.plane.beside_at(R, inside))
         return self.planning.target(frozen(middle - so3.rotation_z(turn) @ R @ inside), R)
 
-    def drawn_back(self, q: FloatArray, away: float) -> DragTarget:
+    def drawn_back(self, q: FloatArray, away: float) -> ToolTarget:
         """Return the tool at `q`, drawn back by ``away`` [m] along x of the grasp frame."""
         at = self.planning.at(q)
         return at.moved(frozen(at.position - away * self._R(q)[:, 0]))
 
-    def retreat(self, q: FloatArray, away: float) -> DragTarget:
+    def retreat(self, q: FloatArray, away: float) -> ToolTarget:
         """Return the tool with which the hand leaves an object that it released at `q`.
 
         It is drawn back by ``away`` [m] and, for a fixed jaw, moved by JAW_ROOM along -y of the
@@ -219,7 +218,7 @@ class HandPlanning:
         aside = JAW_ROOM * self._R(q)[:, 1]
         return back.moved(frozen(back.position - aside)) if self.one_jaw else back
 
-    def branches_to(self, q: FloatArray, target: DragTarget) -> Sequence[AnyBranch | None]:
+    def branches_to(self, q: FloatArray, target: ToolTarget) -> Sequence[AnyBranch | None]:
         """Return the branches on which a grasp at ``target`` is tried, that of `q` first.
 
         None is the nearest one. The result is empty if ``target`` is out of reach.
@@ -227,7 +226,7 @@ class HandPlanning:
         chain, kinematics = self._chain, self.planning.kinematics
         if not isinstance(kinematics, DrivenTool):
             return () if self.planning.joints(q, target, None) is None else (None,)
-        R = cast(ToolPose, target).R
+        R = target.R
         if self.plane is not None:
             turn = self.plane.turn(target.position, self.plane.beside_at(R, np.zeros(3)))
             R = so3.rotation_z(turn) @ R
@@ -256,14 +255,14 @@ class HandPlanning:
         turns_round = self._chain.upper[0] - self._chain.lower[0] >= math.tau
         return wrapped(there - here) if turns_round else there - here
 
-    def turned(self, target: DragTarget, position: FloatArray, angle: float) -> DragTarget:
+    def turned(self, target: ToolTarget, position: FloatArray, angle: float) -> ToolTarget:
         """Return ``target`` turned by ``angle`` [rad] about the vertical, to ``position`` (3,).
 
         The targets of fewer than six axes turn with the arm.
         """
         if self.plane is not None:
             return target.moved(frozen(position))
-        return ToolPose(frozen(position), frozen(so3.rotation_z(angle) @ cast(ToolPose, target).R))
+        return ToolTarget(frozen(position), rotation=frozen(so3.rotation_z(angle) @ target.R))
 
     def over(
         self,
@@ -272,7 +271,7 @@ class HandPlanning:
         q: FloatArray,
         goal: FloatArray,
         yaw: float | None,
-    ) -> Sequence[DragTarget]:
+    ) -> Sequence[ToolTarget]:
         """Return the tools that hold an object over ``goal`` (3,) [m], the best first.
 
         Args:
@@ -320,14 +319,14 @@ class HandPlanning:
         rolls = sorted((wrapped(roll - turn + k * alike) for k in range(count)), key=abs)
         return [self._rolled_over(self.plane, q, p, goal, each - roll)[1] for each in rolls]
 
-    def _carried(self, q: FloatArray, p: FloatArray, goal: FloatArray, turn: float) -> DragTarget:
+    def _carried(self, q: FloatArray, p: FloatArray, goal: FloatArray, turn: float) -> ToolTarget:
         """Return the tool at `q`, turned with an object at `p` (3,) so that it is at ``goal``."""
         at = self.planning.at(q)
         return self.turned(at, goal + so3.rotation_z(turn) @ (at.position - p), turn)
 
     def _rolled_over(
         self, plane: ArmPlane, q: FloatArray, p: FloatArray, goal: FloatArray, by: float
-    ) -> tuple[float, DragTarget]:
+    ) -> tuple[float, ToolTarget]:
         """Return the turn [rad] about axis 1 that brings an object to ``goal``, and the tool there.
 
         The object at `p` (3,) [m] is held at `q`, and rolled ``by`` [rad] by the hand.
@@ -422,11 +421,3 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
     return HandPlanning(
         planning, T_base_shoulder, T_tool_grasp, frame.opening, frame.one_jaw, plane
     )
-
-
-def difference(one: DragTarget, other: DragTarget) -> float:
-    """Return the largest difference [m or rad] of two targets of one arm."""
-    if isinstance(one, ToolTarget) and isinstance(other, ToolTarget):
-        apart = float(np.abs(one.position - other.position).max())
-        return max(apart, abs(one.pitch - other.pitch), abs(one.roll - other.roll))
-    return max(cast(ToolPose, one).apart(cast(ToolPose, other)))

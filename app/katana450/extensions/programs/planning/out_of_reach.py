@@ -6,12 +6,11 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from katana450.arm.control.messages import axis_names
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.language.kinds import XYZ
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.planning.tool_planning import EXACT, AnyCurve, ToolPlanning
@@ -25,7 +24,7 @@ from katana450.maths.kinematics.projection import (
     POSITION_WORTH_TELLING,
     Projection,
 )
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.tolerances import LIMIT_SLACK
 
@@ -41,7 +40,7 @@ SAMPLES = 65
 CLEAR_TURN = math.radians(1.0)
 """[rad] Error of the orientation that is reported beside one of the position."""
 
-Reached = Callable[[DragTarget], bool]
+Reached = Callable[[ToolTarget], bool]
 """Returns whether the tool can be at a target."""
 
 
@@ -57,10 +56,10 @@ class NearestPlace:
         priority: which part of the target is kept.
     """
 
-    pose: DragTarget
+    pose: ToolTarget
     projection: Projection
     branch: AnyBranch
-    target: DragTarget
+    target: ToolTarget
     priority: Priority
 
     @property
@@ -69,7 +68,7 @@ class NearestPlace:
         best = self.projection
         position, roll = round(best.position_error, 9), round(best.roll_error, 9)
         turn = round(best.rotation_error, 6)
-        if isinstance(self.target, ToolTarget):
+        if self.target.is_pitched:
             turn = round(best.pitch_error, 9)
         if self.priority in (Priority.PITCH, Priority.ORIENTATION):
             return turn, position, roll
@@ -79,7 +78,7 @@ class NearestPlace:
 def nearest_place(
     planning: ToolPlanning,
     q: FloatArray,
-    target: DragTarget,
+    target: ToolTarget,
     branch: AnyBranch | None,
     priority: Priority,
 ) -> NearestPlace:
@@ -105,7 +104,7 @@ def nearest_place(
 def unreached(
     planning: ToolPlanning,
     q: FloatArray,
-    target: DragTarget,
+    target: ToolTarget,
     branch: AnyBranch | None,
     frame: ScriptFrame,
 ) -> str:
@@ -114,7 +113,7 @@ def unreached(
     Arguments as for `nearest_place`; ``frame``: the frame of the script.
     """
     orientation = planning.orientation
-    if isinstance(target, ToolTarget):
+    if target.is_pitched:
         orientation = f"a pitch of {np.degrees(target.pitch):.1f} deg"
     where = frame.words(target.position)
     why = f"The tool {planning.state.tool} cannot be at {where} with {orientation}"
@@ -126,7 +125,7 @@ def unreached(
     # Only the roll may be missed.
     moved = there if there.errors[:2] == (0.0, 0.0) else kept
 
-    def reached(other: DragTarget) -> bool:
+    def reached(other: ToolTarget) -> bool:
         return planning.joints(q, other, branch) is not None
 
     works = [*_turns(target, there, moved, frame, reached)]
@@ -217,9 +216,9 @@ def near_points(frame: ScriptFrame, p: FloatArray) -> Iterator[tuple[str, FloatA
         yield f"{{{place}}}", frame.point(np.array(point))
 
 
-def _smallest(target: DragTarget) -> float:
+def _smallest(target: ToolTarget) -> float:
     """Return the smallest distance [m] that is reported: a posture by search is less exact."""
-    return EXACT if isinstance(target, ToolTarget) else POSITION_WORTH_TELLING
+    return EXACT if target.is_pitched else POSITION_WORTH_TELLING
 
 
 def _missed(nearest: NearestPlace) -> str:
@@ -231,7 +230,7 @@ def _missed(nearest: NearestPlace) -> str:
         )
     if best.position_error > _smallest(nearest.target):
         missed.append(f"it is {millimetres(best.position_error)} out of reach")
-    if isinstance(nearest.target, ToolTarget):
+    if nearest.target.is_pitched:
         roll = f"the roll is {math.degrees(best.roll_error):.1f} deg beyond what the arm can have"
         return "".join(missed) or roll
     if best.rotation_error > (CLEAR_TURN if missed else ANGLE_WORTH_TELLING):
@@ -250,7 +249,7 @@ def _links(planning: ToolPlanning, q: FloatArray) -> str:
 
 
 def _turns(
-    target: DragTarget,
+    target: ToolTarget,
     there: NearestPlace,
     moved: NearestPlace,
     frame: ScriptFrame,
@@ -260,8 +259,8 @@ def _turns(
 
     ``there``: the nearest place that keeps the position. ``moved``: the place in the message.
     """
-    if isinstance(target, ToolTarget):
-        pose, rolled = cast(ToolTarget, there.pose), cast(ToolTarget, moved.pose)
+    if target.is_pitched:
+        pose, rolled = there.pose, moved.pose
         for pitch in near(math.degrees(pose.pitch)):
             if reached(replace(target, pitch=math.radians(pitch))):
                 yield f"with `pitch: {pitch:g}`"
@@ -278,5 +277,5 @@ def _turns(
     R = frame.T[:3, :3]
     roll, pitch, yaw = np.round(np.degrees(so3.to_rpy(R @ best.T[:3, :3])), 1) + 0.0
     turned = R.T @ so3.from_rpy(*np.radians((roll, pitch, yaw)))
-    if reached(replace(cast(ToolPose, target), R=frozen(turned))):
+    if reached(replace(target, rotation=frozen(turned))):
         yield f"with `roll: {roll:g}, pitch: {pitch:g}, yaw: {yaw:g}`"

@@ -20,7 +20,6 @@ from katana450.arm.control.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.general_arms.tool_pose import ToolPose
 from katana450.extensions.programs.language.step_target import Angles
 from katana450.extensions.programs.planning.curves import (
     Curve,
@@ -44,7 +43,7 @@ from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 
@@ -92,7 +91,7 @@ class ToolPlanning(ABC):
         """The chain to the tool."""
         return self.kinematics.chain
 
-    def at(self, q: FloatArray) -> DragTarget:
+    def at(self, q: FloatArray) -> ToolTarget:
         """Return the target at which the tool is with the joints at `q`."""
         return self.kinematics.target_at(q)
 
@@ -114,15 +113,15 @@ class ToolPlanning(ABC):
         raise InputError(f"This arm has no branch {str(name)!r}; its branches are {names}.")
 
     def nearest(
-        self, q: FloatArray, target: DragTarget, branch: AnyBranch, priority: Priority
+        self, q: FloatArray, target: ToolTarget, branch: AnyBranch, priority: Priority
     ) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``, with the arm at `q`."""
         here = replace(self.state, goal=q, branch=self.kinematics.branch_of(q), priority=priority)
         return self.kinematics.leap(here, target, branch)
 
     def seen_from(
-        self, q: FloatArray, target: DragTarget, branch: AnyBranch | None
-    ) -> Iterator[tuple[AnyBranch, DragTarget]]:
+        self, q: FloatArray, target: ToolTarget, branch: AnyBranch | None
+    ) -> Iterator[tuple[AnyBranch, ToolTarget]]:
         """Yield each branch that may be used, with ``target`` in its numbers.
 
         With the other shoulder posture the same tool pose may have other pitch and roll values.
@@ -139,12 +138,12 @@ class ToolPlanning(ABC):
         for there in self.branches(q):
             yield there, self.converted(target, here, there)
 
-    def converted(self, target: DragTarget, here: AnyBranch, there: AnyBranch) -> DragTarget:
+    def converted(self, target: ToolTarget, here: AnyBranch, there: AnyBranch) -> ToolTarget:
         """Return ``target``, given in the numbers of the branch ``here``, in those of ``there``."""
         return self.kinematics.target_on(replace(self.state, branch=here), target, there)
 
     def joints(
-        self, q: FloatArray, target: DragTarget, branch: AnyBranch | None
+        self, q: FloatArray, target: ToolTarget, branch: AnyBranch | None
     ) -> FloatArray | None:
         """Return the joint angles (n,) [rad] for ``target`` near `q`; None if it is out of reach.
 
@@ -157,18 +156,18 @@ class ToolPlanning(ABC):
         return None
 
     @abstractmethod
-    def on_branch(self, q: FloatArray, target: DragTarget, branch: AnyBranch) -> FloatArray | None:
+    def on_branch(self, q: FloatArray, target: ToolTarget, branch: AnyBranch) -> FloatArray | None:
         """Return the posture of ``branch`` at ``target``; None without one inside the limits."""
 
     @abstractmethod
-    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+    def target(self, position: FloatArray, R: FloatArray) -> ToolTarget:
         """Return the target of the tool point at ``position`` (3,) [m].
 
         `R` (3, 3) is the rotation of the tool; of fewer than six axes that with axis 1 at zero.
         """
 
     @abstractmethod
-    def oriented(self, now: DragTarget, angles: Angles, R: FloatArray) -> DragTarget:
+    def oriented(self, now: ToolTarget, angles: Angles, R: FloatArray) -> ToolTarget:
         """Return ``now`` with those of ``angles`` that are given; the others stay.
 
         ``R`` (3, 3) is the rotation of {S} in the frame of the angles. Raises InputError for angles
@@ -176,11 +175,11 @@ class ToolPlanning(ABC):
         """
 
     @abstractmethod
-    def line(self, start: DragTarget, end: DragTarget) -> AnyCurve:
+    def line(self, start: ToolTarget, end: ToolTarget) -> AnyCurve:
         """Return the straight line on which the tool turns evenly from ``start`` to ``end``."""
 
     @abstractmethod
-    def lines(self, vias: Sequence[DragTarget], blend: FloatArray) -> AnyCurve:
+    def lines(self, vias: Sequence[ToolTarget], blend: FloatArray) -> AnyCurve:
         """Return straight lines with rounded corners; ``blend`` is that of `Polyline`."""
 
     @abstractmethod
@@ -190,8 +189,8 @@ class ToolPlanning(ABC):
         axis: FloatArray,
         angle: float,
         climb: float,
-        start: DragTarget,
-        end: DragTarget,
+        start: ToolTarget,
+        end: ToolTarget,
     ) -> AnyCurve:
         """Return the turn of the tool point from ``start`` about ``axis`` through ``centre``.
 
@@ -218,7 +217,7 @@ class ToolPlanning(ABC):
         """
 
     @abstractmethod
-    def target_on(self, curve: AnyCurve, sigma: float) -> DragTarget:
+    def target_on(self, curve: AnyCurve, sigma: float) -> ToolTarget:
         """Return the target at the place ``sigma`` of ``curve``."""
 
 
@@ -228,38 +227,37 @@ class PitchPlanning(ToolPlanning):
     priorities = Priority.POSITION, Priority.PITCH
     orientation = "this pitch"
 
-    def on_branch(self, q: FloatArray, target: DragTarget, branch: AnyBranch) -> FloatArray | None:
+    def on_branch(self, q: FloatArray, target: ToolTarget, branch: AnyBranch) -> FloatArray | None:
         """Return the posture of the closed form."""
         best = self.nearest(q, target, branch, Priority.POSE)
         return best.q if max(best.position_error, best.rotation_error) <= EXACT else None
 
-    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+    def target(self, position: FloatArray, R: FloatArray) -> ToolTarget:
         """Return the five freedoms of the tool."""
         arm = arm_of(self.chain)
         K = arm.T_C_S[:3, :3] @ R @ arm.T_K_tool[:3, :3].T
         pitch, roll = math.atan2(-K[2, 0], K[0, 0]), math.atan2(-K[1, 2], K[1, 1])
         return ToolTarget(position, pitch, roll)
 
-    def oriented(self, now: DragTarget, angles: Angles, R: FloatArray) -> DragTarget:  # noqa: ARG002
+    def oriented(self, now: ToolTarget, angles: Angles, R: FloatArray) -> ToolTarget:  # noqa: ARG002
         """Return ``now`` with the pitch and roll of ``angles``."""
         if angles.yaw is not None:
             raise InputError(
                 "The yaw of a five-axis arm follows from its position. Leave `yaw` out."
             )
-        five = _five(now)
         return replace(
-            five,
-            pitch=five.pitch if angles.pitch is None else angles.pitch,
-            roll=five.roll if angles.roll is None else angles.roll,
+            now,
+            pitch=now.pitch if angles.pitch is None else angles.pitch,
+            roll=now.roll if angles.roll is None else angles.roll,
         )
 
-    def line(self, start: DragTarget, end: DragTarget) -> AnyCurve:
+    def line(self, start: ToolTarget, end: ToolTarget) -> AnyCurve:
         """Return the line on which pitch and roll change evenly."""
-        return ToolLine(_five(start), _five(end))
+        return ToolLine(start, end)
 
-    def lines(self, vias: Sequence[DragTarget], blend: FloatArray) -> AnyCurve:
+    def lines(self, vias: Sequence[ToolTarget], blend: FloatArray) -> AnyCurve:
         """Return lines with rounded corners."""
-        return ToolLines(tuple(map(_five, vias)), blend)
+        return ToolLines(tuple(vias), blend)
 
     def arc(
         self,
@@ -267,13 +265,12 @@ class PitchPlanning(ToolPlanning):
         axis: FloatArray,
         angle: float,
         climb: float,
-        start: DragTarget,
-        end: DragTarget,
+        start: ToolTarget,
+        end: ToolTarget,
     ) -> AnyCurve:
         """Return the arc on which pitch and roll change evenly."""
-        one, other = _five(start), _five(end)
-        pitch, roll = Linear(one.pitch, other.pitch), Linear(one.roll, other.roll)
-        return ToolArc(one.position, centre, axis, angle, pitch, roll, climb)
+        pitch, roll = Linear(start.pitch, end.pitch), Linear(start.roll, end.roll)
+        return ToolArc(start.position, centre, axis, angle, pitch, roll, climb)
 
     def roomiest(self, arc: AnyCurve, branch: AnyBranch) -> AnyCurve:
         """Return `roomiest_pitch.roomiest`."""
@@ -287,7 +284,7 @@ class PitchPlanning(ToolPlanning):
         """Return the closed form along the curve."""
         return ToolPath(self.chain, cast(Curve, curve), cast(Branch, branch), q)
 
-    def target_on(self, curve: AnyCurve, sigma: float) -> DragTarget:
+    def target_on(self, curve: AnyCurve, sigma: float) -> ToolTarget:
         """Return the five freedoms at ``sigma``."""
         tool = cast(Curve, curve).at(Jet.variable(sigma))
         x, y, z, pitch, roll = (float(np.asarray(number.c0)) for number in tool)
@@ -304,28 +301,28 @@ class PosePlanning(ToolPlanning):
     def _driven(self) -> DrivenTool:
         return cast(DrivenTool, self.kinematics)
 
-    def target(self, position: FloatArray, R: FloatArray) -> DragTarget:
+    def target(self, position: FloatArray, R: FloatArray) -> ToolTarget:
         """Return the pose."""
-        return ToolPose(frozen(position), frozen(R))
+        return ToolTarget(frozen(position), rotation=frozen(R))
 
-    def oriented(self, now: DragTarget, angles: Angles, R: FloatArray) -> DragTarget:
+    def oriented(self, now: ToolTarget, angles: Angles, R: FloatArray) -> ToolTarget:
         """Return ``now`` with the roll, pitch and yaw of ``angles``.
 
         Fewer than six axes have no yaw of their own, and four axes only one angle.
         """
-        pose, given = _pose(now), (angles.roll, angles.pitch, angles.yaw)
+        given = (angles.roll, angles.pitch, angles.yaw)
         if given == (None, None, None):
-            return pose
+            return now
         if self.chain.n < 6:
-            return replace(pose, R=frozen(self._tilted(pose.R, angles, R)))
-        present = so3.to_rpy(R @ pose.R)
+            return replace(now, rotation=frozen(self._tilted(now.R, angles, R)))
+        present = so3.to_rpy(R @ now.R)
         if None in (angles.roll, angles.yaw) and math.cos(present[1]) < VERTICAL:
             raise InputError(
                 "The x axis of the tool is vertical, so roll and yaw turn it about the same axis. "
                 "Give `roll`, `pitch` and `yaw` together."
             )
         roll, pitch, yaw = (b if a is None else a for a, b in zip(given, present, strict=True))
-        return replace(pose, R=frozen(R.T @ so3.from_rpy(roll, pitch, yaw)))
+        return replace(now, rotation=frozen(R.T @ so3.from_rpy(roll, pitch, yaw)))
 
     def _tilted(self, R_now: FloatArray, angles: Angles, R: FloatArray) -> FloatArray:
         """Return the rotation (3, 3) with the angles of ``angles``, whatever the turn of axis 1."""
@@ -376,14 +373,14 @@ class PosePlanning(ToolPlanning):
             return None
         return axis * math.atan2(float(axis @ np.cross(now, wanted)), float(now @ wanted))
 
-    def line(self, start: DragTarget, end: DragTarget) -> AnyCurve:
+    def line(self, start: ToolTarget, end: ToolTarget) -> AnyCurve:
         """Return the line on which the tool turns about one axis."""
-        points = ToolLine(_point(start.position), _point(end.position))
-        return TurnedCurve(points, _pose(start).R, _turn_between(start, end))
+        points = ToolLine(ToolTarget(start.position), ToolTarget(end.position))
+        return TurnedCurve(points, start.R, _turn_between(start, end))
 
-    def lines(self, vias: Sequence[DragTarget], blend: FloatArray) -> AnyCurve:
+    def lines(self, vias: Sequence[ToolTarget], blend: FloatArray) -> AnyCurve:
         """Return lines with rounded corners."""
-        return PoseLines(tuple(map(_pose, vias)), blend)
+        return PoseLines(tuple(vias), blend)
 
     def arc(
         self,
@@ -391,12 +388,12 @@ class PosePlanning(ToolPlanning):
         axis: FloatArray,
         angle: float,
         climb: float,
-        start: DragTarget,
-        end: DragTarget,
+        start: ToolTarget,
+        end: ToolTarget,
     ) -> AnyCurve:
         """Return the arc on which the tool turns about one axis."""
         points = ToolArc(start.position, centre, axis, angle, STILL, STILL, climb)
-        return TurnedCurve(points, _pose(start).R, _turn_between(start, end))
+        return TurnedCurve(points, start.R, _turn_between(start, end))
 
     def roomiest(self, arc: AnyCurve, branch: AnyBranch) -> AnyCurve:  # noqa: ARG002
         """Raise InputError: the orientation of this tool is no pitch alone."""
@@ -421,7 +418,7 @@ class PosePlanning(ToolPlanning):
         The swivel of seven axes keeps its angle, or turns evenly where that does not do.
         """
         poses = cast(PoseCurve, curve)
-        start = _pose(self.target_on(curve, 0.0))
+        start = self.target_on(curve, 0.0)
         if self.kinematics.branch_of(q) != str(branch) or max(self._apart(q, start)) > EXACT:
             begun = self.on_branch(q, start, branch)
             if begun is None:
@@ -454,48 +451,35 @@ class PosePlanning(ToolPlanning):
         It does not where a place is out of reach with every swivel. A closed curve must close in
         the joints too.
         """
-        places = [_pose(self.target_on(curve, sigma)) for sigma in (0.0, *PROBES)]
+        places = [self.target_on(curve, sigma) for sigma in (0.0, *PROBES)]
         if max(places[0].apart(places[1])) <= EXACT:
             return False
         return all(self.on_branch(q, each, branch) is not None for each in places[1:])
 
-    def on_branch(self, q: FloatArray, target: DragTarget, branch: AnyBranch) -> FloatArray | None:
+    def on_branch(self, q: FloatArray, target: ToolTarget, branch: AnyBranch) -> FloatArray | None:
         """Return the exact posture beside the nearest one."""
-        pose, chain, axes = _pose(target), self.chain, self.chain.n
-        near = self.nearest(q, pose, branch, Priority.POSE).q
-        exact = self._driven.equations(near).posture(near, pose.T)
+        chain, axes = self.chain, self.chain.n
+        near = self.nearest(q, target, branch, Priority.POSE).q
+        exact = self._driven.equations(near).posture(near, target.T)
         if exact is None or not chain.within_limits(exact.q):
             return None
         posture = chain.clamp(exact.q)
-        apart, turned = self._apart(posture, pose)
+        apart, turned = self._apart(posture, target)
         reached = apart <= EXACT and (turned <= EXACT or axes in (3, 5))
         return posture if reached and self.kinematics.branch_of(posture) == branch else None
 
-    def target_on(self, curve: AnyCurve, sigma: float) -> DragTarget:
+    def target_on(self, curve: AnyCurve, sigma: float) -> ToolTarget:
         """Return the pose at ``sigma``."""
-        return ToolPose.of(cast(PoseCurve, curve).at(Jet.variable(sigma)).T[0])
+        return ToolTarget.of(cast(PoseCurve, curve).at(Jet.variable(sigma)).T[0])
 
-    def _apart(self, q: FloatArray, pose: ToolPose) -> tuple[float, float]:
-        """Return the distance [m] and the angle [rad] of the tool at `q` from ``pose``."""
-        return _pose(self.at(q)).apart(pose)
-
-
-def _five(target: DragTarget) -> ToolTarget:
-    return cast(ToolTarget, target)
+    def _apart(self, q: FloatArray, target: ToolTarget) -> tuple[float, float]:
+        """Return the distance [m] and the angle [rad] of the tool at `q` from ``target``."""
+        return self.at(q).apart(target)
 
 
-def _pose(target: DragTarget) -> ToolPose:
-    return cast(ToolPose, target)
-
-
-def _point(p: FloatArray) -> ToolTarget:
-    """Return the point as the end of a line whose pitch and roll are not used."""
-    return ToolTarget(p, 0.0, 0.0)
-
-
-def _turn_between(start: DragTarget, end: DragTarget) -> FloatArray:
+def _turn_between(start: ToolTarget, end: ToolTarget) -> FloatArray:
     """Return the rotation vector (3,) from one orientation to another."""
-    return so3.log(_pose(end).R @ _pose(start).R.T)
+    return so3.log(end.R @ start.R.T)
 
 
 def planning_of(kinematics: ToolKinematics, state: State) -> ToolPlanning:

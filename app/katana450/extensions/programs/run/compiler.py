@@ -33,7 +33,6 @@ from katana450.extensions.programs.building.plan_builder import (
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.source import Problem, ScriptError
 from katana450.extensions.programs.planning.approach import Approach
-from katana450.extensions.programs.planning.hand_planning import difference
 from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.run.task_list import PlannedChoice, PlannedStep, task_list
 from katana450.extensions.programs.script.script import Script
@@ -350,4 +349,4 @@ def _same(one: _Place, other: _Place) -> bool:
         return False
     if one.taken is None or other.taken is None:
         return one.taken is other.taken
-    return difference(one.taken.at, other.taken.at) <= EXACT
+    return max(one.taken.at.apart(other.taken.at)) <= EXACT

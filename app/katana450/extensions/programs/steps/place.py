@@ -25,7 +25,7 @@ from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.steps.grasp import Grasp
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.tool import DragTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.plan import MARGIN
 
 RELEASE_HEIGHT = MARGIN + 2e-4
@@ -197,7 +197,7 @@ def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
     return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
 
 
-def _bring(builder: PlanBuilder, held: SceneObject, low: DragTarget) -> None:
+def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
     """Plan the way to ``low``, from above, and the release there. Raises InputError."""
     name = f"place {held.name}"
 
@@ -221,7 +221,7 @@ def _bring(builder: PlanBuilder, held: SceneObject, low: DragTarget) -> None:
 
 def _over(
     builder: PlanBuilder, held: SceneObject, spot: FloatArray, yaw: float | None
-) -> Sequence[DragTarget]:
+) -> Sequence[ToolTarget]:
     """Return the tools that hold the object over ``spot`` with this ``yaw``; see `HandPlanning`."""
     T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
     goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)

@@ -32,7 +32,6 @@ from katana450.extensions.programs.planning.pour_tilt import (
     tilt_for,
 )
 from katana450.extensions.programs.planning.tool_planning import AnyCurve
-from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
 
@@ -203,7 +202,7 @@ class Pour(Step, word="pour"):
                 )
             volumes[self.into] = other.kept + part
         level = builder.target
-        if isinstance(level, ToolTarget) and level.pitch > MAX_POUR_PITCH:
+        if level.is_pitched and level.pitch > MAX_POUR_PITCH:
             raise InputError(
                 f"The {vessel.name} is held from above, where the wrist cannot tilt it: pick it "
                 "with `side: front`."

@@ -43,7 +43,7 @@ from katana450.extensions.programs.language.step_target import KEPT, Angles, Ste
 from katana450.extensions.programs.planning.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.tool import DragTarget, ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.path import Path
 
 LEVEL_TOLERANCE = 1e-6
@@ -171,7 +171,7 @@ class _Turn(Step):
         centre = builder.point(self.centre, in_base=self.in_base)
         return centre, builder.direction(self.axis, in_base=self.in_base)
 
-    def turned(self, builder: PlanBuilder) -> DragTarget:
+    def turned(self, builder: PlanBuilder) -> ToolTarget:
         """Return the present target with the orientation at the end of the curve."""
         pitch = self.pitch if isinstance(self.pitch, float) else None
         angles = Angles(pitch, self.roll, self.yaw)
@@ -194,8 +194,8 @@ class _Turn(Step):
     def follow_or_advise(
         self,
         builder: PlanBuilder,
-        arc: Callable[[DragTarget, float], AnyCurve],
-        end: DragTarget,
+        arc: Callable[[ToolTarget, float], AnyCurve],
+        end: ToolTarget,
         size: tuple[str, float],
         branch: AnyBranch | None = None,
     ) -> None:
@@ -212,9 +212,9 @@ class _Turn(Step):
                 raise
             first = builder.branches(branch)[0]
             # Eight branches would take long.
-            tried = branch if isinstance(end, ToolTarget) else first
+            tried = branch if end.is_pitched else first
 
-            def build(target: DragTarget, fraction: float) -> None:
+            def build(target: ToolTarget, fraction: float) -> None:
                 self.follow(builder, arc(target, fraction), name, tried)
 
             remedies = arc_remedies(builder, end, build, size, error)
@@ -239,7 +239,7 @@ class Arc(_Turn, word="arc"):
         centre, axis = self.seen(builder)
         arc_of = builder.planning.arc
 
-        def arc(end: DragTarget, fraction: float) -> AnyCurve:
+        def arc(end: ToolTarget, fraction: float) -> AnyCurve:
             angle, climb = fraction * self.angle, fraction * self.climb
             return arc_of(centre, axis, angle, climb, start, end)
 
@@ -277,7 +277,7 @@ class Circle(_Turn, word="circle"):
             out = ahead - (ahead @ normal) * normal
         turn, arc_of = math.tau * self.turns, builder.planning.arc
 
-        def arc(end: DragTarget, fraction: float) -> AnyCurve:
+        def arc(end: ToolTarget, fraction: float) -> AnyCurve:
             start = centre + fraction * self.radius / math.hypot(*out) * out
             there = end.moved(frozen(start))
             return arc_of(centre, normal, turn, 0.0, there, there)
