@@ -6,8 +6,7 @@ import re
 from collections.abc import Mapping
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import KEYWORDS, Node, Route, Use, Value, World
-from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.export.vrml_world import HEADER, KEYWORDS, Node, Route, Use, Value, World
 from katana450.extensions.importers.vrml_reader import Reader
 from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 

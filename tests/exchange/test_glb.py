@@ -17,7 +17,7 @@ import yourdfpy
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.export.vrml_world import HEADER
 from katana450.extensions.importers.archive import packed
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.reading import bind

@@ -10,8 +10,7 @@ from katana450.extensions.importers import reading
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.reading import answer, drawn
 from katana450.extensions.importers.shape_file import Format, Up, read_shape
-from katana450.extensions.importers.simplification import coarser
-from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface
+from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface, coarser
 from katana450.maths.geometry.arrays import FloatArray
 from tests.exchange.solids import volume
 from tests.exchange.test_reading_time import soup

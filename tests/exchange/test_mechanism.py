@@ -14,7 +14,7 @@ from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.export.names import distinct
+from katana450.extensions.export.files import distinct
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
 

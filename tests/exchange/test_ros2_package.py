@@ -21,8 +21,7 @@ import yaml
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.excluded_pairs import ADJACENT, excluded_pairs
-from katana450.extensions.export.home import home_of
+from katana450.extensions.export.rest import ADJACENT, excluded_pairs, home_of
 from katana450.extensions.export.ros2_package import USED
 from katana450.extensions.rosbridge import names
 from katana450.maths.kinematics.forward import forward

@@ -25,10 +25,10 @@ from katana450.extensions.importers.scene_file import (
     read_scene_folder,
     read_scene_zip,
     scene_zip,
+    written,
 )
 from katana450.extensions.importers.shape_file import Up
 from katana450.extensions.programs.script.scene_draft import MeshFile, Scene, parsed
-from katana450.extensions.scene.text import written
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 

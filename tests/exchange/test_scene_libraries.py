@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.trajectory_file import RecordedMotion, load_motion
+from katana450.extensions.export.playback import RecordedMotion, load_motion
 from katana450.extensions.export.vrml import views, vrml_files, world_of
 from katana450.extensions.export.vrml_names import VrmlNames
 from katana450.resources import URDF_PATH

@@ -13,14 +13,14 @@ import pytest
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.export.vrml_world import HEADER
 from katana450.extensions.importers import archive
 from katana450.extensions.importers.archive import ChoiceError, packed
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.initial_scene import load_initial_scene
 from katana450.extensions.importers.mesh_file import read_mesh, read_mesh_file
 from katana450.extensions.importers.scene_file import (
     StoredScene,
+    load_initial_scene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,

@@ -22,7 +22,7 @@ from katana450.errors import InputError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.vrml import world_of
-from katana450.extensions.export.vrml_text import world_text
+from katana450.extensions.export.vrml_world import world_text
 from katana450.extensions.importers import guarded_reading
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.importers.mesh_file import read_mesh

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.export.trajectory_file import WIDEST_TURN, load_motion
+from katana450.extensions.export.playback import WIDEST_TURN, load_motion
 
 TABLE = {
     "t": [1.0, 2.0, 2.5],

@@ -14,11 +14,18 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.export.rows import DIGITS
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.obj_text import DIGITS
+from katana450.extensions.export.playback import load_motion
 from katana450.extensions.export.vrml import part_world, views, vrml_files, world_of
-from katana450.extensions.export.vrml_node import KEYWORDS, Node, Use, Value, World
-from katana450.extensions.export.vrml_text import HEADER, world_text
+from katana450.extensions.export.vrml_world import (
+    HEADER,
+    KEYWORDS,
+    Node,
+    Use,
+    Value,
+    World,
+    world_text,
+)
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES

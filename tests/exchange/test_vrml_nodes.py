@@ -24,8 +24,8 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import initial_objects, world_of
-from katana450.extensions.export.vrml_node import Node, World
 from katana450.extensions.export.vrml_nodes import VrmlNodes
+from katana450.extensions.export.vrml_world import Node, World
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import requests

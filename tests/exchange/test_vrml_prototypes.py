@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_text import HEADER
+from katana450.extensions.export.vrml_world import HEADER
 from katana450.extensions.importers.archive import packed
 from katana450.extensions.importers.shape_file import Format, ShapeFile, Up, read_shape
 from tests.exchange.solids import sides, volume

@@ -12,10 +12,9 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 from katana450.extensions.export.vrml import views, world_of
-from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World
-from katana450.extensions.export.vrml_text import x3d_text
+from katana450.extensions.export.vrml_world import Node, Route, Use, Value, World, x3d_text
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

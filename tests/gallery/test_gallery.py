@@ -14,8 +14,7 @@ import pytest
 from katana450.arm.robot.loader import load
 from katana450.cli.main import main
 from katana450.errors import ConfigurationError
-from katana450.extensions.gallery.arms_command import file_of
-from katana450.extensions.gallery.listed_robot import listed_robots, robot_named
+from katana450.extensions.gallery.arms_command import file_of, listed_robots, robot_named
 from tests.browser.server import APP, AppServer
 from tests.gallery.stand_in import write_package
 

@@ -12,8 +12,8 @@ from msgspec import structs
 
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
-from katana450.extensions.export.vrml_text import HEADER
-from katana450.extensions.importers.initial_scene import load_initial_scene
+from katana450.extensions.export.vrml_world import HEADER
+from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.server.api import requests
 from tests.exchange.test_several_files import ARTICULATED, PARTS, written, zipped
 from tests.gateway.virtual import VirtualServer

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.media.camera import Camera
+from katana450.extensions.media.scene import Camera
 
 spot = st.floats(-2.0, 2.0)
 

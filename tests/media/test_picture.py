@@ -16,11 +16,17 @@ from katana450.arm.robot.initial_camera import InitialCamera as Viewpoint
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.camera import Camera
-from katana450.extensions.media.hits import FLOOR, NOWHERE, Tracer, first_hits
 from katana450.extensions.media.picture import Picture, picture
 from katana450.extensions.media.report_pictures import tube
-from katana450.extensions.media.scene import Item, RenderScene
+from katana450.extensions.media.scene import (
+    FLOOR,
+    NOWHERE,
+    Camera,
+    Item,
+    RenderScene,
+    Tracer,
+    first_hits,
+)
 from katana450.maths.geometry import se3
 from katana450.maths.water.surface import COLOUR
 from katana450.resources import URDF_PATH

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 from katana450.extensions.media import figures
 from katana450.extensions.media.figures import DRAWN, magnification
-from katana450.extensions.media.pour_record import COLUMNS, PourRecord
+from katana450.extensions.media.measures import COLUMNS, PourRecord
 from katana450.extensions.media.report import Report
 from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.run.measured_run import MeasuredRun

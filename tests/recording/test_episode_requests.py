@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from katana450.client.episodes import EpisodeClient
-from katana450.client.files import LostError, RefusedError, Site
+from katana450.client.files import EpisodeClient, LostError, RefusedError, Site
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import interrupted
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of

@@ -16,8 +16,7 @@ import pytest
 import katana450
 from katana450.cli.main import main
 from katana450.client import RefusedError
-from katana450.client.episodes import EpisodeClient
-from katana450.client.files import Site
+from katana450.client.files import EpisodeClient, Site
 from katana450.extensions.recording.episodes.episode import EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from tests.browser.server import RECORDING_APP, AppServer, ServerError

@@ -19,7 +19,7 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extension import ServerFacts
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files import message_writer
 from katana450.extensions.recording.files.checking import verify_recording

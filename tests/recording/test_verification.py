@@ -25,7 +25,7 @@ from katana450.arm.runtime.tick import Submission, TickRecord, stepped
 from katana450.assembly.robot_session import find_robot
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 from katana450.extensions.recording.digest import Digester
 from katana450.extensions.recording.files.checking import TickReader, verify_recording
 from katana450.extensions.recording.files.fingerprint import fingerprint

@@ -8,10 +8,19 @@ import sys
 from collections.abc import Sequence
 
 from katana450.assembly.output import drop_output
-from katana450.cli.core_commands import CORE_COMMANDS
 from katana450.cli.version import version
 from katana450.errors import KatanaError
 from katana450.extension import CliCommand, extensions, load, provided
+
+CORE_COMMANDS = (
+    CliCommand(
+        "serve",
+        "start the app and print its address",
+        "katana450.cli.serve_options:add_serve_options",
+        "katana450.cli.serve:serve_with",
+    ),
+)
+
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EIO)
 """Errors of a full or broken disk to which the output is written."""

@@ -21,8 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from katana450.arm.control.act import Id
 from katana450.arm.control.checked import encoded_field
-from katana450.client.episodes import EpisodeClient
-from katana450.client.files import STOP_TIMEOUT, LostError, RefusedError, Site
+from katana450.client.files import STOP_TIMEOUT, EpisodeClient, LostError, RefusedError, Site
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import ROOT

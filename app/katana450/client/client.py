@@ -10,7 +10,7 @@ from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from katana450.client.asynchronous import FOLLOW_RATE, AsyncClient, aconnect
-from katana450.client.episodes import EpisodeClient
+from katana450.client.files import EpisodeClient
 from katana450.server.api import answers
 
 T = TypeVar("T")

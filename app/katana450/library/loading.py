@@ -11,7 +11,7 @@ from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.found_arm import solved_arm
-from katana450.extensions.importers.initial_scene import load_initial_scene
+from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.library.arm import NEEDED, Arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH

@@ -16,7 +16,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
-from katana450.extensions.importers.initial_scene import load_initial_scene
+from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
 from katana450.extensions.programs.building.actions import FollowPlan, Task
 from katana450.extensions.programs.run.clocked_run import plan_script, ready, run_by_clock

@@ -16,8 +16,8 @@ import numpy as np
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.export.names import distinct
-from katana450.extensions.export.rows import indexed
+from katana450.extensions.export.files import distinct
+from katana450.extensions.export.obj_text import indexed
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
 from katana450.maths.kinematics.chain import Chain

@@ -11,7 +11,7 @@ from katana450.assembly.robot_files import read_robot
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.formats import FORMATS, ExportJob, named
-from katana450.extensions.export.trajectory_file import load_motion
+from katana450.extensions.export.playback import load_motion
 
 LARGE_BYTES = 20_000_000
 """Size [bytes] of all files together above which the command says why."""

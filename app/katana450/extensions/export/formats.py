@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from katana450.arm.robot.robot import Robot
-    from katana450.extensions.export.trajectory_file import RecordedMotion
-    from katana450.extensions.export.vrml_node import World
+    from katana450.extensions.export.playback import RecordedMotion
+    from katana450.extensions.export.vrml_world import World
 
 
 class ExportJob(NamedTuple):

@@ -15,8 +15,8 @@ from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
-from katana450.extensions.export.names import distinct
-from katana450.extensions.export.trajectory_file import RecordedMotion
+from katana450.extensions.export.files import distinct
+from katana450.extensions.export.playback import RecordedMotion
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.srgb import to_light

@@ -18,11 +18,9 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.urdf import Inertial
 from katana450.arm.robot.visual import PrimitiveShape, Visual
-from katana450.extensions.export.archive import zipped
-from katana450.extensions.export.excluded_pairs import excluded_pairs
-from katana450.extensions.export.home import home_of
-from katana450.extensions.export.names import distinct
+from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import obj_text
+from katana450.extensions.export.rest import excluded_pairs, home_of
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 

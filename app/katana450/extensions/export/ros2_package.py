@@ -13,8 +13,7 @@ from xml.sax.saxutils import escape, quoteattr
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import arm_session
-from katana450.extensions.export.excluded_pairs import excluded_pairs
-from katana450.extensions.export.home import home_of
+from katana450.extensions.export.rest import excluded_pairs, home_of
 from katana450.settings import Settings
 
 ARM, GRIPPER, JOINTS = "arm", "gripper", "joints"

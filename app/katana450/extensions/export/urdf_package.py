@@ -23,8 +23,7 @@ from katana450.arm.robot.visual import Visual, mesh_file
 from katana450.assembly.robot_files import read_robot, read_urdf
 from katana450.assembly.robot_session import find_arm
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.export.archive import zipped
-from katana450.extensions.export.names import distinct
+from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
 from katana450.extensions.export.ros2_package import (
     RVIZ,

@@ -31,12 +31,20 @@ from katana450.arm.robot.surfaces import Material, VisualMesh, main_colour, shap
 from katana450.arm.robot.visual import Visual
 from katana450.assembly.robot_session import arm_session
 from katana450.errors import InputError
-from katana450.extensions.export.names import distinct
-from katana450.extensions.export.rows import DIGITS, NORMAL_DIGITS
-from katana450.extensions.export.trajectory_file import RecordedMotion
+from katana450.extensions.export.files import distinct
+from katana450.extensions.export.obj_text import DIGITS, NORMAL_DIGITS
+from katana450.extensions.export.playback import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
-from katana450.extensions.export.vrml_node import Node, Route, Use, Value, World, axis_angle
-from katana450.extensions.export.vrml_text import world_text, x3d_text
+from katana450.extensions.export.vrml_world import (
+    Node,
+    Route,
+    Use,
+    Value,
+    World,
+    axis_angle,
+    world_text,
+    x3d_text,
+)
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.settings import Settings

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material
-from katana450.extensions.export.names import distinct
-from katana450.extensions.export.vrml_node import KEYWORDS
+from katana450.extensions.export.files import distinct
+from katana450.extensions.export.vrml_world import KEYWORDS
 
 CLOCK = "Clock"
 """Name of the TimeSensor."""

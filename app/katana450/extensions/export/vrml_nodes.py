@@ -27,7 +27,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
-from katana450.extensions.export.vrml_node import axis_angle
+from katana450.extensions.export.vrml_world import axis_angle
 from katana450.extensions.touch.pad import COLUMNS, ROWS, PadPressure
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3, so3

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from urllib.parse import unquote
 
 from katana450.errors import InputError
-from katana450.extensions.export.archive import zipped
+from katana450.extensions.export.files import zipped
 
 SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:|//")
 """Beginning of an address on a network or of a kind of its own, which is never opened."""

@@ -22,8 +22,7 @@ from katana450.extensions.importers.shape_file import (
     Up,
     read_shape,
 )
-from katana450.extensions.importers.simplification import coarser
-from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface
+from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface, coarser
 from katana450.platform_support import limit_resources
 
 

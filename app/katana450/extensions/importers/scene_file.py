@@ -1,4 +1,4 @@
-"""A scene with its meshes: as a folder, or as one .zip of the same files.
+"""A scene with its meshes, as a folder or as one .zip of its files; and that of a new server.
 
 All of it is read and checked before it is used. Paths cannot lead outside of the scene.
 """
@@ -7,27 +7,126 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+import numpy as np
+import yaml
+
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.session import Session
+from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
+from katana450.extensions.free_place import free_place
 from katana450.extensions.importers.archive import (
     MAX_ARCHIVE_BYTES,
     SCENE,
     contents,
     packed,
 )
-from katana450.extensions.importers.mesh_file import content_of, read_mesh
+from katana450.extensions.importers.mesh_file import content_of, read_mesh, read_mesh_file
 from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
+from katana450.extensions.objects.scenes import free_name
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
-from katana450.extensions.programs.script.scene_draft import MeshFile, Scene, SceneDraft, parsed
+from katana450.extensions.programs.script.scene_draft import (
+    VERSION,
+    MeshFile,
+    Scene,
+    SceneDraft,
+    parsed,
+)
 from katana450.extensions.programs.script.script import is_script, parse
 from katana450.extensions.programs.script.script_files import files_in
-from katana450.extensions.scene.text import written
+from katana450.extensions.programs.script.script_scene import check_scene
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.water.units import ML
+
+LENGTH_DIGITS, ANGLE_DIGITS = 6, 9
+"""Decimal places of written numbers [mm], [deg]: a millionth of a millimetre."""
+
+HEAD = """\
+# A scene of katana450. Lengths are in mm and angles in degrees. A pose is x, y, z, roll, pitch, yaw
+# in the frame of the base, or in that of the tool for what is attached to the hand.
+"""
+"""Comment at the start of a written scene."""
+
+
+def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None) -> str:
+    """Return the text of a scene. ``files`` are the files of its meshes by their keys."""
+    entry: dict[str, object] = {"scene": VERSION}
+    if scene.joints is not None:
+        entry["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
+    if scene.water is not None:
+        entry["water"] = _round(scene.water / ML, LENGTH_DIGITS)
+    entry["objects"] = [
+        _object_entry(scene_object, files, T_palm_tool) for scene_object in scene.objects
+    ]
+    body: str = yaml.dump(entry, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+    return HEAD + body
+
+
+class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
+    """A YAML dumper that writes lists of numbers on one line."""
+
+    def ignore_aliases(self, data: object) -> bool:  # noqa: ARG002
+        """Return True, so that repeated values are written in full."""
+        return True
+
+    def represent_list(self, data: list[object]) -> yaml.Node:
+        """Return the node of a list; a list of numbers is on one line."""
+        plain = all(isinstance(each, int | float) for each in data)
+        return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=plain)
+
+
+_Dumper.add_representer(list, _Dumper.represent_list)
+
+
+def _object_entry(
+    scene_object: SceneObject, files: Mapping[str, MeshFile], T_palm_tool: FloatArray | None
+) -> dict[str, object]:
+    entry: dict[str, object] = {"name": scene_object.name, "shape": scene_object.shape.value}
+    T = scene_object.T
+    if scene_object.fixed and T_palm_tool is not None:
+        T = se3.inverse(T_palm_tool) @ T
+    if scene_object.solid is None:
+        entry["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in scene_object.size]
+    else:
+        file = files[scene_object.solid.key]
+        values = {"file": file.path, "unit": file.unit, "up": file.up, "sha256": file.sha256}
+        entry["mesh"] = {name: each for name, each in values.items() if each is not None}
+    entry["pose"] = [
+        *(_round(1e3 * each, LENGTH_DIGITS) for each in T[:3, 3]),
+        *(_round(each, ANGLE_DIGITS) for each in np.degrees(so3.to_rpy(T[:3, :3]))),
+    ]
+    scale, opacity = (
+        float(f"{each:.12g}") for each in (scene_object.scale, scene_object.appearance.opacity)
+    )
+    if scale != 1.0:
+        entry["scale"] = scale
+    if scene_object.appearance.colour is not None:
+        entry["colour"] = "#{:02x}{:02x}{:02x}".format(*scene_object.appearance.colour)
+    if opacity != 1.0:
+        entry["opacity"] = opacity
+    for name, true in (
+        ("hidden", scene_object.appearance.hidden),
+        ("can_be_held", scene_object.can_be_held),
+    ):
+        if true:
+            entry[name] = True
+    if scene_object.fixed:
+        entry["attach"] = "hand"
+    return entry
+
+
+def _round(value: float, digits: int) -> int | float:
+    rounded = round(float(value), digits) + 0.0
+    return int(rounded) if rounded == int(rounded) else rounded
+
 
 FOLDER = "meshes"
 """Folder of the meshes in a .zip."""
@@ -188,3 +287,75 @@ def _text(content: bytes, name: str) -> str:
         return content.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"{name} is not UTF-8 text: {error.reason}.") from error
+
+
+PLACED = re.compile(
+    r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?(?:@(?P<scale>[0-9.]+(?:e-?[0-9]+)?))?"
+)
+"""Pattern of an ``--object`` value: FILE[@x,y,z][@SCALE]."""
+
+
+def initial_scene(
+    session: Session, scene: Path | None, object_files: Sequence[str]
+) -> InitialScene:
+    """Return the initial scene. Raises InputError; see ``load_initial_scene``."""
+    stored, notes = load_initial_scene(session, scene, object_files)
+    command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water)
+    return InitialScene(command, stored.scene.joints, stored.meshes, notes)
+
+
+def load_initial_scene(
+    session: Session, scene: Path | None, object_files: Sequence[str]
+) -> tuple[StoredScene, tuple[str, ...]]:
+    """Return the scene of the file ``scene`` with the objects of ``object_files``, and notes.
+
+    Each of ``object_files`` is FILE[@x,y,z][@SCALE] with x, y, z in mm. Without a scene file, the
+    scene has the robot's own objects. Raises InputError for a file that cannot be read, and for an
+    object that cannot stand at its place.
+    """
+    hand = session.environment.hand
+    stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
+    if scene is not None:
+        stored = read_scene_folder(scene, None if hand is None else hand.T_palm_tool)
+    try:
+        check_scene(session, stored.scene)
+    except InputError as error:
+        raise InputError(f"{scene}: {error}") from error
+    objects, meshes, notes = list(stored.scene.objects), list(stored.meshes), []
+    for argument in object_files:
+        mesh, scene_object = _object(argument, objects, session.environment.table_height)
+        objects.append(scene_object)
+        meshes.append(mesh)
+        notes.append(f"{scene_object.name}: {mesh.text}")
+    session.check(cmd.ReplaceScene(tuple(objects), stored.scene.water))
+    kept = {mesh.key: mesh for mesh in meshes}
+    complete = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(kept.values()))
+    return complete, tuple(notes)
+
+
+def _object(
+    argument: str, objects: Sequence[SceneObject], table: float
+) -> tuple[Mesh, SceneObject]:
+    match = PLACED.fullmatch(argument)
+    assert match is not None
+    mesh = read_mesh_file(Path(match["file"]))
+    name = free_name(mesh.name, {scene_object.name for scene_object in objects})
+    scale = 1.0
+    if match["scale"] is not None:
+        try:
+            scale = float(match["scale"])
+        except ValueError:
+            raise InputError(f"{argument!r}: the scale must be a number, as in @0.5.") from None
+    elif mesh.scale != 1.0:
+        raise InputError(
+            f"{match['file']}: {mesh.text} Give the scale after the file, as in "
+            f"{match['file']}@{mesh.scale:g}."
+        )
+    scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid, scale=scale)
+    if match["at"] is None:
+        return mesh, replace(scene_object, T=free_place(scene_object, objects, table))
+    try:
+        at = [1e-3 * float(each) for each in match["at"].split(",")]
+    except ValueError:
+        raise InputError(f"{argument!r}: the place must be x,y,z in mm, as in @300,0,0.") from None
+    return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), at))

@@ -42,7 +42,7 @@ def chosen_scene(options: Namespace, session: Callable[[], Session]) -> InitialS
     """Return the scene that the options name; None without one. Raises KatanaError."""
     if options.scene is None and not options.objects:
         return None
-    from katana450.extensions.importers.initial_scene import initial_scene
+    from katana450.extensions.importers.scene_file import initial_scene
 
     return initial_scene(session(), options.scene, options.objects)
 

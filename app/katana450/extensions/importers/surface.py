@@ -1,7 +1,13 @@
-"""Triangle surfaces as all readers produce them."""
+"""Triangle surfaces as all readers produce them, from polygons, and coarser ones for drawing.
+
+Sources: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975), for the triangulation
+of concave polygons. J. Rossignac, P. Borrel, "Multi-resolution 3D approximations for rendering
+complex scenes", in: Modeling in Computer Graphics (1993), for the clustering of vertices in a grid.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,8 +17,124 @@ import numpy.typing as npt
 
 from katana450.arm.robot.creases import Colours
 from katana450.errors import InputError
-from katana450.extensions.importers.polygons import cut
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+
+
+def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntArray, IntArray]:
+    """Return triangles (m, 3) as places in ``corners``, and the polygon (m,) of each.
+
+    Args:
+        vertices: (n, 3), finite.
+        corners: (k,) indices of vertices, polygon after polygon.
+        sizes: (p,) number of corners of each polygon.
+
+    A polygon of k corners gives k - 2 triangles with its own orientation. A polygon that crosses
+    itself gives as many, of arbitrary shape. The effort for a concave polygon grows with its number
+    of corners times the number that lies within the extent of an ear.
+    """
+    starts = np.cumsum(sizes) - sizes
+    triangles, owners = [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for size in np.unique(sizes[sizes >= 3]).tolist():
+        polygons = np.flatnonzero(sizes == size)
+        places = starts[polygons][:, None] + np.arange(size)
+        fan = np.column_stack((np.zeros(size - 2), np.arange(1, size - 1), np.arange(2, size)))
+        local = np.broadcast_to(fan.astype(np.int64), (len(polygons), size - 2, 3)).copy()
+        if size > 3:
+            points = vertices[corners[places]]
+            for number in np.flatnonzero(_concave(points)).tolist():
+                local[number] = _ears(points[number])
+        triangles.append(np.take_along_axis(places[:, None, :], local, axis=2).reshape(-1, 3))
+        owners.append(np.repeat(polygons, size - 2))
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(triangles)[order], owner[order]
+
+
+def _normals(points: FloatArray) -> FloatArray:
+    """Return normals (p, 3) of polygons (p, k, 3), of any length, by Newell's sum."""
+    ahead = np.roll(points, -1, axis=1)
+    return np.asarray(np.cross(points, ahead).sum(axis=1))
+
+
+def _concave(points: FloatArray) -> IntArray:
+    """Return for each polygon of (p, k, 3) whether it has a concave corner, (p,)."""
+    points = points - points[:, :1]
+    before, ahead = np.roll(points, 1, axis=1), np.roll(points, -1, axis=1)
+    turns = np.einsum("pkc,pc->pk", np.cross(points - before, ahead - points), _normals(points))
+    scale = np.abs(turns).max(axis=1, keepdims=True)
+    return np.asarray((turns < -1e-9 * scale).any(axis=1))
+
+
+def _ears(points: FloatArray) -> IntArray:
+    """Return the triangles (k - 2, 3) of one polygon (k, 3), as numbers of its corners."""
+    points = points - points[0]
+    normal = _normals(points[None])[0]
+    axis = int(np.argmax(np.abs(normal)))
+    flat = np.delete(points, axis, axis=1)
+    if (normal[axis] < 0.0) != (axis == 1):
+        flat = flat[:, ::-1]
+    count = len(flat)
+    before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
+    before[0] = count - 1
+    rest = _RemainingCorners(flat)
+    is_ear = [rest.is_ear(before[b], b, ahead[b]) for b in range(count)]
+    ears = deque(b for b in range(count) if is_ear[b])
+    found: list[tuple[int, int, int]] = []
+    b = 0
+    while len(found) < count - 2:
+        while ears and not is_ear[ears[0]]:
+            ears.popleft()
+        # Without an ear the polygon crosses itself; then any corner is taken.
+        b = ears.popleft() if ears else ahead[b]
+        a, c = before[b], ahead[b]
+        found.append((a, b, c))
+        rest.left[b] = is_ear[b] = False
+        ahead[a], before[c] = c, a
+        # Only the two neighbours can become an ear by this, or cease to be one.
+        for corner in (a, c):
+            was, is_ear[corner] = (
+                is_ear[corner],
+                rest.is_ear(before[corner], corner, ahead[corner]),
+            )
+            if is_ear[corner] and not was:
+                ears.append(corner)
+    return np.array(found, dtype=np.int64)
+
+
+class _RemainingCorners:
+    """The remaining corners (k, 2) of a polygon, sorted along its longer axis."""
+
+    def __init__(self, flat: FloatArray) -> None:
+        self._flat = flat
+        self.left = np.ones(len(flat), dtype=bool)
+        self._axis = int(np.ptp(flat, axis=0).argmax())
+        self._order = np.argsort(flat[:, self._axis], kind="stable")
+        self._along = flat[self._order, self._axis]
+
+    def is_ear(self, a: int, b: int, c: int) -> bool:
+        """Return whether corner b is convex, and no remaining corner lies in its triangle."""
+        ends = self._flat[[a, b, c]]
+        if _turn(ends[0], ends[1], ends[2:])[0] <= 0.0:
+            return False
+        span = ends[:, self._axis]
+        first = self._along.searchsorted(span.min(), "left")
+        last = self._along.searchsorted(span.max(), "right")
+        near = self._order[first:last]
+        others = self._flat[near[self.left[near]]]
+        inside = (
+            (_turn(ends[0], ends[1], others) >= 0.0)
+            & (_turn(ends[1], ends[2], others) >= 0.0)
+            & (_turn(ends[2], ends[0], others) >= 0.0)
+        )
+        # Corners equal to its own do not count, such as those that a bridge to a hole duplicates.
+        return bool((others[inside][:, None] == ends).all(axis=2).any(axis=1).all())
+
+
+def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
+    """Return twice the signed area of a, b, p for each point p of (k, 2); positive left of a, b."""
+    (ax, ay), (bx, by) = a, b
+    return np.asarray((bx - ax) * (points[:, 1] - ay) - (by - ay) * (points[:, 0] - ax))
+
 
 GREY = (204, 204, 204, 255)
 """Colour (RGBA bytes) of uncoloured parts beside coloured ones: the default of VRML97."""
@@ -198,3 +320,73 @@ def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
     """Return colours 0..1 as bytes (m, 4); values outside are clipped."""
     rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
     return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)
+
+
+MAX_CELLS = 1 << 20
+"""Maximum number of cells along a side, so that the numbers of a cell fit into 64 bits."""
+
+ENOUGH = 0.75
+"""[1] Fraction of the maximum number of triangles with which no finer grid is tried."""
+
+FINER_GRIDS = 2
+"""Maximum number of finer grids that are tried after the first one that is coarse enough."""
+
+
+def coarser(surface: MeshSurface, maximum: int) -> tuple[MeshSurface, float]:
+    """Return a surface of at most ``maximum`` triangles, and how far a vertex was moved at most.
+
+    Vertices in the same cell of a grid become their mean. Triangles whose corners become the same,
+    and repeated triangles, are left out. The result has the same extent along each axis.
+    ``surface`` is not empty and has no equal vertices.
+    """
+    vertices, faces = surface.vertices, surface.faces
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    edges = np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1)
+    fine = float((high - low).max()) / MAX_CELLS
+    cell = max(0.5 * float(np.median(edges)), fine)
+    found: tuple[IntArray, FloatArray, IntArray] | None = None
+    tries, growth = FINER_GRIDS, 1.1
+    while found is None or tries:
+        cluster, means = _clustered(vertices, low, cell)
+        kept = _distinct(cluster[faces], len(means))
+        if len(kept) <= maximum:
+            found, coarse = (cluster, means, kept), cell
+            if len(kept) > ENOUGH * maximum:
+                break
+        else:
+            fine = cell
+        if found is None:
+            # The number of triangles of a surface falls with the square of the size of a cell. It
+            # falls later if there are many small triangles beside large ones.
+            cell *= max(float(np.sqrt(len(kept) / maximum)), growth)
+            growth **= 2
+        else:
+            cell = float(np.sqrt(fine * coarse)) if fine * 8.0 > coarse else coarse / 2.0
+            tries -= 1
+    cluster, means, kept = found
+    near, far = means.min(axis=0), means.max(axis=0)
+    means = low + (means - near) * ((high - low) / np.where(far > near, far - near, 1.0))
+    moved = float(np.linalg.norm(vertices - means[cluster], axis=1).max())
+    colours = None if surface.colours is None else surface.colours[kept]
+    return MeshSurface(means, cluster[faces[kept]], colours).tidy(), moved
+
+
+def _clustered(vertices: FloatArray, low: FloatArray, cell: float) -> tuple[IntArray, FloatArray]:
+    """Return the cluster (n,) of each vertex, and the mean (k, 3) of each cluster."""
+    x, y, z = np.floor((vertices - low) / cell).astype(np.int64).T
+    side = MAX_CELLS + 1
+    _, cluster = np.unique((x * side + y) * side + z, return_inverse=True)
+    count = np.bincount(cluster)
+    sums = [np.bincount(cluster, weights=column) for column in vertices.T]
+    return cluster.astype(np.int64), np.column_stack(sums) / count[:, None]
+
+
+def _distinct(faces: IntArray, count: int) -> IntArray:
+    """Return the numbers of the faces that have three corners and do not repeat another one."""
+    a, b, c = np.sort(faces, axis=1).T
+    whole = np.flatnonzero((a != b) & (b != c))
+    a, b, c = a[whole], b[whole], c[whole]
+    order = np.lexsort((c, a * count + b))
+    repeated = np.zeros(len(order), dtype=bool)
+    repeated[1:] = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)
+    return np.sort(whole[order[~repeated]])

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_node import Node, Use, Value
+from katana450.extensions.export.vrml_world import Node, Use, Value
 
 MAX_QUOTED_CHARACTERS = 160
 """Maximum length of a quotation from a file in an error message."""

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.extensions.media.measures import PathTrace
-from katana450.extensions.media.pour_record import PourRecord
+from katana450.extensions.media.measures import PathTrace, PourRecord
 from katana450.extensions.programs.run.measured_run import Deviation, MeasuredRun
 from katana450.extensions.programs.run.simulation import Trace
 from katana450.maths.geometry.arrays import FloatArray

@@ -24,8 +24,8 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.picture import Picture, picture
+from katana450.extensions.media.scene import Camera
 from katana450.extensions.media.stage import RenderStage
 from katana450.server.view.cameras import camera_pose
 from katana450.server.viser_bridge.presets import FOV, Preset

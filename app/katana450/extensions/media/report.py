@@ -21,8 +21,14 @@ from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.media import figures
 from katana450.extensions.media.figures import measured_figure
-from katana450.extensions.media.measures import Bound, alongs, bounds, measurements
-from katana450.extensions.media.pour_record import COLUMNS, PourRecord
+from katana450.extensions.media.measures import (
+    COLUMNS,
+    Bound,
+    PourRecord,
+    alongs,
+    bounds,
+    measurements,
+)
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Trace

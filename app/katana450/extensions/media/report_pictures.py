@@ -17,9 +17,8 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.extensions.media.camera import Camera
 from katana450.extensions.media.picture import picture
-from katana450.extensions.media.scene import Item, unit
+from katana450.extensions.media.scene import Camera, Item, unit
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.program import Program

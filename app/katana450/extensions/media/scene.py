@@ -1,9 +1,11 @@
-"""The triangles of a picture in one frame, with their items and materials."""
+"""The triangles of a scene, and the first of them that each ray of a camera hits."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +13,9 @@ import numpy.typing as npt
 
 from katana450.arm.robot.surfaces import VisualMesh
 from katana450.caching import cached_property
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.errors import InputError
+from katana450.extras import require
+from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.srgb import to_light
 
 Floats = npt.NDArray[np.float32]
@@ -87,3 +91,228 @@ def _stacked(parts: Sequence[Any], kind: Any) -> npt.NDArray[Any]:
     if not parts or not len(parts[0]):
         return np.empty((0, 3), dtype=kind)
     return np.concatenate(parts).astype(kind)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera.
+
+    Attributes:
+        position: [m] in the base frame, z up.
+        target: point that it looks at [m].
+        fov: vertical field of view [rad].
+        size: width and height of its picture [px].
+
+    Raises InputError for invalid values.
+    """
+
+    position: tuple[float, float, float]
+    target: tuple[float, float, float]
+    fov: float
+    size: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        eye = finite_array(self.position, (3,), "The position of the camera")
+        to = finite_array(self.target, (3,), "The target of the camera") - eye
+        if math.hypot(to[0], to[1]) < MIN_SLOPE_SINE * float(np.linalg.norm(to)) or not to.any():
+            raise InputError(
+                "The camera must not look straight up or down, or at its own position."
+            )
+        if not 0.0 < self.fov < math.pi:
+            raise InputError(
+                f"The camera's field of view is {self.fov} rad; it must be between 0 and pi."
+            )
+        if not all(1 <= side <= MAX_PIXELS for side in self.size):
+            raise InputError(
+                f"A picture must have 1 to {MAX_PIXELS} pixels per side, not {self.size}."
+            )
+
+    @cached_property
+    def frame(self) -> Floats:
+        """The rows (3, 3) of its axes in the base frame: right, up and ahead."""
+        ahead = unit(np.subtract(self.target, self.position))
+        right = unit(np.cross(ahead, (0.0, 0.0, 1.0)))
+        return np.stack((right, np.cross(right, ahead), ahead)).astype(np.float32)
+
+    @property
+    def pixel(self) -> float:
+        """The width of the central pixel, as a fraction of the distance."""
+        return 2.0 * math.tan(0.5 * self.fov) / self.size[1]
+
+    def directions(self, x: Floats, y: Floats) -> Floats:
+        """Return unit directions (n, 3) through x, y (n,) [px] from the top left corner."""
+        width, height = self.size
+        across = (x - 0.5 * width) * self.pixel
+        up = (0.5 * height - y) * self.pixel
+        return unit(np.stack((across, up, np.ones_like(across)), axis=1) @ self.frame)
+
+
+MIN_SLOPE_SINE = 1e-3
+"""Sine of the minimum angle between view direction and vertical."""
+
+MAX_PIXELS = 8192
+"""Maximum width and height of a picture."""
+
+
+NOTHING = -1
+"""Triangle number of a ray that hits nothing."""
+
+
+def check_traceable() -> None:
+    """Raise MissingExtraError if embreex is missing, to report this before a long run."""
+    require("embreex", "pictures", "Pictures and films")
+
+
+FLOOR, NOWHERE = -1, -2
+"""Values in place of the number of an item."""
+
+BACKGROUND_DISTANCE = 1e4
+"""[m] Distance that is assigned to rays that hit nothing."""
+
+MAX_SHADOW_LENGTH = 2.5
+"""[m] Maximum length of a shadow."""
+
+RAY_OFFSET = 2e-4
+"""[m] Distance of the start of a shadow ray from its surface, to avoid hits of that surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """The first intersections of n rays.
+
+    Attributes:
+        directions: (n, 3) of the rays.
+        distance: (n,) [m].
+        points: (n, 3) end points in the base frame [m].
+        normals: (n, 3) unit normals, towards the camera.
+        item: (n,) numbers of items, FLOOR or NOWHERE.
+    """
+
+    directions: Floats
+    distance: Floats
+    points: Floats
+    normals: Floats
+    item: Ints
+
+    def some(self, which: Bools) -> Hits:
+        """Return the hits of the rays for which ``which`` (n,) is True."""
+        return Hits(
+            self.directions[which],
+            self.distance[which],
+            self.points[which],
+            self.normals[which],
+            self.item[which],
+        )
+
+
+class Tracer:
+    """A scene prepared for ray queries."""
+
+    def __init__(self, scene: RenderScene) -> None:
+        """Build the acceleration structure. Raises MissingExtraError without embreex."""
+        check_traceable()
+        rtcore: Any = import_module("embreex.rtcore_scene")
+        meshes: Any = import_module("embreex.mesh_construction")
+        self._scene, self._embree = scene, rtcore.EmbreeScene()
+        self._empty = not len(scene.faces)
+        if not self._empty:
+            meshes.TriangleMesh(self._embree, scene.vertices, scene.faces)
+
+    def hits(self, eye: Floats, directions: Floats) -> Hits:
+        """Return the hits of rays from ``eye`` (3,) [m] along ``directions`` (n, 3)."""
+        count = len(directions)
+        distance = np.full(count, BACKGROUND_DISTANCE, dtype=np.float32)
+        item = np.full(count, NOWHERE, dtype=np.int32)
+        normals = np.tile(UPWARD, (count, 1))
+        if not self._empty and count:
+            found = self._embree.run(_from(eye, directions), directions, output=True)
+            face: Ints = found["primID"]
+            hit = np.flatnonzero(face != NOTHING)
+            distance[hit] = np.minimum(found["tfar"][hit], BACKGROUND_DISTANCE)
+            item[hit] = self._scene.item[face[hit]]
+            places = (found["u"][hit, None], found["v"][hit, None])
+            normals[hit] = _normals(self._scene, face[hit], places, directions[hit])
+        return Hits(directions, distance, _ends(eye, distance, directions), normals, item)
+
+    def blocked(self, origins: Floats, directions: Floats, reach: float) -> Bools:
+        """Return (n,) whether each ray hits anything within ``reach`` [m]."""
+        if self._empty or not len(origins):
+            return np.zeros(len(origins), dtype=bool)
+        reached = np.full(len(origins), reach, dtype=np.float32)
+        found = self._embree.run(origins, directions, dists=reached, query="OCCLUDED")
+        return np.asarray(found != NOTHING)
+
+
+def first_hits(tracer: Tracer, eye: Floats, directions: Floats, floor: float) -> Hits:
+    """Return the hits of rays from ``eye`` (3,) along ``directions`` (n, 3).
+
+    ``floor`` is the height of the floor [m].
+    """
+    hits = tracer.hits(eye, directions)
+    down = directions[:, 2]
+    to_floor = np.full(len(directions), BACKGROUND_DISTANCE, dtype=np.float32)
+    np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
+    on_floor = (to_floor > 0.0) & (to_floor < hits.distance)
+    distance = np.where(on_floor, to_floor, hits.distance).astype(np.float32)
+    return Hits(
+        directions,
+        distance,
+        _ends(eye, distance, directions),
+        np.where(on_floor[:, None], UPWARD, hits.normals),
+        np.where(on_floor, FLOOR, hits.item).astype(np.int32),
+    )
+
+
+def hits_behind(
+    tracer: Tracer, eye: Floats, before: Hits
+) -> tuple[np.typing.NDArray[np.intp], Hits]:
+    """Return the numbers (m,) of rays that hit another scene ``before`` they end, and the hits."""
+    hits = tracer.hits(eye, before.directions)
+    nearer = hits.distance < before.distance
+    return np.flatnonzero(nearer), hits.some(nearer)
+
+
+def lit(tracer: Tracer, hits: Hits, towards: Floats) -> Bools:
+    """Return (n,) whether the lamp in the direction ``towards`` (3,) reaches each point."""
+    reached: Bools = (hits.item != NOWHERE) & (hits.normals @ towards > 0.0)
+    facing = np.flatnonzero(reached)
+    start = (hits.points[facing] + RAY_OFFSET * hits.normals[facing]).astype(np.float32)
+    reached[facing] = ~tracer.blocked(start, _from(towards, facing), MAX_SHADOW_LENGTH)
+    return reached
+
+
+def _from(vector: Floats, rays: np.typing.NDArray[np.generic]) -> Floats:
+    """Return ``vector`` (3,) for each of the ``rays``."""
+    return np.tile(vector, (len(rays), 1))
+
+
+def _ends(eye: Floats, distance: Floats, directions: Floats) -> Floats:
+    return np.asarray(eye + distance[:, None] * directions, dtype=np.float32)
+
+
+def _normals(
+    scene: RenderScene, face: Ints, places: tuple[Floats, Floats], directions: Floats
+) -> Floats:
+    """Return smooth unit normals (m, 3) on the triangles ``face`` (m,), towards the camera.
+
+    places: barycentric coordinates (m, 1) of the second and third corner.
+    """
+    a, b, c = (scene.normals[scene.faces[face, corner]] for corner in range(3))
+    smooth = a + places[0] * (b - a) + places[1] * (c - a)
+    size = np.sqrt(np.einsum("ni,ni->n", smooth, smooth))[:, None]
+    plane = scene.flat[face]
+    # An open surface can be seen from both sides.
+    inside = np.einsum("ni,ni->n", plane, directions) > 0.0
+    side = np.where(inside, np.float32(-1.0), np.float32(1.0))[:, None]
+    shaded = np.where(size > MIN_DENOMINATOR, smooth / np.maximum(size, MIN_DENOMINATOR), plane)
+    return np.asarray(side * shaded, dtype=np.float32)
+
+
+UPWARD = np.array((0.0, 0.0, 1.0), dtype=np.float32)
+"""The normal of the floor, and of what no ray hits."""
+
+STEEPNESS = 1e-6
+"""Sine of the inclination below which a ray counts as level."""
+
+MIN_DENOMINATOR = np.float32(1e-6)
+"""Minimum length of a vector that can be normalized."""

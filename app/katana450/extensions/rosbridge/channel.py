@@ -15,19 +15,15 @@ from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.extensions.rosbridge import names, ops, rosapi
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
-from katana450.extensions.rosbridge.goals import Goal, GoalHost
-from katana450.extensions.rosbridge.gripper_goal import GripperGoal
+from katana450.extensions.rosbridge.goals import Goal, GoalHost, GripperGoal
 from katana450.extensions.rosbridge.messages import (
     JointJog,
     NoArguments,
     TriggerResponse,
     TwistStamped,
 )
-from katana450.extensions.rosbridge.publications import Publications
-from katana450.extensions.rosbridge.servo_commands import ServoCommands
-from katana450.extensions.rosbridge.servoing import Units
-from katana450.extensions.rosbridge.stream import ServoStream
-from katana450.extensions.rosbridge.subscriptions import Subscriptions
+from katana450.extensions.rosbridge.publications import Publications, Subscriptions
+from katana450.extensions.rosbridge.servoing import ServoCommands, ServoStream, Units
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import driver_key

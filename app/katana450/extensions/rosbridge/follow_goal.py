@@ -1,17 +1,26 @@
-"""A goal of FollowJointTrajectory: the script of its trajectory is planned, checked and run."""
+"""A goal of FollowJointTrajectory: its checks, and the script that is planned and run for it.
+
+The script has one step `trajectory`: a natural cubic spline through the positions, checked as a
+whole for limits and contacts before anything moves, at the given times or slower ones where the
+limits require it.
+"""
 
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import time
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
 from katana450.arm.control.actor import Actor
-from katana450.errors import KatanaError
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.programs.planning.trajectory_path import MIN_INTERVAL
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GoalStatus, Result
 from katana450.extensions.rosbridge.messages import (
     FollowedPoint,
@@ -19,20 +28,239 @@ from katana450.extensions.rosbridge.messages import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryResult,
     Header,
+    JointTolerance,
+    JointTrajectoryPoint,
     RosMessage,
     time_of,
 )
 from katana450.extensions.rosbridge.ops import SendActionGoal, read
-from katana450.extensions.rosbridge.trajectory import (
-    START_TOLERANCE,
-    CheckedTrajectory,
-    ErrorCode,
-    GoalError,
-)
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.service.runner import Runner
+
+MAX_POINTS = 700
+"""Maximum number of points, which fit in a script of 64 KB."""
+
+MAX_SECONDS = 3600.0
+"""[s] Maximum duration."""
+
+START_TOLERANCE = 0.02
+"""[rad] Distance of a first point at time 0 from the posture of the arm."""
+
+CLOCK_TOLERANCE = 1.0
+"""[s] Maximum difference between a start time and now that counts as clock difference."""
+
+STANDS = 1e-6
+"""[rad] Motion of a joint up to which it counts as at rest."""
+
+MAX_END_RATE = 1e-3
+"""[rad/s] Rate of a joint at the end that counts as rest."""
+
+
+class ErrorCode(IntEnum):
+    """Error codes of control_msgs/FollowJointTrajectory."""
+
+    SUCCESSFUL = 0
+    INVALID_GOAL = -1
+    INVALID_JOINTS = -2
+    OLD_HEADER_TIMESTAMP = -3
+    PATH_TOLERANCE_VIOLATED = -4
+    GOAL_TOLERANCE_VIOLATED = -5
+
+
+class GoalError(InputError):
+    """Raised for a goal that is refused or fails.
+
+    Attributes:
+        code: Error code of the result.
+    """
+
+    def __init__(self, code: ErrorCode, why: str) -> None:
+        super().__init__(why)
+        self.code = code
+
+
+@dataclass(frozen=True, eq=False)
+class CheckedTrajectory:
+    """A goal whose form is valid.
+
+    Attributes:
+        times: (m,) [s], the first one 0.
+        postures: (m, n) [rad], in the order of the arm's joints; the first is that of the arm.
+        path_tolerance: (n,) maximum tracking errors [rad]; infinite without one.
+        goal_tolerance: (n,) maximum errors at the end [rad]; infinite without one.
+        time_tolerance: maximum delay of the end [s]; infinite without one.
+    """
+
+    times: FloatArray
+    postures: FloatArray
+    path_tolerance: FloatArray
+    goal_tolerance: FloatArray
+    time_tolerance: float
+
+    @classmethod
+    def of(
+        cls, goal: FollowJointTrajectory, joints: Sequence[str], q: FloatArray, now: float
+    ) -> CheckedTrajectory:
+        """Return ``goal`` for an arm with ``joints`` at rest at ``q`` (n,) [rad].
+
+        ``now`` is the time [s since the epoch]. Raises GoalError with the reason for a refusal.
+        """
+        given = goal.trajectory
+        if sorted(given.joint_names) != sorted(joints):
+            raise GoalError(
+                ErrorCode.INVALID_JOINTS,
+                f"The joints of the goal are {', '.join(given.joint_names) or 'none'}; they must "
+                f"be {', '.join(joints)}, in any order.",
+            )
+        if not 0 < len(given.points) <= MAX_POINTS:
+            raise _invalid(
+                f"The trajectory has {len(given.points)} points; it must have 1 to {MAX_POINTS}."
+            )
+        order = [given.joint_names.index(name) for name in joints]
+        rows = [_positions(point, number, order) for number, point in enumerate(given.points, 1)]
+        times = [point.time_from_start.seconds for point in given.points]
+        for number, (before, after) in enumerate(zip((0.0, *times), times, strict=False), 1):
+            least = 0.0 if number == 1 else MIN_INTERVAL
+            if not after - before >= least - 1e-9:
+                raise _invalid(
+                    f"Point {number} has the time {after:g} s; it must be at least "
+                    f"{1e3 * MIN_INTERVAL:g} ms later than the point before."
+                )
+        if times[-1] > MAX_SECONDS:
+            raise _invalid(f"A trajectory lasts at most {MAX_SECONDS:g} s.")
+        _check_end(given.points[-1])
+        _check_stamp(given.header.stamp.seconds, times[-1], now)
+        postures = np.array(rows)
+        if times[0] < MIN_INTERVAL:
+            away = float(np.abs(postures[0] - q).max())
+            if away > START_TOLERANCE:
+                raise _invalid(
+                    f"The first point is at time 0 and {away:.3g} rad from where the arm stands. "
+                    "Begin where it stands, or give the first point a later time."
+                )
+            times, postures = times[1:], postures[1:]
+        return cls(
+            np.array([0.0, *times]),
+            np.vstack((q, *postures)),
+            _tolerances(goal.path_tolerance, joints, "path_tolerance"),
+            _tolerances(goal.goal_tolerance, joints, "goal_tolerance"),
+            goal.goal_time_tolerance.seconds or math.inf,
+        )
+
+    @property
+    def duration(self) -> float:
+        """The time from the start to the last point [s]."""
+        return float(self.times[-1])
+
+    @property
+    def moves(self) -> bool:
+        """True if any joint moves."""
+        return float(np.ptp(self.postures, axis=0).max()) > STANDS
+
+    def script(self, name: str) -> str:
+        """Return the script of one step that moves along the trajectory."""
+        rows = (
+            ", ".join([f"{time:.4f}", *(f"{angle:.6f}" for angle in angles)])
+            for time, angles in zip(
+                self.times.tolist(), np.degrees(self.postures).tolist(), strict=True
+            )
+        )
+        lines = "".join(f"    - [{row}]\n" for row in rows)
+        return f"name: {name}\nsteps:\n- trajectory:\n    through:\n{lines}"
+
+    def check_path(self, error: FloatArray, joints: Sequence[str]) -> None:
+        """Raise GoalError if the tracking errors ``error`` (n,) [rad] exceed the tolerance."""
+        _check_error(error, self.path_tolerance, joints, ErrorCode.PATH_TOLERANCE_VIOLATED)
+
+    def check_end(self, q: FloatArray, joints: Sequence[str]) -> None:
+        """Raise GoalError if ``q`` (n,) [rad] is too far from the last point."""
+        error = q - self.postures[-1]
+        _check_error(error, self.goal_tolerance, joints, ErrorCode.GOAL_TOLERANCE_VIOLATED)
+
+    def check_time(self, seconds: float) -> None:
+        """Raise GoalError if the planned duration ``seconds`` [s] exceeds the tolerance."""
+        if seconds > self.duration + self.time_tolerance:
+            raise GoalError(
+                ErrorCode.GOAL_TOLERANCE_VIOLATED,
+                f"Within its limits the arm needs {seconds:.2f} s for a trajectory of "
+                f"{self.duration:.2f} s, and goal_time_tolerance is {self.time_tolerance:g} s. "
+                "Nothing has moved.",
+            )
+
+
+def _invalid(why: str) -> GoalError:
+    return GoalError(ErrorCode.INVALID_GOAL, why)
+
+
+def _positions(point: JointTrajectoryPoint, number: int, order: Sequence[int]) -> list[float]:
+    """Return the positions of ``point`` in the order of the arm's joints."""
+    n = len(order)
+    for name, values in (
+        ("positions", point.positions),
+        ("velocities", point.velocities),
+        ("accelerations", point.accelerations),
+    ):
+        if len(values) != n and (values or name == "positions"):
+            raise _invalid(f"Point {number} has {len(values)} {name}; it must have {n}.")
+        if not all(map(math.isfinite, values)):
+            raise _invalid(f"Point {number} has {name} that are not finite.")
+    if point.effort:
+        raise _invalid(f"Point {number} has efforts, which the arm does not have. Leave them out.")
+    return [point.positions[k] for k in order]
+
+
+def _check_end(last: JointTrajectoryPoint) -> None:
+    if any(abs(rate) > MAX_END_RATE for rate in last.velocities):
+        raise _invalid(
+            "The velocities of the last point are not 0: the arm would not come to rest."
+        )
+
+
+def _check_stamp(stamp: float, duration: float, now: float) -> None:
+    """Raise GoalError for a start time other than 0 or about ``now``."""
+    if not stamp or abs(stamp - now) <= CLOCK_TOLERANCE:
+        return
+    if stamp > now:
+        raise _invalid(
+            f"The trajectory would begin in {stamp - now:.1f} s. Send it when it is to begin, with "
+            "a stamp of 0."
+        )
+    ended = " and has ended" if stamp + duration < now else ""
+    raise GoalError(
+        ErrorCode.OLD_HEADER_TIMESTAMP,
+        f"The trajectory began {now - stamp:.1f} s ago{ended}. Send it with a stamp of 0.",
+    )
+
+
+def _tolerances(given: Sequence[JointTolerance], joints: Sequence[str], what: str) -> FloatArray:
+    """Return the tolerances of positions (n,); 0 and less stand for none, as in ROS."""
+    found = dict.fromkeys(joints, math.inf)
+    for each in given:
+        if each.name not in found:
+            raise GoalError(
+                ErrorCode.INVALID_JOINTS, f"{what} names the unknown joint {each.name!r}."
+            )
+        if each.velocity > 0.0 or each.acceleration > 0.0:
+            raise _invalid(f"{what} of {each.name}: only tolerances of `position` are supported.")
+        if each.position > 0.0:
+            found[each.name] = each.position
+    return np.array(list(found.values()))
+
+
+def _check_error(
+    error: FloatArray, tolerance: FloatArray, joints: Sequence[str], code: ErrorCode
+) -> None:
+    excess = np.abs(error) - tolerance
+    worst = int(excess.argmax())
+    if excess[worst] > 0.0:
+        raise GoalError(
+            code,
+            f"{joints[worst]} is {abs(error[worst]):.3g} rad off; the tolerance is "
+            f"{tolerance[worst]:.3g} rad.",
+        )
+
 
 PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)
 """Line and column with which a reason begins; removed, because the client has no script."""

@@ -1,13 +1,21 @@
-"""The websocket of rosbridge and the meshes of the robot's description."""
+"""The websocket of rosbridge, and the robot's description with the meshes that it names.
+
+The meshes are those of the exported package for ROS 2: OBJ files, one for each colour. Their
+addresses hold a secret of this server, because viewers load meshes without cookies and headers. A
+client that has received the description can load them.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import io
 import logging
 import secrets
 import threading
+import zipfile
 from functools import partial
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -17,8 +25,8 @@ from starlette.websockets import WebSocket
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError, RobotDescriptionError
+from katana450.extensions.export.urdf_package import package_files
 from katana450.extensions.rosbridge.channel import Endpoint, RosChannel, RosLine
-from katana450.extensions.rosbridge.description import MESHES, TYPES, RobotPackage
 from katana450.extensions.rosbridge.publications import Publications
 from katana450.extensions.rosbridge.servoing import Units
 from katana450.server.service.participants import actor_of
@@ -27,6 +35,55 @@ from katana450.server.web.channel import BAD_REQUEST_CLOSE_CODE
 from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.http_api import RouteContext
 from katana450.server.web.program_socket import serve_socket
+
+MESHES = "/rosbridge/meshes"
+"""Path of the meshes; the secret and the name of a file follow."""
+
+TYPES = {
+    ".obj": "model/obj",
+    ".mtl": "model/mtl",
+    ".stl": "model/stl",
+    ".dae": "model/vnd.collada+xml",
+    ".glb": "model/gltf-binary",
+    ".gltf": "model/gltf+json",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+}
+"""Types of the files by their suffixes."""
+
+
+class RobotPackage(NamedTuple):
+    """A robot's description with its files.
+
+    Attributes:
+        text: the URDF; its meshes have the prefix ``package``.
+        package: prefix of the meshes, ``package://NAME/``.
+        files: content of each file by its path in the package.
+        key: secret in the addresses of the files.
+    """
+
+    text: str
+    package: str
+    files: dict[str, bytes]
+    key: str
+
+    @classmethod
+    def read(cls, urdf: Path, key: str) -> RobotPackage:
+        """Return the description of the file ``urdf``. Raises RobotDescriptionError."""
+        ((name, content),) = package_files(urdf).items()
+        package = PurePosixPath(name).stem
+        with zipfile.ZipFile(io.BytesIO(content)) as packed:
+            files = {
+                each.removeprefix(f"{package}/"): packed.read(each) for each in packed.namelist()
+            }
+        text = next(files[each] for each in files if each.endswith(".urdf")).decode()
+        meshes = {each: data for each, data in files.items() if each.startswith("meshes/")}
+        return cls(text, f"package://{package}/", meshes, key)
+
+    def at(self, origin: str) -> str:
+        """Return the text whose meshes are at ``origin``, such as http://127.0.0.1:8080."""
+        return self.text.replace(self.package, f"{origin}{MESHES}/{self.key}/")
+
 
 log = logging.getLogger(__name__)
 

@@ -1,4 +1,4 @@
-"""Twists and rates of joints as MoveIt Servo takes them, and the rates of the arm that they mean.
+"""Twists and rates of joints as MoveIt Servo takes them, and the motion of a stream of them.
 
 An arm of the five-axis family turns its tool about two axes only: that of pitch, which is
 horizontal and across the arm, and that of roll, which is the tool's own. How it turns about a third
@@ -8,15 +8,28 @@ rotation about another axis is refused. Other arms take any rotation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 
 import numpy as np
 
+from katana450.arm.control.joint_commands import JOG_TIME
 from katana450.arm.control.tool_commands import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
-from katana450.errors import InputError
-from katana450.extensions.rosbridge.messages import GivenHeader, JointJog, Twist, Vector3
+from katana450.errors import InputError, KatanaError
+from katana450.extensions.rosbridge.messages import (
+    GivenHeader,
+    JointJog,
+    Twist,
+    TwistStamped,
+    Vector3,
+)
+from katana450.extensions.rosbridge.publications import axis_names, frames
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.tool import pitched_frame
+from katana450.server.api import answers, requests
+from katana450.server.service.hub import Hub
 
 COMMAND_TIMEOUT = 0.1
 """[s] Time for which a command is valid, as ``incoming_command_timeout`` of MoveIt Servo."""
@@ -151,3 +164,141 @@ def _check_range(value: float, limit: float, what: str, units: Units, unit: str)
     if not abs(value) <= limit:
         meant = "without unit" if units is Units.UNITLESS else unit
         raise InputError(f"{what} is {value:g}; it must be from {-limit:g} to {limit:g} {meant}.")
+
+
+LEAD = JOG_TIME
+"""[s] Time by which the angles that are sent may lead those of the arm."""
+
+
+class ServoMotion(Enum):
+    """The part that the stream moves."""
+
+    NOTHING = "nothing"
+    TOOL = "tool"
+    JOINTS = "joints"
+
+
+class ServoStream:
+    """Follows the newest command for COMMAND_TIMEOUT, then brings the arm to rest.
+
+    A stream that continues over a stop or a change of driver stays refused until it has paused for
+    STREAM_GAP: the person who steers may not have seen the stop.
+    """
+
+    def __init__(self, hub: Hub, ask: Callable[[requests.Request], answers.Answer]) -> None:
+        """Create a stream that has not begun. ``ask`` executes a request of the client."""
+        self._hub = hub
+        self._ask = ask
+        self._motion = ServoMotion.NOTHING
+        self._last = -math.inf
+        self._revocations = 0
+        self._rates = np.zeros(0)
+        self._q = np.zeros(0)
+        self._t = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """True while a command is being followed."""
+        return self._motion is not ServoMotion.NOTHING
+
+    def tool(self, rates: FloatArray) -> None:
+        """Move the tool at ``rates``, see ``requests.Jog``. Raises KatanaError if refused."""
+        self._received()
+        if not rates.any():
+            self._end(ServoMotion.TOOL)
+            return
+        self._begin(ServoMotion.TOOL)
+        self._rates = rates
+        self._send(requests.Jog(rates=rates, revocations=self._revocations))
+
+    def joints(self, rates: FloatArray) -> None:
+        """Move the joints at ``rates`` (n,) [rad/s]. Raises KatanaError if refused."""
+        self._received()
+        if not rates.any():
+            self._end(ServoMotion.JOINTS)
+            return
+        if self._motion is not ServoMotion.JOINTS:
+            self._begin(ServoMotion.JOINTS)
+            self._q, self._t = self._hub.present().state.setpoint.copy(), self._hub.clock()
+        self._rates = rates
+        self._follow()
+
+    def tick(self) -> None:
+        """Continue, or end the motion if the newest command is too old.
+
+        Raises KatanaError if the motion is refused, which ends it.
+        """
+        if not self.moves:
+            return
+        if self._hub.clock() - self._last > COMMAND_TIMEOUT:
+            self._end(self._motion)
+        elif self._motion is ServoMotion.JOINTS:
+            self._follow()
+
+    def _received(self) -> None:
+        """Note that a command was received now."""
+        t = self._hub.clock()
+        if t - self._last > STREAM_GAP:
+            self._revocations = self._hub.gate.revocations
+        self._last = t
+
+    def _begin(self, motion: ServoMotion) -> None:
+        if self._motion is not motion:
+            self._end(self._motion)
+        self._motion = motion
+
+    def _follow(self) -> None:
+        """Send the angles at which the joints should be now."""
+        state, t = self._hub.present().state, self._hub.clock()
+        lead = LEAD * np.abs(self._rates)
+        q = self._q + self._rates * (t - self._t)
+        # The lead stays bounded if the arm is slower or cannot continue.
+        self._q, self._t = np.clip(q, state.setpoint - lead, state.setpoint + lead), t
+        request = requests.Servo(q=self._q, qd=self._rates, revocations=self._revocations)
+        self._send(request)
+
+    def _send(self, request: requests.Request) -> None:
+        try:
+            self._ask(request)
+        except KatanaError:
+            self._motion = ServoMotion.NOTHING
+            raise
+
+    def _end(self, motion: ServoMotion) -> None:
+        """Bring the arm to rest if ``motion`` is what moves it now."""
+        if motion is not self._motion or motion is ServoMotion.NOTHING:
+            return
+        self._motion = ServoMotion.NOTHING
+        if motion is ServoMotion.TOOL:
+            # Keeps the tool on its line; a hold brakes each joint by itself.
+            rest = requests.Jog(np.zeros(len(self._rates)), revocations=self._revocations)
+            self._ask(rest)
+        else:
+            self._ask(requests.Hold(revocations=self._revocations))
+
+
+class ServoCommands:
+    """Turns messages of one client into motion of its stream."""
+
+    def __init__(self, hub: Hub, stream: ServoStream, units: Units) -> None:
+        self._hub = hub
+        self._stream = stream
+        self._units = units
+
+    def twist(self, message: TwistStamped) -> None:
+        """Move the tool. Raises KatanaError if that is refused."""
+        check_fresh(message.header, time.time())
+        arm = self._hub.present()
+        state, mounted = arm.state, arm.arm
+        found = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
+        R = rotation_of(message.header.frame_id, found, arm.robot.links[0].name)
+        pitched = None
+        if mounted.kinematics_to(state.tool).freedoms == 5:
+            pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
+        self._stream.tool(tool_rates(message.twist, R, pitched, self._units))
+
+    def jog(self, message: JointJog) -> None:
+        """Move joints. Raises KatanaError if that is refused."""
+        check_fresh(message.header, time.time())
+        names = axis_names(self._hub.present().robot)
+        self._stream.joints(joint_rates(message, names, self._units))

@@ -1,18 +1,40 @@
-"""The pairs of links that need no collision check, for programs that list them."""
+"""The posture in which the arm starts, and the pairs of links that need no collision check."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
+
+import numpy as np
 
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
-from katana450.extensions.export.home import home_vector
 from katana450.maths.collision.linkage import Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.settings import Settings
+
+
+def home_of(robot: Robot) -> Mapping[str, float]:
+    """Return the value of every joint [rad or m] at the app's home; of a mechanism at zero."""
+    arm = robot.arm
+    if arm is None:
+        return robot.every({})
+    *q, gripper = home_vector(robot).tolist()
+    return robot.every(arm.joint_values(np.array(q), gripper))
+
+
+def home_vector(robot: Robot) -> FloatArray:
+    """Return `home_of` as the joint values (k,) [rad or m] of a collision world of ``robot``."""
+    arm = robot.arm
+    if arm is None:
+        home = robot.every({})
+        return np.array([*(home[name] for name in robot.driven), 0.0])
+    return np.append(arm.ready(Settings.ready), arm.gripper.clamp(0.0))
+
 
 ADJACENT, NEVER, DEFAULT = "Adjacent", "Never", "Default"
 """Reasons of MoveIt: neighbours in the tree, never in contact, in contact at home."""

@@ -1,1 +1,0 @@
-"""Scenes as YAML texts that people read and write."""
