@@ -40,7 +40,7 @@ def test_samples_are_what_the_controller_does(
 ) -> None:
     dt, session = 0.01, shoulder_arm.session
     samples = circle.sample(dt)
-    state = shoulder_arm.standing(circle.start)
+    state = session.begin(circle.start, 0.0, 0.0)
     given: tuple[cmd.Command, ...] = (cmd.Follow(circle.core),)
     for number in range(1, len(samples)):
         state = session.step(state, given, number * dt)

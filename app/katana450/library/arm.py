@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.caching import cached_property
@@ -32,6 +31,7 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
+from katana450.maths.planning.plan import Plan
 from katana450.settings import Settings
 
 if TYPE_CHECKING:
@@ -319,7 +319,7 @@ class Arm:
             ...
         katana450.errors.InputError: ...
         """
-        return MotionPlan(self, self._planner.through([goal], start, seed))
+        return self._plan(self._planner.through([goal], start, seed))
 
     def plan_through(
         self,
@@ -337,7 +337,7 @@ class Arm:
         >>> bool(np.allclose(arm.fk(plan.end), arm.fk(arm.ready)))
         True
         """
-        return MotionPlan(self, self._planner.through(goals, start, seed))
+        return self._plan(self._planner.through(goals, start, seed))
 
     def line(
         self,
@@ -368,7 +368,7 @@ class Arm:
         >>> round(plan.length, 6)
         0.070711
         """
-        return MotionPlan(self, self._planner.line(to, by, start, (pitch, roll, yaw)))
+        return self._plan(self._planner.line(to, by, start, (pitch, roll, yaw)))
 
     def circle(  # noqa: PLR0913
         self,
@@ -410,8 +410,8 @@ class Arm:
         if pitch == ROOMIEST and self._planned.kinematics.freedoms != FIVE_FREEDOMS:
             pitch = None
         angles = pitch, roll, yaw
-        core = self._planner.circle(centre, radius, normal, start, angles, turns, branch)
-        return MotionPlan(self, core)
+        planner = self._planner
+        return self._plan(planner.circle(centre, radius, normal, start, angles, turns, branch))
 
     def reachability(
         self,
@@ -474,16 +474,21 @@ class Arm:
         ...     viewer.url.startswith("http://127.0.0.1:")
         True
         """
-        from katana450.library.viewer import opened
+        from katana450.library.viewer import Viewer
 
-        return opened(self, what, port, host)
-
-    def standing(self, q: npt.ArrayLike) -> State:
-        """Return the state of the arm at rest at ``q`` (n,) [rad], with its scene objects."""
-        angles = self.chain.check_q(q)
-        state = self.session.begin(angles, self._planned.gripper.clamp(0.0), 0.0)
-        return replace(state, objects=self.objects)
+        if what is not None and not isinstance(what, MotionPlan):
+            self.chain.check_q(what)
+        viewer = Viewer(self.robot, self._planner, self.T_base_frame, port, host)
+        if isinstance(what, MotionPlan):
+            viewer.play(what)
+        elif what is not None:
+            viewer.move(what)
+        return viewer
 
     @cached_property
     def _planner(self) -> Planner:
-        return Planner(self, self.session, self._planned.T_base_shoulder, self.pose_frame)
+        T = self._planned.T_base_shoulder
+        return Planner(self._kinematics, self.session, T, self.pose_frame, self.objects)
+
+    def _plan(self, core: Plan) -> MotionPlan:
+        return MotionPlan(core, self.chain, self.pose_frame)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from katana450.errors import InputError
+from katana450.library.pose_frame import PoseFrame
 from katana450.library.trajectory import Trajectory, sampled
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.plan import Plan
 
 if TYPE_CHECKING:
     from katana450.client import Client
-    from katana450.library.arm import Arm
     from katana450.server.api.answers import State
+
+DRAWN_SAMPLES: Final = 400
+"""Number of intervals of a plan in its figure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,12 +28,14 @@ class MotionPlan:
     the speed of the tool point (0.5 m/s) keep their limits. Bodies keep a distance of 6 mm.
 
     Attributes:
-        arm: the arm for which it was planned.
         core: the plan as the controller follows it.
+        chain: the arm for which it was planned, with its tool.
+        pose_frame: the frame of the poses of its samples.
     """
 
-    arm: Arm
     core: Plan
+    chain: Chain
+    pose_frame: PoseFrame
 
     def __repr__(self) -> str:
         """Return a short description."""
@@ -74,7 +80,7 @@ class MotionPlan:
         >>> bool(np.allclose(samples.points[-1] - samples.points[0], (0.0, 0.0, -0.05)))
         True
         """
-        return sampled(self.core, dt, self.arm.chain, self.arm.pose_frame)
+        return sampled(self.core, dt, self.chain, self.pose_frame)
 
     def plot(self) -> Any:
         """Draw the tool's path and the joints over time; return the matplotlib ``Figure``.
@@ -86,7 +92,7 @@ class MotionPlan:
         """
         from katana450.library.plot import figure_of
 
-        return figure_of(self)
+        return figure_of(self.sample(self.duration / DRAWN_SAMPLES))
 
     def run(self, client: Client, dt: float = 0.02, speed: float = 1.0) -> State:
         """Drive the arm of a server along this plan; return its state once it rests at the end.

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.errors import InputError
+from katana450.extensions.general_arms.nearest import nearest_pose
 from katana450.extensions.programs.building.plan_builder import (
     PlanBuilder,
     PlanContext,
@@ -21,13 +23,12 @@ from katana450.extensions.programs.language.places import ROOMIEST
 from katana450.extensions.programs.language.step_target import Angles, StepTarget
 from katana450.extensions.programs.steps.tool_moves import Circle, Line
 from katana450.library.pose_frame import PoseFrame, dimensions
+from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
 from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.pose_units import check_radians
 from katana450.maths.planning.plan import Plan
-
-if TYPE_CHECKING:
-    from katana450.library.arm import Arm
 
 MAX_TURNS = 20.0
 
@@ -37,16 +38,24 @@ class Planner:
     """Makes plans in coordinates of ``frame``; see `katana450.Arm`.
 
     Attributes:
-        arm: the arm.
+        kinematics: those of the tool.
         session: the rules of motion.
         T_base_shoulder: (4, 4) frame {S} in the base [m].
         frame: frame of poses and points.
+        objects: objects that plans keep clear of.
     """
 
-    arm: Arm
+    kinematics: Kinematics
     session: Session
     T_base_shoulder: FloatArray
     frame: PoseFrame
+    objects: tuple[SceneObject, ...]
+
+    def standing(self, q: npt.ArrayLike) -> State:
+        """Return the state of the arm at rest at ``q`` (n,) [rad], with its objects."""
+        angles = self.kinematics.chain.check_q(q)
+        gripper = self.session.require_arm().gripper.clamp(0.0)
+        return replace(self.session.begin(angles, gripper, 0.0), objects=self.objects)
 
     def through(
         self, goals: Sequence[npt.ArrayLike], start: npt.ArrayLike | None, seed: int
@@ -57,7 +66,7 @@ class Planner:
             if dimensions(goal) == 2:
                 self._to_pose(builder, goal)
             else:
-                builder.move_to(self.session.require_arm().chain.check_q(goal), "plan")
+                builder.move_to(self.kinematics.chain.check_q(goal), "plan")
         if not builder.actions:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
         return _timed(builder)
@@ -130,21 +139,23 @@ class Planner:
 
     def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
         """Plan to the nearest reachable posture that takes the pose ``goal`` (4, 4)."""
-        found = self.arm.ik(goal, builder.q).feasible
-        if not found:
-            why = self.arm.nearest(goal, q_hint=builder.q).reason or "only the nearest pose is"
+        T = self.frame.to_shoulder(goal)
+        solutions = IKSolutions(self.kinematics, T, builder.q).feasible
+        if not solutions:
+            nearest = nearest_pose(self.kinematics, T, q_hint=builder.q)
+            why = nearest.reason or "only the nearest pose is"
             raise InputError(
                 f"The arm cannot take this pose: {why}. `Arm.nearest` returns the nearest feasible "
                 "pose."
             )
         q = builder.q
-        nearest_first = sorted(found, key=lambda each: float(np.abs(each.q - q).max()))
-        builder.first(nearest_first, lambda each: builder.move_to(each.q, "plan"))
+        nearest_first = sorted(solutions, key=lambda solution: float(np.abs(solution.q - q).max()))
+        builder.first(nearest_first, lambda solution: builder.move_to(solution.q, "plan"))
 
     def _builder(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanBuilder:
         plan_context = PlanContext(self.session, self.T_base_shoulder, seed)
         return PlanBuilder(
-            plan_context, self.arm.standing(self.session.ready if start is None else start)
+            plan_context, self.standing(self.session.ready if start is None else start)
         )
 
 

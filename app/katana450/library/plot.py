@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from katana450.extensions.media.figures import AXES, STYLE, TIME, equal_axes
-
-if TYPE_CHECKING:
-    from katana450.library.motion_plan import MotionPlan
-
-SAMPLES = 400
+from katana450.library.trajectory import Trajectory
 
 
-def figure_of(plan: MotionPlan) -> Any:
-    """Draw ``plan`` and return the matplotlib ``Figure``, still open."""
+def figure_of(samples: Trajectory) -> Any:
+    """Draw ``samples`` of a plan and return the matplotlib ``Figure``, still open."""
     plt = importlib.import_module("matplotlib.pyplot")
-    samples = plan.sample(plan.duration / SAMPLES)
     points = 1e3 * samples.points
     with plt.rc_context(STYLE):
         figure = plt.figure(figsize=(9.0, 3.9), layout="constrained")
@@ -35,6 +30,6 @@ def figure_of(plan: MotionPlan) -> Any:
         panel.set_title("Joint angles")
         panel.set_xlabel(TIME)
         panel.set_ylabel("angle (deg)")
-        panel.legend(ncols=plan.arm.n, fontsize=8.0, loc="upper center")
+        panel.legend(ncols=samples.q.shape[1], fontsize=8.0, loc="upper center")
         panel.margins(x=0.0, y=0.15)
     return figure

@@ -319,7 +319,7 @@ class Recording:
             InputError: the speed is not above 0, or the part has no states.
             ConfigurationError: no port could be opened.
         """
-        from katana450.library.arm import Arm
+        from katana450.library.planner import Planner
         from katana450.library.pose_frame import PoseFrame
         from katana450.library.recorded_frames import RecordedFrames
         from katana450.library.viewer import Viewer, check_speed
@@ -329,9 +329,10 @@ class Recording:
             robot = session_for(file, None if urdf is None else Path(urdf))
             part = shown_part(file, start, end)
         frames = RecordedFrames(self.path, robot, *part)
-        mounted = robot.robot.require_arm()
-        frame = PoseFrame.of(mounted.T_base_shoulder, "base")
-        viewer = Viewer(Arm(*robot, pose_frame=frame, objects=(), mounted=mounted), port, host)
+        arm = robot.robot.require_arm()
+        T, frame = arm.T_base_shoulder, PoseFrame.of(arm.T_base_shoulder, "base")
+        planner = Planner(arm.kinematics, robot.session, T, frame, ())
+        viewer = Viewer(robot.robot, planner, np.eye(4), port, host)
         viewer.replay(frames, speed)
         return viewer
 

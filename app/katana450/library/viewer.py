@@ -18,17 +18,18 @@ import viser
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.water.nodes import WaterLayer
 from katana450.library.motion_plan import MotionPlan
+from katana450.library.planner import Planner
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 if TYPE_CHECKING:
-    from katana450.library.arm import Arm
     from katana450.library.recorded_frames import RecordedFrames
 
 FRAME_TIME = 1.0 / 60.0
@@ -49,12 +50,21 @@ class Viewer:
     nothing in it moves a simulated or real arm.
     """
 
-    def __init__(self, arm: Arm, port: int, host: str) -> None:
-        """Serve a scene of ``arm`` at ``host``, on ``port`` or the next free one above it.
+    def __init__(
+        self, robot: Robot, planner: Planner, T_base_frame: FloatArray, port: int, host: str
+    ) -> None:
+        """Serve a scene of ``robot`` at ``host``, on ``port`` or the next free one above it.
+
+        Args:
+            robot: the arm and its shapes.
+            planner: gives the states in which it stands.
+            T_base_frame: (4, 4) maps coordinates of the frame of poses into the base [m].
+            port: TCP port.
+            host: address.
 
         Raises ConfigurationError if no port can be opened.
         """
-        self._arm = arm
+        self._planner, self._T_base_frame = planner, T_base_frame
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 self._server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -67,8 +77,8 @@ class Viewer:
         look = CAMERA_POSES[Preset.FREE]
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
-        session = arm.session
-        parts = (self._server, arm.robot, session, load_props(), NoGestures(), Meshes())
+        session = planner.session
+        parts = (self._server, robot, session, load_props(), NoGestures(), Meshes())
         self._scenery = Scenery(*parts, layers=(ConduitLayer(), WaterLayer()))
         self._path = scene.add_line_segments(
             "/path", np.zeros((1, 2, 3), np.float32), PATH_COLOUR, thickness=0.003, visible=False
@@ -85,7 +95,7 @@ class Viewer:
 
         Raises InputError if ``q`` is not n finite angles.
         """
-        angles = self._arm.chain.check_q(q)
+        angles = self._planner.kinematics.chain.check_q(q)
         self.pause()
         self._show(angles)
 
@@ -96,7 +106,7 @@ class Viewer:
         """
         check_speed(speed)
         samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
-        T_base_frame = self._arm.T_base_frame
+        T_base_frame = self._T_base_frame
         points = plan.sample(plan.duration / PATH_POINTS).points
         points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
         self._play(samples.t / speed, points, lambda number: self._show(samples.q[number]))
@@ -184,22 +194,10 @@ class Viewer:
             stopped.wait(PAUSE)
 
     def _show(self, q: FloatArray) -> None:
-        self._scenery.show(self._arm.standing(q))
+        self._scenery.show(self._planner.standing(q))
 
 
 def check_speed(speed: float) -> None:
     """Raise InputError unless ``speed`` is a number above 0."""
     if not (np.isfinite(speed) and speed > 0.0):
         raise InputError(f"The speed is {speed!r}; give a number above 0.")
-
-
-def opened(arm: Arm, what: MotionPlan | npt.ArrayLike | None, port: int, host: str) -> Viewer:
-    """Open a viewer of ``arm`` that shows ``what``; see `Arm.show`."""
-    if what is not None and not isinstance(what, MotionPlan):
-        arm.chain.check_q(what)
-    viewer = Viewer(arm, port, host)
-    if isinstance(what, MotionPlan):
-        viewer.play(what)
-    elif what is not None:
-        viewer.move(what)
-    return viewer
