@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject, Shape
+from katana450.arm.control.environment import Environment
+from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.support import check_carried, check_mounted, is_loose
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError

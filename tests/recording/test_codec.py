@@ -23,7 +23,6 @@ from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.modes import IDLE, Target, Tracking
-from katana450.arm.control.pouring import MotionWithWater, VesselMotion
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import Solid
@@ -62,6 +61,7 @@ from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
 from katana450.maths.water.course import Course
 from katana450.maths.water.flow import WaterFlow
+from katana450.maths.water.motion import MotionWithWater, VesselMotion
 from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG

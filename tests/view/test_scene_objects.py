@@ -14,7 +14,8 @@ import trimesh
 import viser
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import Environment, SceneObject, Shape
+from katana450.arm.control.environment import Environment
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.session import Session
 from katana450.arm.control.solid import ObjectAppearance
 from katana450.arm.control.state import Finding, Reason, State

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from threading import Event
 
-from katana450.arm.control.scene_objects import Environment
+from katana450.arm.control.environment import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect_when_ready

@@ -6,8 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from katana450.arm.control.environment import Hand
 from katana450.arm.control.messages import UNCHECKED
-from katana450.arm.control.scene_objects import Hand, SceneObject
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare

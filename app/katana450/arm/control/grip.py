@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from katana450.arm.control.environment import Environment, Hand
 from katana450.arm.control.goals import without_finding
-from katana450.arm.control.scene_objects import Environment, Hand, SceneObject, placed
+from katana450.arm.control.scene_objects import SceneObject, placed
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.support import surface_below
 from katana450.maths.collision.world import CollisionWorld

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import Environment, SceneObject, Shape, named
+from katana450.arm.control.environment import Environment
+from katana450.arm.control.scene_objects import SceneObject, Shape, named
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.course import Course
 from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.flow import VesselMove, VesselWater, Water, WaterFlow
+from katana450.maths.water.motion import MotionWithWater, VesselMotion
 from katana450.maths.water.units import counted
 from katana450.maths.water.vectors import Vector, scale, sub, vector
 
@@ -22,8 +24,6 @@ MAX_VESSELS = 8
 
 ABSENT_BASIN_AT = (100.0, 0.0, 0.0)
 """[m] Place of the basin if the scene has none: so far away that it catches no water."""
-
-NO_VELOCITY: Vector = (0.0, 0.0, 0.0)
 
 FILM_STEP = 1.0
 """[s] Time step of a film that drains in vessels at rest, because each step is published. The film
@@ -43,39 +43,6 @@ def vessels_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
         return []
     others = [each for each in objects if is_vessel(each) and each is not cup]
     return [cup, *others][:MAX_VESSELS]
-
-
-@dataclass(frozen=True, eq=False)
-class VesselMotion:
-    """The motion of a vessel so far, and position [m] and velocity [m/s] of its middle."""
-
-    course: Course
-    middle: Vector
-    velocity: Vector = NO_VELOCITY
-
-
-@dataclass(frozen=True, eq=False)
-class MotionWithWater:
-    """The water and the motion of each vessel.
-
-    ``waited``: time [s] for which the films have still to drain, in vessels at rest.
-    """
-
-    water: Water
-    motions: tuple[VesselMotion, ...]
-    waited: float = 0.0
-
-    @property
-    def course(self) -> Course:
-        """The motion history of the cup."""
-        return self.motions[0].course
-
-    @property
-    def still(self) -> bool:
-        """True if the water is at rest as long as no vessel moves, except for the films."""
-        if self.water.parcels or any(each.velocity != NO_VELOCITY for each in self.motions):
-            return False
-        return all(each.slosh.lean == each.slosh.rate == (0.0, 0.0) for each in self.water.vessels)
 
 
 class Pouring:

@@ -9,15 +9,10 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control import solid
 from katana450.arm.control.appearance import DisplayMode, LinkAppearance
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.object_commands import MoveObject, SetAppearance
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.scene_objects import (
-    Environment,
-    SceneObject,
-    named,
-    placed,
-    with_replaced,
-)
+from katana450.arm.control.scene_objects import SceneObject, named, placed, with_replaced
 from katana450.arm.control.state import State
 
 

@@ -19,6 +19,7 @@ from katana450.arm.control.branch_options import (
     current_target,
 )
 from katana450.arm.control.checks import check, check_joints
+from katana450.arm.control.environment import Environment, Hand
 from katana450.arm.control.findings import of_joints
 from katana450.arm.control.goals import (
     end_drag,
@@ -49,7 +50,7 @@ from katana450.arm.control.motion_stepper import MotionStepper, Travel, no_trave
 from katana450.arm.control.outcome import outcome, take_all
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.scene_changes import with_scene_change
-from katana450.arm.control.scene_objects import Environment, Hand, SceneObject
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
 from katana450.arm.control.stopping import stopped_again, with_presses
 from katana450.arm.control.supervision import held_where_measured, stop_for, with_tracking_time

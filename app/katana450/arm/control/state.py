@@ -23,7 +23,6 @@ from katana450.arm.control.modes import (
     Target,
     Tracking,
 )
-from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.stop_cause import WATCHDOG, StopCause
 from katana450.caching import cached_property
@@ -35,6 +34,7 @@ from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.motion.limiter import JointMotion
 from katana450.maths.motion.stream import Stream
 from katana450.maths.planning.plan import Plan
+from katana450.maths.water.motion import MotionWithWater
 
 
 class Status(Enum):

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.pouring import BASIN, is_vessel
-from katana450.arm.control.scene_objects import Attachment, Environment, SceneObject, Shape
+from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray

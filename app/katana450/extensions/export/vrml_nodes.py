@@ -18,8 +18,9 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.appearance import AppearanceTrait, Colour
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.scene_changes import appearance_of, with_moved_object
-from katana450.arm.control.scene_objects import Environment, SceneObject
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.arm.robot.link import Joint

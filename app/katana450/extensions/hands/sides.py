@@ -15,8 +15,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from katana450.arm.control.environment import Hand
 from katana450.arm.control.gripper_model import GripperModel
-from katana450.arm.control.scene_objects import Hand
 from katana450.errors import InputError
 from katana450.extensions.hands.fixed_jaw import FixedJaw
 from katana450.extensions.hands.placed_bodies import PlacedBodies

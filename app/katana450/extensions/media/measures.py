@@ -14,7 +14,6 @@ from itertools import pairwise
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.pouring import MotionWithWater
 from katana450.extensions.programs.building.actions import FollowPlan, Task
 from katana450.extensions.programs.planning.curves import ToolCoordinates
 from katana450.extensions.programs.planning.pose_path import PosePath
@@ -30,6 +29,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import CurvePath, joint_derivatives, point_derivatives
+from katana450.maths.water.motion import MotionWithWater
 from katana450.maths.water.units import MILLILITRE
 
 PATH_SAMPLES = 2000

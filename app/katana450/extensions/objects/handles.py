@@ -9,7 +9,8 @@ import viser
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.commands import PlaceObject
-from katana450.arm.control.scene_objects import Environment, SceneObject
+from katana450.arm.control.environment import Environment
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried, is_loose
 from katana450.errors import InputError, KatanaError

@@ -11,15 +11,9 @@ import numpy as np
 import viser
 
 from katana450.arm.control import commands as cmd
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.pouring import BASIN, CUP
-from katana450.arm.control.scene_objects import (
-    MAX_SCALE,
-    MIN_SCALE,
-    Attachment,
-    Environment,
-    SceneObject,
-    named,
-)
+from katana450.arm.control.scene_objects import MAX_SCALE, MIN_SCALE, Attachment, SceneObject, named
 from katana450.arm.control.solid import MIN_OPACITY, ObjectAppearance
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_mounted

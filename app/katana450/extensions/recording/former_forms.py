@@ -12,9 +12,10 @@ from typing import Any
 
 from katana450.arm.control.act import tag_of
 from katana450.arm.control.modes import Target
-from katana450.arm.control.pouring import CUP, MotionWithWater
+from katana450.arm.control.pouring import CUP
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.water.motion import MotionWithWater
 from katana450.maths.water.units import ML
 
 FORMER: Mapping[str, Any] = {"liquid": ["water", 998.2, 1.0016e-3, 72.74e-3, [74, 148, 192]]}

@@ -10,9 +10,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.modes import JointTarget, PoseTarget
-from katana450.arm.control.scene_objects import Environment, SceneObject
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.recording.messages import (

@@ -8,7 +8,8 @@ from typing import TypedDict
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import Hand, SceneObject, same
+from katana450.arm.control.environment import Hand
+from katana450.arm.control.scene_objects import SceneObject, same
 from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.props import load_props

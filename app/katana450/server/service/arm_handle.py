@@ -8,10 +8,10 @@ from concurrent.futures import Future
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.branch_options import BranchOption
+from katana450.arm.control.environment import Environment
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.scene_objects import Environment
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State

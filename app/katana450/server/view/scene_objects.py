@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import viser
 
-from katana450.arm.control.scene_objects import Environment, SceneObject, Shape
+from katana450.arm.control.environment import Environment
+from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.arm.robot.creases import Drawn, drawn, glb

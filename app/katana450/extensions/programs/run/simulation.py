@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
@@ -19,6 +18,7 @@ from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.maths.geometry.arrays import FloatArray, IntArray
+from katana450.maths.water.motion import MotionWithWater
 
 MAX_DURATION = 24 * 3600.0
 """[s] Maximum duration of a program."""

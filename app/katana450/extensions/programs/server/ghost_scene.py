@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import viser
 
-from katana450.arm.control.pouring import MotionWithWater
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -18,6 +17,7 @@ from katana450.extensions.water.nodes import WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import Water
+from katana450.maths.water.motion import MotionWithWater
 from katana450.server.view.scene import Colour, Window
 from katana450.server.view.scene_objects import ObjectShape
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import msgspec
 
-from katana450.arm.control.scene_objects import Environment
+from katana450.arm.control.environment import Environment
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.recording.files.fingerprint import fingerprint

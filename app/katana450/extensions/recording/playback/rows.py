@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from katana450.arm.control.pouring import CUP, MotionWithWater
+from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.recording.files.checking import TickReader, content_of
@@ -20,6 +20,7 @@ from katana450.extensions.recording.messages import (
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import VesselWater, Water
+from katana450.maths.water.motion import MotionWithWater
 from katana450.maths.water.parcel import Parcel, landing
 from katana450.maths.water.puddle import Puddle
 from katana450.maths.water.slosh import Slosh
