@@ -46,10 +46,10 @@ from katana450.extension import provided
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
+from katana450.server.service.command_gate import guarded
 from katana450.server.service.heartbeats import ARRIVAL, Arrival
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.people import People
-from katana450.server.service.runner import guarded
 from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web.access_links import AccessFile

@@ -20,8 +20,8 @@ from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
 from katana450.extension import provided
 from katana450.server.service.arm_handle import ArmHandle
+from katana450.server.service.command_gate import guarded
 from katana450.server.service.nodes import Nodes
-from katana450.server.service.runner import guarded
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder
 from katana450.server.view.panel_tabs import PanelTabs

@@ -18,7 +18,7 @@ from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
-from katana450.server.service.request_handler import RequestHandler
+from katana450.server.service.runner import RequestHandler
 
 MAX_CHANGES = 20
 """Maximum number of changes that can be undone."""
@@ -235,8 +235,8 @@ class UndoRequests(RequestHandler):
 
     request_types = (requests.Undo, requests.Redo)
 
-    def __init__(self, hub: Hub, options: Namespace) -> None:
-        super().__init__(hub, options)
+    def __init__(self, hub: Hub, _options: Namespace) -> None:
+        self.hub = hub
         self.history = UndoHistory(hub.clock)
         hub.gate.delivered.append(self.history.note)
 

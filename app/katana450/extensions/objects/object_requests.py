@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +17,9 @@ from katana450.extensions.free_place import free_place
 from katana450.extensions.objects.scenes import scenes_of
 from katana450.maths.geometry import se3
 from katana450.server.api import requests
+from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
-from katana450.server.service.request_handler import RequestHandler
+from katana450.server.service.runner import RequestHandler
 
 
 class ObjectRequests(RequestHandler):
@@ -29,6 +31,9 @@ class ObjectRequests(RequestHandler):
     request_types = (
         *(requests.Place, requests.Attach, requests.Load, requests.Fill, requests.Remove),
     )
+
+    def __init__(self, hub: Hub, _options: Namespace) -> None:
+        self.hub = hub
 
     def handle(self, _participant: Participant, request: requests.Request) -> cmd.Command:
         """Return the command of ``request``."""

@@ -15,7 +15,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.people import Connection, ConnectionKind
-from katana450.server.service.request_handler import RequestHandler
+from katana450.server.service.runner import RequestHandler
 
 log = logging.getLogger(__name__)
 
@@ -29,8 +29,8 @@ class PeopleRequests(RequestHandler):
 
     request_types = (requests.ListPeople, requests.Kick)
 
-    def __init__(self, hub: Hub, options: Namespace) -> None:
-        super().__init__(hub, options)
+    def __init__(self, hub: Hub, _options: Namespace) -> None:
+        self.hub = hub
         self._people = hub.people
 
     def handle(self, participant: Participant, request: requests.Request) -> answers.Answer:

@@ -24,7 +24,6 @@ from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.last_pause import LastPause
 from katana450.server.service.least_delay import check_in_time
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.runner import guarded
 from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
 from katana450.settings import Settings
 
@@ -414,3 +413,19 @@ class CommandGate:
         self.acquire(actor)
         log.info("%s took the free lease (%s).", actor.name, actor.channel.value)
         return replace(actor, grounds=Grounds.FREE_LEASE)
+
+
+def guarded(note: Callable[[], None]) -> Callable[[], None]:
+    """Return ``note`` with its errors logged and not raised.
+
+    For ``Runner.stopped`` and ``Runner.redirected``, which are on the path of a stop to the arm,
+    and for callbacks after a command was delivered, which nothing can take back.
+    """
+
+    def noted() -> None:
+        try:
+            note()
+        except Exception:
+            log.exception("Error in a callback on the path of commands and stops.")
+
+    return noted

@@ -6,7 +6,6 @@ Runs in the gateway's one thread; ``CommandGate`` decides which commands reach t
 from __future__ import annotations
 
 import math
-from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -21,7 +20,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.command_gate import CommandGate
+from katana450.server.service.command_gate import CommandGate, guarded
 from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
@@ -38,8 +37,7 @@ from katana450.server.service.participants import (
 from katana450.server.service.people import People
 from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.request_handler import RequestHandler
-from katana450.server.service.runner import Runner, guarded
+from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath
 from katana450.server.service.stop_state import ClearBy, StopNews, StopRecord
 from katana450.settings import Settings
@@ -72,7 +70,7 @@ class Hub:
         self.event_log = EventLog()
         self.people = People(clock)
         self.handlers: list[RequestHandler] = []
-        self.use_runner(Runner(self, Namespace()))
+        self.use_runner(Runner())
         self.meshes = Meshes() if meshes is None else meshes
         self._participants: dict[str, Participant] = {}
         self.pictures = ShownPictures()

@@ -1,21 +1,41 @@
-"""Base class of runners, which drive the arm over time. The extension for programs overrides it."""
+"""Base classes of what an extension adds to a server: answers to requests, and runs of the arm."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
+from katana450.arm.control import commands as cmd
+from katana450.arm.control.act import Request
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.server.api import answers
-from katana450.server.service.request_handler import RequestHandler
+from katana450.server.service.participants import Participant
 
-if TYPE_CHECKING:
-    from katana450.arm.control.lease import Person
-    from katana450.server.service.participants import Participant
 
-log = logging.getLogger(__name__)
+class RequestHandler:
+    """Answers requests of some classes. Its methods are called in the server's thread.
+
+    The class of an extension is called with the ``Hub`` and the options of ``katana450 serve``.
+
+    Attributes:
+        request_types: Classes of the requests that ``handle`` answers, of the API or of its own.
+    """
+
+    request_types: ClassVar[tuple[type[Request], ...]] = ()
+
+    def handle(self, participant: Participant, request: Request) -> answers.Answer | cmd.Command:  # noqa: ARG002
+        """Execute ``request``, one of ``request_types``, and return its answer.
+
+        The dispatcher submits a returned command in the name of ``participant``, and answers with
+        its outcome. Raises LeaseError and InputError with the reason for a refusal.
+        """
+        kind = type(request).__name__
+        raise AssertionError(f"{type(self).__name__} lists {kind} and does not execute it.")
+
+    def page_status(self, participant: Participant) -> dict[str, Any]:  # noqa: ARG002
+        """Return its entries in the status of the page of ``participant``."""
+        return {}
 
 
 class StatusLine(NamedTuple):
@@ -109,19 +129,3 @@ class Runner(RequestHandler):
         Pause and Resume are not among them: the bar always has them.
         """
         return ()
-
-
-def guarded(note: Callable[[], None]) -> Callable[[], None]:
-    """Return ``note`` with its errors logged and not raised.
-
-    For ``stopped`` and ``redirected``, which are on the path of a stop to the arm, and for
-    callbacks after a command was delivered, which nothing can take back.
-    """
-
-    def noted() -> None:
-        try:
-            note()
-        except Exception:
-            log.exception("Error in a callback on the path of commands and stops.")
-
-    return noted

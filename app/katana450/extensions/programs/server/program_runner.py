@@ -54,7 +54,7 @@ class ProgramRunner(Runner):
 
     def __init__(self, hub: Hub, options: Namespace) -> None:
         """Prepare to run programs of ``hub``. ``options``: see ``extension.add_serve_options``."""
-        super().__init__(hub, options)
+        self.hub = hub
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
         self.planner = ProgramPlanner(hub, self._owner, idly=not options.no_idle_planning)
