@@ -148,6 +148,7 @@ class Extension:
         runner: Class that drives the arm over time, with its requests. Of the first extension that
             has it.
         handler: Class that answers further requests.
+        step: A script step, a class derived from ``Step``. Other steps of its module are added too.
         folder: Adds controls to a tab of the panel, given a FolderContext, and returns them, or
             None. Called also for a robot without an arm. Raises KatanaError.
         server_log: Returns the event log of the server, given the options and the port, or None. Of
@@ -177,6 +178,7 @@ class Extension:
     nodes: Target | None = None
     runner: Target | None = None
     handler: Target | None = None
+    step: Target | None = None
     folder: Target | None = None
     server_log: Target | None = None
     send_records: Target | None = None

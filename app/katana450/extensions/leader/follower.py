@@ -17,7 +17,7 @@ from katana450.client.asynchronous import is_over
 from katana450.extensions.leader.joint_map import LeaderPosture
 from katana450.extensions.leader.posture_history import SILENCE, PostureHistory
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.api import answers
+from katana450.sdk import answers
 
 NEAR = 0.09
 """[rad] Difference of each joint up to which the arm follows the leader without a planned path."""

@@ -12,7 +12,7 @@ from katana450.errors import InputError
 from katana450.extensions.leader.calibration import Calibration, MotorCalibration
 from katana450.extensions.leader.layout import AxisSource, FingerSource, Layout
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.api import answers
+from katana450.sdk import answers
 
 LIMIT_MARGIN = 1e-4
 """[rad] Distance that is kept from the limits of the joints, so that no rounding exceeds them."""

@@ -36,8 +36,8 @@ from katana450.extensions.leader.motor_bus import (
 from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, TORQUE_ENABLE
 from katana450.extensions.serial_port import SerialPort
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.server.api import answers, requests
-from katana450.server.api.program_requests import Program, ProgramOrder, Steer
+from katana450.sdk import answers, requests
+from katana450.sdk import program_requests as programs
 
 NAME = "Leader"
 """Name of this client, which others see as the driver."""
@@ -190,8 +190,10 @@ class LeaderRun:
         """Run a program that moves the arm to ``q`` (n,) [rad] on a planned path."""
         try:
             text = ease_script(q)
-            await self._client.ask(Program(text=text, revocations=revocations))
-            await self._client.ask(Steer(order=ProgramOrder.RUN, revocations=revocations))
+            await self._client.ask(programs.Program(text=text, revocations=revocations))
+            await self._client.ask(
+                programs.Steer(order=programs.ProgramOrder.RUN, revocations=revocations)
+            )
             self._follower.eased((await self._client.query(answers.State)).sent)
         except RefusedError as error:
             await self._perform(self._follower.refused(str(error)))
@@ -204,7 +206,7 @@ class LeaderRun:
             await asyncio.gather(self._easing, return_exceptions=True)
             self._easing = None
         with suppress(RefusedError):
-            await self._client.ask(Steer(order=ProgramOrder.END))
+            await self._client.ask(programs.Steer(order=programs.ProgramOrder.END))
 
     async def _come_to_rest(self) -> None:
         """Wait until the arm is at rest, and release the lease; the connection may be lost."""

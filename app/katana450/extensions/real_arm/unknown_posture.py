@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.state import State
-from katana450.server.view.layer import LayerContext, ViewLayer
+from katana450.sdk import LayerContext, ViewLayer
 
 
 class UnknownPosture(ViewLayer):

@@ -122,7 +122,7 @@ class ScriptRoutes:
 
 def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of the scripts of the library and of the folder of ``--programs``."""
-    folder = getattr(context.hub.runner.options, "programs", None)
+    folder = getattr(context.options, "programs", None)
     return ScriptRoutes(context, Scripts(folder)).routes()
 
 

@@ -13,7 +13,7 @@ from contextlib import suppress
 from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.server.web.listen import listen
+from katana450.sdk import listen
 
 IDLE = 0.01
 """[s] Interval at which the arm moves while nothing is received."""
