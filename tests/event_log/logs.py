@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from katana450.extensions.event_log.disk_log import LogWriter
-from katana450.extensions.event_log.folder import MAX_FILE_BYTES, MAX_FILES, lines_of, log_files
+from katana450.extensions.event_log.disk_log import DiskLog
+from katana450.extensions.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, lines_of, log_files
 from katana450.extensions.event_log.records import Record, record
 
 CLOSING = 20.0
@@ -19,11 +19,10 @@ def write(
     max_files: int = MAX_FILES,
 ) -> None:
     """Write ``contents`` between a start and an end."""
-    writer = LogWriter(folder, max_file_bytes, max_files)
-    writer.put(record("start"))
+    log = DiskLog(folder, 8080, max_file_bytes, max_files)
     for content in contents:
-        writer.put(content)
-    writer.close(record("end"), CLOSING)
+        log.put(content)
+    log.close(requested=True, timeout=CLOSING)
 
 
 def numbered(count: int) -> list[Record]:

@@ -12,14 +12,12 @@ from pathlib import Path
 import pytest
 
 from katana450.client import connect
-from katana450.extensions.event_log.disk_log import MAX_KEPT, LogWriter
-from katana450.extensions.event_log.folder import LogFolder
+from katana450.extensions.event_log.disk_log import DiskLog
+from katana450.extensions.event_log.log_files import PRESENT, LogFile
 from katana450.extensions.event_log.records import Record, record
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import CLOSING, numbered, records
-
-FIRST = "events-000000000001.jsonl"
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such devices")
 
@@ -34,8 +32,8 @@ def wait(until: Callable[[], object], seconds: float = 20.0) -> None:
 def full(folder: Path) -> Path:
     """Return the first file of a log in ``folder``, on a device that is always full."""
     folder.mkdir()
-    (folder / FIRST).symlink_to("/dev/full")
-    return folder / FIRST
+    (folder / PRESENT).symlink_to("/dev/full")
+    return folder / PRESENT
 
 
 def test_writer_continues_when_a_full_disk_has_room_again(
@@ -43,97 +41,83 @@ def test_writer_continues_when_a_full_disk_has_room_again(
 ) -> None:
     folder = tmp_path / "log"
     device = full(folder)
-    writer = LogWriter(folder)
     with caplog.at_level(logging.WARNING, "katana450"):
-        for content in numbered(MAX_KEPT + 50):
+        writer = DiskLog(folder, 8080)
+        for content in numbered(50):
             writer.put(content)
         wait(lambda: caplog.records)
-        time.sleep(2.5)
         (entry,) = caplog.records
         assert "cannot be written: No space left on device" in entry.getMessage()
         device.unlink()
-        wait(lambda: writer.seq == MAX_KEPT + 1)
         wait(lambda: "is written again" in caplog.text)
-    writer.close(record("end"), CLOSING)
-    *kept, lost, end = records(folder)
-    assert [each["what"]["value"] for each in kept] == list(range(MAX_KEPT))
-    assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 50, "end")
+    writer.close(requested=True, timeout=CLOSING)
+    lost, end = records(folder)
+    assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 51, "end")
     assert "No space left" in lost["why"]
 
 
 def test_lost_records_stand_between_those_before_and_after_them(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    written, room = LogFolder.append, [0]
+    written, room = LogFile.append, [3]
 
-    def append(folder: LogFolder, content: Record) -> None:
+    def append(file: LogFile, content: Record) -> None:
         if not room[0]:
             raise OSError(28, "No space left on device")
         room[0] -= 1
-        written(folder, content)
+        written(file, content)
 
-    monkeypatch.setattr(LogFolder, "append", append)
-    writer = LogWriter(tmp_path)
-    *early, late = numbered(MAX_KEPT + 6)
-    for content in early:
+    monkeypatch.setattr(LogFile, "append", append)
+    writer = DiskLog(tmp_path, 8080)
+    for content in numbered(6):
         writer.put(content)
-    wait(lambda: caplog.records)
-    time.sleep(0.2)
-    room[0] = 100
     wait(lambda: not room[0])
-    writer.put(late)
-    time.sleep(0.2)
-    room[0] = MAX_KEPT
-    wait(lambda: writer.seq == MAX_KEPT + 1)
-    writer.close(record("end"), CLOSING)
-    *kept, lost, end = records(tmp_path)
-    assert [each["what"]["value"] for each in kept] == list(range(MAX_KEPT))
-    assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 6, "end")
+    room[0] = 100
+    writer.close(requested=True, timeout=CLOSING)
+    start, *early, lost, end = records(tmp_path)
+    assert [found["what"]["value"] for found in early] == [0, 1]
+    assert (start["kind"], lost["what"]["count"], end["kind"]) == ("start", 4, "end")
 
 
-def test_record_that_cannot_be_written_is_counted(tmp_path: Path) -> None:
-    writer = LogWriter(tmp_path)
+def test_record_that_cannot_be_written_is_counted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    writer = DiskLog(tmp_path, 8080)
+    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
     writer.put(record("command", object()))
-    time.sleep(0.2)
-    writer.put(record("start"))
-    writer.close(record("end"), CLOSING)
-    lost, start, end = records(tmp_path)
+    wait(lambda: caplog.records)
+    writer.close(requested=True, timeout=CLOSING)
+    start, lost, end = records(tmp_path)
     assert (lost["what"]["count"], start["kind"], end["kind"]) == (1, "start", "end")
 
 
 def test_deleted_log_begins_again(tmp_path: Path) -> None:
-    folder = tmp_path / "log"
-    writer = LogWriter(folder)
-    writer.put(record("start"))
-    wait(lambda: writer.seq == 1)
-    for path in folder.iterdir():
-        path.unlink()
+    writer = DiskLog(tmp_path, 8080)
+    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
+    (tmp_path / PRESENT).unlink()
 
     def written() -> bool:
         writer.put(record("command"))
-        time.sleep(0.3)
-        return (folder / "claim").exists()
+        time.sleep(0.1)
+        return (tmp_path / PRESENT).exists()
 
     wait(written)
-    writer.close(record("end"), CLOSING)
-    seqs = [each["seq"] for each in records(folder)]
-    assert seqs == list(range(seqs[0], seqs[0] + len(seqs)))
-    assert seqs[0] > 1
+    writer.close(requested=True, timeout=CLOSING)
+    lost, *_, end = records(tmp_path)
+    assert (lost["kind"], end["kind"]) == ("lost", "end")
 
 
 def test_second_writer_of_a_folder_waits_for_the_first(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    first, second = LogWriter(tmp_path), None
-    first.put(record("start"))
-    wait(lambda: first.seq == 1)
-    second = LogWriter(tmp_path)
-    second.put(record("start"))
+    first = DiskLog(tmp_path, 8080)
+    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
+    second = DiskLog(tmp_path, 8080)
     wait(lambda: "another server writes there" in caplog.text)
-    first.close(record("end"), CLOSING)
+    first.close(requested=True, timeout=CLOSING)
     # The place is free now.
-    second.close(record("end"), CLOSING)
-    assert [each["kind"] for each in records(tmp_path)] == ["start", "end", "start", "end"]
+    second.close(requested=True, timeout=CLOSING)
+    assert [found["kind"] for found in records(tmp_path)] == ["start", "end", "lost", "end"]
 
 
 def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
@@ -154,7 +138,7 @@ def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_server_drives_stops_and_ends_while_the_disk_is_stuck(tmp_path: Path) -> None:
     """Give the log a pipe without a reader: opening it for writing never returns."""
-    os.mkfifo(tmp_path / FIRST)
+    os.mkfifo(tmp_path / PRESENT)
     with AppServer((*APP, "--log", str(tmp_path)), seconds=30.0) as server:
         with connect(server.url, "Anna") as arm:
             arm.go(requests.Joint(axis=1, value=0.1))

@@ -9,7 +9,7 @@ from argparse import Namespace
 from katana450.assembly.log_lines import printable
 from katana450.errors import InputError
 from katana450.extensions.event_log.disk_log import default_folder
-from katana450.extensions.event_log.folder import lines_of
+from katana450.extensions.event_log.log_files import lines_of
 from katana450.extensions.event_log.records import Record
 
 
@@ -53,7 +53,6 @@ def _shown(record: Record) -> str:
     grounds = f"[{record['grounds']}]" if "grounds" in record else ""
     outcome = ": ".join(str(record[key]) for key in ("outcome", "why") if key in record)
     parts = (
-        str(record["seq"]).rjust(6),
         _text(record, "time"),
         f"{name}{about}",
         _text(record, "kind"),

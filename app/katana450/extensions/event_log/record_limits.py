@@ -6,8 +6,7 @@ So nobody can quickly fill the log, or displace older records by new ones.
 from __future__ import annotations
 
 from collections import Counter, OrderedDict
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from katana450.extensions.event_log.records import Record
 from katana450.server.web.token_bucket import TokenBucket
@@ -15,104 +14,93 @@ from katana450.server.web.token_bucket import TokenBucket
 SUMMARY_INTERVAL = 10.0
 """[s] Time between two summaries of what was not written."""
 
-MAX_SOURCES = 256
-"""Maximum number of participants with limits of their own; others share the total limit."""
+MAX_ACCOUNTS = 512
+"""Maximum number of accounts; beyond it the oldest ones are counted with all others."""
 
-TOTAL = 4.0
-"""Limit of all participants together, in limits of one."""
-
-
-class RecordLimit(NamedTuple):
-    """Records that are written in a burst, and per second afterwards."""
-
-    burst: float
-    rate: float
-
+SESSION = (60.0, 0.2)
 
 LIMITS = {
-    "command": RecordLimit(600.0, 2.0),
-    "stop": RecordLimit(30.0, 0.5),
-    "lease": RecordLimit(60.0, 0.5),
-    "finding": RecordLimit(200.0, 1.0),
-    "session": RecordLimit(60.0, 0.2),
-    "refusal": RecordLimit(20.0, 0.2),
+    "stop": (30.0, 0.5),
+    "clear": (30.0, 0.5),
+    "lease": (60.0, 0.5),
+    "finding": (200.0, 1.0),
+    "outcome": (200.0, 1.0),
+    "refusal": (20.0, 0.2),
+    **dict.fromkeys(("join", "leave", "rename", "sign-in", "upload"), SESSION),
 }
-"""Limits by groups of kinds. A flood in one group leaves the others as they are."""
+"""Records of one participant in a burst, and per second [1/s] afterwards, by kind. A flood of one
+kind leaves the others as they are."""
 
-GROUPS = {
-    "stop": "stop",
-    "clear": "stop",
-    "lease": "lease",
-    "finding": "finding",
-    "join": "session",
-    "leave": "session",
-    "rename": "session",
-    "sign-in": "session",
-    "upload": "session",
-    "refusal": "refusal",
-}
-"""Groups of the kinds of records; all others are in ``command``."""
+COMMANDS = (600.0, 2.0)
+"""The same for all other kinds."""
+
+EVERYBODY, EVERYBODY_FACTOR = "everybody", 4.0
+"""Source of the records of all participants together, and their limits in limits of one."""
 
 
-@dataclass
 class _Account:
-    """Records that one participant may cause now, and those that were not written."""
+    """Records of one kind that one participant may cause now, and those that were not written."""
 
-    records: TokenBucket
-    since: float = 0.0
-    who: Any = None
-    unwritten: Counter[str] = field(default_factory=Counter)
+    def __init__(self, kind: str, factor: float, t: float) -> None:
+        burst, rate = LIMITS.get(kind, COMMANDS)
+        self.records = TokenBucket(factor * rate, factor * burst, t)
+        self.since = t
+        self.who: Any = None
+        self.unwritten: Counter[str] = Counter()
 
-    @staticmethod
-    def of(limit: RecordLimit, t: float, factor: float = 1.0) -> _Account:
-        """Return an account for ``factor`` times the records of ``limit``, full at ``t`` [s]."""
-        return _Account(TokenBucket(factor * limit.rate, factor * limit.burst, t))
+    def add(self, unwritten: Counter[str], who: Any, t: float) -> None:
+        """Count records that are not written since ``t`` [s]."""
+        if not self.unwritten:
+            self.since, self.who = t, who
+        self.unwritten += unwritten
+
+    def summary(self, t: float) -> Record:
+        """Return the record of what was not written up to ``t`` [s], and count from zero."""
+        counts, self.unwritten = self.unwritten, Counter()
+        seconds = round(t - self.since, 1)
+        what = {"count": counts.total(), "seconds": seconds, "of": dict(counts.most_common(8))}
+        return {"kind": "more", "what": what, "t": round(t, 3), "who": self.who}
 
 
 class RecordLimits:
-    """Limits by participant and group of kinds, and for all participants by group."""
+    """Limits by participant and kind, and for all participants by kind."""
 
     def __init__(self) -> None:
         self._accounts: OrderedDict[tuple[str, str], _Account] = OrderedDict()
-        self._totals: dict[str, _Account] = {}
 
     def admits(self, source: str, record: Record, t: float) -> bool:
         """Return whether ``record`` of ``source`` is written at ``t`` [s]; count it otherwise."""
-        group = GROUPS.get(record["kind"], "command")
-        limit = LIMITS[group]
-        total = self._totals.setdefault(group, _Account.of(limit, t, TOTAL))
-        own = self._accounts.pop((source, group), None) or _Account.of(limit, t)
-        self._accounts[source, group] = own
-        self._forget_some()
+        kind = record["kind"]
+        own, total = self._account(source, kind, t), self._account(EVERYBODY, kind, t)
         if own.records.take(t) and total.records.take(t):
             return True
-        if not own.unwritten:
-            own.since, own.who = t, record.get("who")
-        own.unwritten[_label(record)] += 1
+        own.add(Counter([_label(record)]), record.get("who"), t)
         return False
 
     def summaries(self, t: float, *, all_now: bool = False) -> list[Record]:
         """Return the summaries that are due at ``t`` [s], or all of them."""
-        due: list[Record] = []
-        for account in (*self._accounts.values(), *self._totals.values()):
-            if account.unwritten and (all_now or t - account.since >= SUMMARY_INTERVAL):
-                due.append(_summary(account, t))
-                account.unwritten = Counter()
-        return due
+        return [
+            account.summary(t)
+            for account in self._accounts.values()
+            if account.unwritten and (all_now or t - account.since >= SUMMARY_INTERVAL)
+        ]
 
     @property
     def counts(self) -> bool:
         """True if a summary will be due."""
-        accounts = (*self._accounts.values(), *self._totals.values())
-        return any(account.unwritten for account in accounts)
+        return any(account.unwritten for account in self._accounts.values())
 
-    def _forget_some(self) -> None:
-        while len(self._accounts) > MAX_SOURCES:
-            (_, group), old = self._accounts.popitem(last=False)
-            total = self._totals[group]
-            if old.unwritten and not total.unwritten:
-                total.since, total.who = old.since, {"name": "several participants"}
-            total.unwritten += old.unwritten
+    def _account(self, source: str, kind: str, t: float) -> _Account:
+        """Return an account, as the newest one."""
+        factor = EVERYBODY_FACTOR if source == EVERYBODY else 1.0
+        account = self._accounts.pop((source, kind), None) or _Account(kind, factor, t)
+        self._accounts[source, kind] = account
+        if len(self._accounts) > MAX_ACCOUNTS:
+            (_, oldest_kind), oldest = self._accounts.popitem(last=False)
+            if oldest.unwritten:
+                everybody = self._account(EVERYBODY, oldest_kind, t)
+                everybody.add(oldest.unwritten, {"name": "several participants"}, oldest.since)
+        return account
 
 
 def _label(record: Record) -> str:
@@ -122,14 +110,3 @@ def _label(record: Record) -> str:
     if isinstance(what, dict):
         name = what.get("command") or what.get("request") or what.get("lease") or ""
     return f"{record['kind']} {name}".strip()
-
-
-def _summary(account: _Account, t: float) -> Record:
-    what = {
-        "count": account.unwritten.total(),
-        "seconds": round(t - account.since, 1),
-        "of": dict(account.unwritten.most_common(8)),
-    }
-    return {"kind": "more", "what": what, "t": round(t, 3)} | (
-        {} if account.who is None else {"who": account.who}
-    )

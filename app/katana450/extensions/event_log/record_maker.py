@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Act, Command
+from katana450.arm.control.act import Command
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.state import Outcome, Verdict
-from katana450.extensions.event_log.compact import compact, compact_act, text
 from katana450.extensions.event_log.record_limits import RecordLimits
-from katana450.extensions.event_log.records import Record, utc
+from katana450.extensions.event_log.records import Record, content_of, text, utc
 from katana450.server.service.recorder import LeaseChange, Note
 
 STREAM_GAP = 1.0
@@ -34,18 +33,11 @@ MAX_TICKETS = 1024
 
 @dataclass
 class CommandStream:
-    """Commands of one kind from one participant, in quick succession.
-
-    ``ended``: its last record is made, so a later outcome needs one of its own.
-    """
+    """Commands of one kind from one participant, in quick succession."""
 
     first: Note
     last: Note
     count: int = 1
-    limited: int = 0
-    refused: int = 0
-    why: str = ""
-    ended: bool = False
 
     def add(self, note: Note) -> None:
         """Add the next command."""
@@ -64,8 +56,8 @@ class RecordMaker:
 
     def __init__(self) -> None:
         self._streams: dict[StreamKey, CommandStream] = {}
-        self._tickets: OrderedDict[int, CommandStream | Note] = OrderedDict()
-        self._early: OrderedDict[int, Outcome] = OrderedDict()
+        self._commands: OrderedDict[int, Note] = OrderedDict()
+        self._outcomes: list[Note] = []
         self._limits = RecordLimits()
         self._made: list[Record] = []
         self._stopped = False
@@ -78,8 +70,14 @@ class RecordMaker:
         """
         # Anew each time: the clock of the day may have been set.
         self._epoch = time.time() - time.perf_counter()
+        # Their thread can be quicker than the one that gave the command, so they wait for a turn.
+        outcomes, self._outcomes = self._outcomes, []
+        for note in outcomes:
+            self._outcome(note)
         for note in notes:
             self._take(note)
+        for note in self._outcomes if closing else ():
+            self._outcome(note)
         ended = [
             key
             for key, stream in self._streams.items()
@@ -95,14 +93,14 @@ class RecordMaker:
     @property
     def is_idle(self) -> bool:
         """True if no record will become due without another note."""
-        return not self._streams and not self._limits.counts
+        return not (self._streams or self._outcomes or self._limits.counts)
 
     def _take(self, note: Note) -> None:
         match note.what:
             case Command() if note.kind == "command":
                 self._command(note, note.what)
             case Outcome():
-                self._outcome(note.ticket, note.what, note.t)
+                self._outcomes.append(note)
             case LogEntry():
                 self._finding(note.what)
             case LeaseChange():
@@ -111,17 +109,20 @@ class RecordMaker:
                 if note.kind in ("stop", "leave"):
                     self._end_all()
                 self._stopped |= note.kind == "stop"
-                self._add(note, _content(note.what))
+                self._add(note, content_of(note.what))
 
     def _command(self, note: Note, command: Command) -> None:
+        if note.ticket:
+            self._commands[note.ticket] = note
+            if len(self._commands) > MAX_TICKETS:
+                self._commands.popitem(last=False)
         key = _stream_key(note, command)
         if key is None:
             self._end_all()
             if isinstance(command, cmd.ClearStop):
                 note = note._replace(kind="clear", always=self._stopped)
                 self._stopped = False
-            self._add(note, _content(command))
-            self._expect(note, note)
+            self._add(note, content_of(command))
             return
         stream = self._streams.get(key)
         if (
@@ -132,44 +133,19 @@ class RecordMaker:
             stream.add(note)
         else:
             self._end(key)
-            stream = self._streams[key] = CommandStream(note, note)
-            self._add(note, _content(command))
-        self._expect(note, stream)
+            self._streams[key] = CommandStream(note, note)
+            self._add(note, content_of(command))
         if isinstance(command, cmd.Jog) and not command.rates.any():
             self._end(key)
 
-    def _expect(self, note: Note, known: CommandStream | Note) -> None:
-        """Remember the ticket of ``note`` until its outcome is reported."""
-        if not note.ticket:
-            return
-        self._tickets[note.ticket] = known
-        if len(self._tickets) > MAX_TICKETS:
-            self._tickets.popitem(last=False)
-        early = self._early.pop(note.ticket, None)
-        if early is not None:
-            self._outcome(note.ticket, early, note.t)
-
-    def _outcome(self, ticket: int, outcome: Outcome, t: float) -> None:
-        """Record that a command was limited or refused, or count it for its stream."""
-        known = self._tickets.pop(ticket, None)
-        if known is None:
-            # Another thread was quicker than the one that gave the command.
-            self._early[ticket] = outcome
-            if len(self._early) > MAX_TICKETS:
-                self._early.popitem(last=False)
-            return
-        limited = outcome.verdict is Verdict.LIMITED
-        why = "; ".join(map(finding_text, outcome.findings)) if limited else reason(outcome)
-        if isinstance(known, CommandStream):
-            known.limited += limited
-            known.refused += not limited
-            known.why = why
-            if known.count > 1 and not known.ended:
-                return
-            known = known.last
-        name = type(known.what).__name__
-        note = Note(t, "outcome", known.actor, None, outcome.verdict.value, why)
-        self._add(note, {"command": name, "ticket": ticket})
+    def _outcome(self, note: Note) -> None:
+        """Record that a command was limited or refused."""
+        given, outcome = self._commands.pop(note.ticket, None), note.what
+        if given is not None:
+            limited = outcome.verdict is Verdict.LIMITED
+            why = "; ".join(map(finding_text, outcome.findings)) if limited else reason(outcome)
+            named = note._replace(actor=given.actor, outcome=outcome.verdict.value, why=why)
+            self._add(named, {"command": type(given.what).__name__})
 
     def _finding(self, entry: LogEntry) -> None:
         found = entry.finding
@@ -177,7 +153,7 @@ class RecordMaker:
             "finding": text(finding_text(found)),
             "reason": found.reason.value,
             "began": entry.began,
-            "amount": compact(found.amount),
+            "amount": content_of(found.amount),
             "command": entry.command,
         }
         self._add(Note(entry.t, "finding", entry.actor), what)
@@ -215,8 +191,7 @@ class RecordMaker:
         stream = self._streams.pop(key, None)
         if stream is None or stream.count == 1:
             return
-        stream.ended = True
-        first, last = _content(stream.first.what), _content(stream.last.what)
+        first, last = content_of(stream.first.what), content_of(stream.last.what)
         what = {
             "command": first.pop("command"),
             "count": stream.count,
@@ -224,9 +199,7 @@ class RecordMaker:
             "first": first,
             "last": {name: value for name, value in last.items() if name != "command"},
         }
-        counts = {"limited": stream.limited, "refused": stream.refused}
-        what |= {name: count for name, count in counts.items() if count}
-        self._add(stream.last._replace(kind="stream", outcome="", why=stream.why), what)
+        self._add(stream.last._replace(kind="stream", outcome=""), what)
 
     def _add(self, note: Note, what: Any, grounds: str = "") -> None:
         """Add the record of ``note``, unless its participant causes too many."""
@@ -261,10 +234,6 @@ def _stream_key(note: Note, command: Command) -> StreamKey | None:
         (type(part), *(getattr(part, at, None) for at in SUBJECT)) for part in command.parts
     )
     return actor.key, actor.channel.value, str(actor.grounds), subject
-
-
-def _content(what: Any) -> Any:
-    return compact_act(what) if isinstance(what, Act) else compact(what)
 
 
 def _who(actor: Actor | None) -> dict[str, str]:
