@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import logging
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -75,7 +76,7 @@ class TickSender(Protocol):
 
 @dataclass(frozen=True)
 class ServerFacts:
-    """Description of a server for a further process of it.
+    """Description of a server for each process of it, used each time the process is started.
 
     Attributes:
         settings: Settings of the server.
@@ -83,6 +84,8 @@ class ServerFacts:
         tool: Link to which targets refer; None for that of the file.
         port: Port of the page.
         address: Address of the arm's process.
+        options: Options of the extensions; None if no extension takes part.
+        folder: Private folder for the meshes of scene objects.
     """
 
     settings: Settings
@@ -90,6 +93,8 @@ class ServerFacts:
     tool: str | None
     port: int
     address: ArmAddress
+    options: Namespace | None = None
+    folder: Path = Path()
 
 
 @dataclass(frozen=True)

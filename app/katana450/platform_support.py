@@ -100,15 +100,6 @@ def raise_open_file_limit(wanted: int) -> int | None:
         return soft
 
 
-def memory_limit() -> int | None:
-    """Return the address space [bytes] that this process may use; None without a limit."""
-    if sys.platform == "win32":
-        return None
-    else:  # noqa: RET505 - so that mypy follows either system
-        soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-        return None if soft == resource.RLIM_INFINITY else soft
-
-
 def limit_resources(memory: int, seconds: int) -> None:
     """Limit the memory [bytes] and the processor time [s] of this process.
 

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from katana450.arm.control.lease import Role
-from katana450.assembly import page_files
+from katana450.assembly import page_routes
 from katana450.client import connect
 from katana450.resources import STATIC
 from katana450.server.api import requests
@@ -192,9 +192,9 @@ def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
 
 
 def test_the_page_is_small() -> None:
-    sent = {name: len(file.packed) for name, file in page_files.load().items()}
+    sent = {name: len(file.packed) for name, file in page_routes.page_files().items()}
     # The scripts of each document are sent in one file. Those in folders are loaded on first use.
-    first = ("index.html", "page.css", page_files.PAGE_SCRIPTS, SCRIPTS, "link.js", "icon.svg")
+    first = ("index.html", "page.css", page_routes.PAGE_SCRIPTS, SCRIPTS, "link.js", "icon.svg")
     assert sum(sent[name] for name in first) < 42_000
     # Each of them is also there alone, for people.
     sent = {name: size for name, size in sent.items() if "/" in name or name in first}
@@ -212,13 +212,13 @@ def test_the_page_is_small() -> None:
 
 
 def test_scripts_of_each_document_are_sent_in_one_file_in_their_order() -> None:
-    written, sent = static_files.contents(), page_files.load()
+    written, sent = static_files.contents(), page_routes.page_files()
     names = re.findall(r'<script src="static/([^"]+)" defer>', written["index.html"].decode())
     assert names[0] == "viser.js"
     assert names[-1] == "page.js"
     page = sent["index.html"].content.decode()
-    assert re.findall(r'<script src="([^"]+)"', page) == [f"static/{page_files.PAGE_SCRIPTS}"]
-    assert sent[page_files.PAGE_SCRIPTS].content == b"\n".join(written[each] for each in names)
+    assert re.findall(r'<script src="([^"]+)"', page) == [f"static/{page_routes.PAGE_SCRIPTS}"]
+    assert sent[page_routes.PAGE_SCRIPTS].content == b"\n".join(written[each] for each in names)
     assert sent[SCRIPTS].content.endswith(written["frame.js"])
     inline = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
     assert [each.encode() for each in inline] == [written["theme.js"]]

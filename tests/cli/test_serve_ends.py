@@ -57,14 +57,14 @@ def test_interrupt_during_the_start_leaves_no_traceback(delay: float) -> None:
     assert "Traceback" not in output
 
 
-def failing(_config: object, _supervisor: SupervisorPipe) -> None:
+def failing(_supervisor: SupervisorPipe) -> None:
     # As any arm does, it loads a library that lists at exit what an error still holds.
     robot = find_robot(Settings(), URDF_PATH, None)
     raise OSError(f"It fails with {robot.session}.")
 
 
 def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
-    supervisor = Supervisor([child_spec("it", "It", failing, None, 5.0)], threading.Event())
+    supervisor = Supervisor([child_spec("it", "It", failing, 5.0)], threading.Event())
     supervisor.start()
     supervisor._children["it"].process.join(60.0)
     supervisor.stop()

@@ -25,7 +25,7 @@ from katana450.server.web.acceptor import Acceptor, _Connection
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, SOCKETS, SOCKETS_EACH
 from katana450.server.web.channel import CLOSE_FRAME_TIMEOUT, GoneError
-from katana450.server.web.connection_limit import ConnectionLimit
+from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 from katana450.server.web.program_socket import ProgramChannel
 from tests.gateway.client import HOUR, Control

@@ -26,7 +26,7 @@ from katana450.server.viser_bridge.flow import (
     OVERDUE,
     FlowControl,
 )
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 
 class Clocks:

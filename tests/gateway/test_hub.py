@@ -26,13 +26,13 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
-from katana450.server.service.derived import once
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of, key_of
 from katana450.server.service.runner import Runner
+from katana450.server.service.serialize import once
 from katana450.settings import Settings
 
 PAGES = ("first-page-of-all", "second-page-of-all")

@@ -27,8 +27,7 @@ from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
-from katana450.server.service.known_pages import MAX_PAGES
-from katana450.server.service.names import MAX_NAME, renamed
+from katana450.server.service.known_pages import MAX_NAME, MAX_PAGES, renamed
 from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.access_links import AccessFile

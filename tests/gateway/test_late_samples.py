@@ -21,7 +21,7 @@ from katana450.errors import LeaseError
 from katana450.server.api import requests
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.least_delay import WINDOW, LeastDelay
+from katana450.server.service.heartbeats import WINDOW, LeastDelay
 from katana450.server.service.participants import Participant
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.message_filter import MessageFilter, Ruling

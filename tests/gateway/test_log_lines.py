@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import pytest
 
-from katana450.assembly.log_lines import LineFormatter, RepetitionFilter, printable
+from katana450.assembly.log_output import LineFormatter, RepetitionFilter, printable
 from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import AppServer

@@ -18,7 +18,7 @@ import pytest
 from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse
 
-from katana450.assembly.routes import control_routes
+from katana450.assembly.gateway import control_routes
 from katana450.assembly.web_server import WebServer
 from katana450.server.service.budget import Budgets
 from katana450.server.service.hub import Hub

@@ -34,10 +34,9 @@ from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.assembly.gateway import REFUSALS
+from katana450.assembly.gateway import REFUSALS, control_routes
 from katana450.assembly.page_routes import page_routes
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.assembly.routes import control_routes
 from katana450.cli.serve_options import add_serve_options
 from katana450.client import Client
 from katana450.client.asynchronous import AsyncClient

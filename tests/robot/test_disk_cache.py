@@ -19,7 +19,7 @@ from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.creases import Drawn
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.surfaces import shapes_of
-from katana450.assembly import page_files
+from katana450.assembly import page_routes
 from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
 from katana450.extensions.conduit.rings import Floats, poses
@@ -278,7 +278,7 @@ def test_every_kind_of_value_is_found_again(folder: Path) -> None:
         partial(visual.kept, lambda: _merged(visual), Drawn),
         partial(kept, lambda: poses(stretch, 9), Floats),
         partial(_glossy, np.eye(3), np.zeros((1, 3), np.uint32), (1.0, 2.0, 3.0, 0.5)),
-        page_files.load,
+        page_routes.page_files,
         viser_page.load,
     ):
         read()

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -116,8 +117,8 @@ def until(true: Callable[[], bool], seconds: float = 20.0) -> None:
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal.Signals) -> None:
     running = Running(
-        child_spec("worker", "The worker", worker, tmp_path, 1.0, keeps=True),
-        child_spec("idler", "The idler", idler, tmp_path, 1.0),
+        child_spec("worker", "The worker", partial(worker, tmp_path), 1.0, keeps=True),
+        child_spec("idler", "The idler", partial(idler, tmp_path), 1.0),
     )
     try:
         until((tmp_path / "pid0").exists)
@@ -135,7 +136,7 @@ def test_lost_process_starts_again_with_its_state(tmp_path: Path, number: signal
 
 
 def test_process_without_heartbeats_is_ended(tmp_path: Path) -> None:
-    running = Running(child_spec("stubborn", "It", stubborn, tmp_path, 0.5))
+    running = Running(child_spec("stubborn", "It", partial(stubborn, tmp_path), 0.5))
     try:
         until(lambda: len((tmp_path / "started").read_text()) >= 2)
     finally:
@@ -147,8 +148,8 @@ def test_process_that_another_one_no_longer_hears_starts_again(
 ) -> None:
     monkeypatch.setattr(supervisor_module, "MAX_UNHEARD_TIME", 0.1)
     running = Running(
-        child_spec("worker", "The worker", worker, tmp_path, 5.0, keeps=True),
-        child_spec("deaf", "The deaf one", deaf, tmp_path, 5.0),
+        child_spec("worker", "The worker", partial(worker, tmp_path), 5.0, keeps=True),
+        child_spec("deaf", "The deaf one", partial(deaf, tmp_path), 5.0),
     )
     try:
         until((tmp_path / "pid1").exists)
@@ -159,7 +160,7 @@ def test_process_that_another_one_no_longer_hears_starts_again(
 def test_error_in_any_thread_ends_the_process(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    running = Running(child_spec("careless", "It", careless, tmp_path, 5.0))
+    running = Running(child_spec("careless", "It", partial(careless, tmp_path), 5.0))
     (tmp_path / "started").touch()
     (tmp_path / "running").touch()
     try:
@@ -175,7 +176,9 @@ def test_error_in_any_thread_ends_the_process(
 def test_error_of_the_first_start_ends_the_server(
     tmp_path: Path, work: Callable[[Path, SupervisorPipe], None], message: str
 ) -> None:
-    supervisor = Supervisor([child_spec("it", "It", work, tmp_path, 1.0)], threading.Event())
+    supervisor = Supervisor(
+        [child_spec("it", "It", partial(work, tmp_path), 1.0)], threading.Event()
+    )
     supervisor.start()
     with pytest.raises(ConfigurationError, match=message):
         supervisor.wait_for("it", READY)
@@ -183,7 +186,7 @@ def test_error_of_the_first_start_ends_the_server(
 
 
 def test_hang_at_the_first_start_ends_the_server_with_its_reason(tmp_path: Path) -> None:
-    spec = child_spec("stubborn", "It", stubborn, tmp_path, 0.5)
+    spec = child_spec("stubborn", "It", partial(stubborn, tmp_path), 0.5)
     supervisor = Supervisor([spec], threading.Event())
     supervisor.start()
     with pytest.raises(ConfigurationError, match="did not start: it has not answered for"):
@@ -197,9 +200,9 @@ def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path)
         raise OSError("no more processes")
 
     specs = [
-        child_spec("idler", "The idler", idler, tmp_path, 1.0),
+        child_spec("idler", "The idler", partial(idler, tmp_path), 1.0),
         ChildSpec("it", "It", work, 1.0),
-        child_spec("later", "The later one", idler, tmp_path, 1.0),
+        child_spec("later", "The later one", partial(idler, tmp_path), 1.0),
     ]
     supervisor = Supervisor(specs, threading.Event())
     with pytest.raises(OSError, match="no more"):
@@ -210,7 +213,7 @@ def test_supervisor_ends_although_a_process_could_not_be_started(tmp_path: Path)
 def test_excused_time_ends_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr(supervisor_module, "time", SimpleNamespace(monotonic=lambda: now))
-    child = Child(child_spec("it", "It", idler, tmp_path, 1.0))
+    child = Child(child_spec("it", "It", partial(idler, tmp_path), 1.0))
     # More than the time since the last message, as when one has just been read.
     child.excuse(2 * now)
     assert child.hangs is None

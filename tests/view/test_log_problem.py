@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import viser
 
-from katana450.server.view.scene_tab import LogProblem
+from katana450.server.view.display_options import LogProblem
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 

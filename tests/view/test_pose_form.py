@@ -11,8 +11,8 @@ import viser
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.server.view.controls import listener
-from katana450.server.view.pose_display import BASE, SHOULDER
 from katana450.server.view.pose_form import PoseForm
+from katana450.server.view.readout import BASE, SHOULDER
 from katana450.server.viser_bridge.guard import Guard
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals

@@ -13,8 +13,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.view.controls import ends
-from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
-from katana450.server.view.readout import details, page
+from katana450.server.view.readout import BASE, SHOULDER, UNITS, PoseDisplay, details, page
 
 
 def test_limit_distance_of_every_axis_is_shown_and_the_nearest_marked(

@@ -9,16 +9,14 @@ import shutil
 import sys
 import threading
 from argparse import Namespace
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmAddress, ArmListener, Roles
-from katana450.assembly.output import say
+from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
+from katana450.assembly.log_output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
-from katana450.extension import provided
-from katana450.settings import Settings
+from katana450.extension import ServerFacts, provided
 
 if TYPE_CHECKING:
     from katana450.arm.control.state import State
@@ -44,27 +42,9 @@ IDLE_INTERVAL = 5.0
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class ArmConfig:
-    """Configuration of the arm's process, used each time it is started.
-
-    Attributes:
-        settings: of the server.
-        urdf, tool: see ``robot.loader.load``.
-        options: options of the extensions; None if no extension takes part.
-        address: address at which the process listens.
-        folder: private folder for the meshes of scene objects.
-    """
-
-    settings: Settings
-    urdf: Path
-    tool: str | None
-    options: Namespace | None
-    address: ArmAddress
-    folder: Path
-
-
-def run_arm(config: ArmConfig, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe) -> None:
+def run_arm(
+    config: ServerFacts, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe
+) -> None:
     """Run the arm in this process, from start to end. Raises KatanaError.
 
     kept: what an earlier process gave to the supervisor; None at the first start.
@@ -121,7 +101,7 @@ def _driver(
     return next(filter(None, drivers), None)
 
 
-def _with_scene(config: ArmConfig) -> tuple[DescribedRobot | None, InitialScene | None]:
+def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScene | None]:
     """Return the robot if it was read for the scene that an extension starts with, and that."""
     from katana450.arm.control.session import Session
     from katana450.arm.robot.object_meshes import Meshes

@@ -14,17 +14,15 @@ from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect
 from katana450.arm.runtime.detour_planner import DetourPlanner
 from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
-from katana450.extension import provided
+from katana450.extension import ServerFacts, provided
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.command_gate import guarded
 from katana450.server.service.nodes import Nodes
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.panel_folder import FolderContext, PanelFolder
-from katana450.server.view.panel_tabs import PanelTabs
+from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
 from katana450.server.view.view import View, ViewOptions
 from katana450.server.view.view_updater import ViewUpdater
 
@@ -37,14 +35,12 @@ class Frontend:
         view: the view.
     """
 
-    def __init__(
-        self, gateway: Gateway, config: FrontendConfig, meshes: Meshes, ended: Event
-    ) -> None:
+    def __init__(self, gateway: Gateway, config: ServerFacts, meshes: Meshes, ended: Event) -> None:
         """Connect to the arm, and build the scene.
 
         Args:
             gateway: the server of the page.
-            config: settings and options of the front end.
+            config: settings and options of the server.
             meshes: the meshes of scene objects.
             ended: set when the server ends.
 

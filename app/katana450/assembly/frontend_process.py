@@ -6,14 +6,14 @@ It can end and be started again. The arm runs in another process, which stops th
 from __future__ import annotations
 
 import gc
+import socket
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from katana450.assembly.arm_process import ARM
-from katana450.assembly.frontend_config import FrontendConfig
 from katana450.assembly.supervised import READY, SupervisorPipe
-from katana450.extension import provided
+from katana450.extension import ServerFacts, provided
 from katana450.platform_support import reset_priority
 
 if TYPE_CHECKING:
@@ -33,7 +33,16 @@ HANG_SECONDS = 5.0
 """[s] Time after which an event loop that does not turn counts as hung."""
 
 
-def run_frontend(config: FrontendConfig, records: Connection, supervisor: SupervisorPipe) -> None:
+class Sockets(NamedTuple):
+    """The sockets for browsers, and for programs that send JSON lines, if any."""
+
+    pages: socket.socket
+    lines: socket.socket | None
+
+
+def run_frontend(
+    config: ServerFacts, sockets: Sockets, records: Connection, supervisor: SupervisorPipe
+) -> None:
     """Run the front end in this process, from start to end. Raises KatanaError.
 
     records: pipe to the event log.
@@ -42,23 +51,27 @@ def run_frontend(config: FrontendConfig, records: Connection, supervisor: Superv
 
     from katana450.assembly.web_server import WebServer
 
-    web = WebServer(config.settings, config.listening)
+    web = WebServer(config.settings, sockets.pages)
     web.start()
     supervisor.report(OPEN)
     try:
-        _run(config, web, records, supervisor)
+        _run(config, web, sockets.lines, records, supervisor)
     except EOFError:
         # The server ends before this process is ready.
         return
     finally:
         web.stop()
-        config.listening.close()
+        sockets.pages.close()
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()
 
 
 def _run(
-    config: FrontendConfig, web: WebServer, records: Connection, supervisor: SupervisorPipe
+    config: ServerFacts,
+    web: WebServer,
+    lines: socket.socket | None,
+    records: Connection,
+    supervisor: SupervisorPipe,
 ) -> None:
     # These imports take a third of a second. The page loads meanwhile.
     from katana450.arm.robot.object_meshes import Meshes
@@ -66,7 +79,7 @@ def _run(
     from katana450.server.viser_bridge.viser_server import close_server
 
     meshes = Meshes(config.folder)
-    gateway = Gateway(config.settings, web, config.lines, meshes)
+    gateway = Gateway(config.settings, web, lines, meshes)
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     supervisor.notify = gateway.announce
     senders: list[Callable[[], None] | None] = []

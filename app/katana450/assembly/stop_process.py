@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import socket
 import time
-from dataclasses import dataclass
 from functools import partial
 
-from katana450.arm.runtime.arm_listener import STOP, ArmAddress, Greeting, connect_when_ready
+from katana450.arm.runtime.arm_listener import STOP, Greeting, connect_when_ready
 from katana450.assembly.supervised import READY, SupervisorPipe
+from katana450.extension import ServerFacts
 from katana450.platform_support import raise_priority
-from katana450.settings import Settings
 
 TURN_INTERVAL = 0.2
 """[s] Interval at which the event loop proves that it runs, and checks whether it must end."""
@@ -23,33 +22,16 @@ HANG_TIMEOUT = 1.0
 """[s] Time without a turn of the event loop after which no heartbeat is sent."""
 
 
-@dataclass(frozen=True)
-class StopConfig:
-    """Configuration of the process of STOP.
-
-    Attributes:
-        settings: settings of the server.
-        listening: the socket for STOP.
-        main_port: the port of the page.
-        address: address of the arm's process.
-    """
-
-    settings: Settings
-    listening: socket.socket
-    main_port: int
-    address: ArmAddress
-
-
-def run_stop(config: StopConfig, supervisor: SupervisorPipe) -> None:
-    """Run the server of STOP in this process, from start to end. Raises KatanaError."""
+def run_stop(config: ServerFacts, listening: socket.socket, supervisor: SupervisorPipe) -> None:
+    """Run the server of STOP on the socket ``listening``, from start to end. Raises KatanaError."""
     raise_priority()
     # Imported here, because the supervisor imports this module before it starts the processes.
     import asyncio
 
-    asyncio.run(_serve(config, supervisor))
+    asyncio.run(_serve(config, listening, supervisor))
 
 
-async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
+async def _serve(config: ServerFacts, listening: socket.socket, supervisor: SupervisorPipe) -> None:
     import asyncio
 
     from katana450.arm.runtime.stop_pipe import StopPipe
@@ -60,7 +42,7 @@ async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
     from katana450.server.web.stop_connection import StopConnection
     from katana450.server.web.stop_server import StopServer
 
-    settings, listening = config.settings, config.listening
+    settings = config.settings
     address = address_of(settings, listening)
     access = access_file(settings, listening)
     tls = tls_context(settings)
@@ -69,8 +51,8 @@ async def _serve(config: StopConfig, supervisor: SupervisorPipe) -> None:
         lambda: connect_when_ready(config.address, Greeting(STOP), supervisor.ended)
     )
     acceptor = Acceptor(listening)
-    authenticator = Authenticator(access, config.main_port, address)
-    server = StopServer(stop_pipe, authenticator, address, config.main_port, acceptor)
+    authenticator = Authenticator(access, config.port, address)
+    server = StopServer(stop_pipe, authenticator, address, config.port, acceptor)
     acceptor.start(partial(StopConnection, server), tls)
     turned = time.monotonic()
     supervisor.prove(lambda: stop_pipe.running and time.monotonic() - turned < HANG_TIMEOUT)

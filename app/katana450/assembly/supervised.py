@@ -16,8 +16,9 @@ from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
 
+from katana450.arm.runtime.arm_listener import RECORD, ArmAddress, Greeting, connect_when_ready
 from katana450.arm.runtime.readiness import writable
-from katana450.assembly.log_lines import start_log
+from katana450.assembly.log_output import start_log
 from katana450.errors import KatanaError
 from katana450.platform_support import name_process, stop_signals, unblock_stop_signals
 
@@ -214,3 +215,11 @@ def _end_after(supervisor: SupervisorPipe, failure: threading.ExceptHookArgs) ->
     log.critical("The thread%s met an error.", name, exc_info=failure.exc_value)
     if not supervisor.ended.is_set():
         os._exit(1)
+
+
+def connected_to_ticks(address: ArmAddress, ended: threading.Event) -> Connection:
+    """Return a new pipe as soon as the arm's process listens at ``address``.
+
+    Raises EOFError when ``ended`` is set first.
+    """
+    return connect_when_ready(address, Greeting(RECORD), ended)

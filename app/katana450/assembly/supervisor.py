@@ -391,20 +391,12 @@ class Supervisor:
 
 
 def child_spec(
-    name: str,
-    title: str,
-    function: Callable[..., None],
-    config: Any,
-    deadline: float,
-    *,
-    keeps: bool = False,
+    name: str, title: str, function: Callable[..., None], deadline: float, *, keeps: bool = False
 ) -> ChildSpec:
-    """Return the specification of a process that runs ``function(config, supervisor)``.
+    """Return the specification of a process that runs ``function(supervisor)``.
 
-    keeps: whether the function takes the kept state too: ``function(config, kept, supervisor)``.
+    keeps: whether the function takes the kept state too: ``function(kept, supervisor)``.
     """
-
-    def work(kept: Kept | None) -> Work:
-        return partial(function, config, kept) if keeps else partial(function, config)
-
-    return ChildSpec(name, title, work, deadline)
+    return ChildSpec(
+        name, title, lambda kept: partial(function, kept) if keeps else function, deadline
+    )

@@ -19,7 +19,6 @@ from starlette.applications import Starlette
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from katana450.assembly.authentication import access_file, address_of, tls_context
-from katana450.assembly.memory_limit import check_memory_limit
 from katana450.assembly.page_routes import page_routes
 from katana450.errors import ConfigurationError
 from katana450.server.service.heartbeats import keep_alive
@@ -67,7 +66,6 @@ class WebServer:
         """
         tls_context(settings)
         raise_descriptor_limit()
-        check_memory_limit()
         access = access_file(settings, listening)
         self.address = address_of(settings, listening)
         # Behind a proxy, the paths of STOP on the page's own address lead there.

@@ -7,7 +7,7 @@ import errno
 import sys
 from collections.abc import Sequence
 
-from katana450.assembly.output import drop_output
+from katana450.assembly.log_output import drop_output
 from katana450.cli.version import version
 from katana450.errors import KatanaError
 from katana450.extension import CliCommand, extensions, load, provided

@@ -8,7 +8,7 @@ import webbrowser
 from pathlib import Path
 from threading import Thread
 
-from katana450.assembly.output import say
+from katana450.assembly.log_output import say
 
 SCREENS = {"DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"}
 """Variables of which a Linux that can show a browser has one."""

@@ -18,12 +18,10 @@ from types import FrameType
 from typing import Any
 
 from katana450.arm.runtime.arm_listener import ArmAddress
-from katana450.assembly.arm_process import ARM, ArmConfig, run_arm
-from katana450.assembly.frontend_config import FrontendConfig
-from katana450.assembly.frontend_process import OPEN, run_frontend
-from katana450.assembly.log_lines import start_log
-from katana450.assembly.output import say
-from katana450.assembly.stop_process import StopConfig, run_stop
+from katana450.assembly.arm_process import ARM, run_arm
+from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
+from katana450.assembly.log_output import say, start_log
+from katana450.assembly.stop_process import run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
@@ -115,21 +113,26 @@ def serve(
     event_log = _server_log(options, listening.getsockname()[1])
     folder, claimed = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
-    front = FrontendConfig(settings, urdf, tool, listening, lines, options, address, folder)
-    arm = ArmConfig(settings, urdf, tool, options, address, folder)
-    stop = StopConfig(settings, stopping_socket, listening.getsockname()[1], address)
-    front_end_work = _FrontendWork(front, event_log)
-    facts = ServerFacts(settings, urdf, tool, listening.getsockname()[1], address)
+    port = listening.getsockname()[1]
+    facts = ServerFacts(settings, urdf, tool, port, address, options, folder)
+    front_end_work = _FrontendWork(facts, Sockets(listening, lines), event_log)
+    stop = partial(run_stop, facts, stopping_socket)
     extra = _extra_processes(options, facts)
     specs = (
-        child_spec(STOP, "The process of STOP", run_stop, stop, STOP_DEADLINE),
+        child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
         ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
-        child_spec(ARM, "The arm's process", run_arm, arm, ARM_DEADLINE, keeps=True),
+        child_spec(ARM, "The arm's process", partial(run_arm, facts), ARM_DEADLINE, keeps=True),
         *(
             replace(
-                child_spec(each.name, each.title, each.run, each.config, EXTRA_DEADLINE), late=True
+                child_spec(
+                    process.name,
+                    process.title,
+                    partial(process.run, process.config),
+                    EXTRA_DEADLINE,
+                ),
+                late=True,
             )
-            for each in extra
+            for process in extra
         ),
     )
     supervisor = Supervisor(specs, stopping, event_log.restart)
@@ -166,8 +169,8 @@ def serve(
 class _FrontendWork:
     """Returns the function of each front end that is started, with a new pipe to the event log."""
 
-    def __init__(self, config: FrontendConfig, event_log: ServerLog) -> None:
-        self._config = config
+    def __init__(self, facts: ServerFacts, sockets: Sockets, event_log: ServerLog) -> None:
+        self._facts, self._sockets = facts, sockets
         self._event_log = event_log
         self._sender: Connection | None = None
 
@@ -177,7 +180,7 @@ class _FrontendWork:
         ends: Any = multiprocessing.get_context("spawn").Pipe()
         receiver, self._sender = ends
         self._event_log.attach(receiver)
-        return partial(run_frontend, self._config, self._sender)
+        return partial(run_frontend, self._facts, self._sockets, self._sender)
 
     def close(self) -> None:
         """End the pipe of the newest front end, so that its reader ends too."""

@@ -6,7 +6,7 @@ import json
 import sys
 from argparse import Namespace
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.errors import InputError
 from katana450.extensions.event_log.disk_log import default_folder
 from katana450.extensions.event_log.log_files import lines_of

@@ -9,7 +9,7 @@ from collections import Counter, OrderedDict
 from typing import Any
 
 from katana450.extensions.event_log.records import Record
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 SUMMARY_INTERVAL = 10.0
 """[s] Time between two summaries of what was not written."""

@@ -41,8 +41,7 @@ from katana450.server.web.bodies import (
     as_json,
     body_of,
 )
-from katana450.server.web.connection_limit import ConnectionLimit
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import ConnectionLimit, TokenBucket
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:

@@ -8,7 +8,7 @@ import time
 from argparse import Namespace
 from contextlib import suppress
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.client.asynchronous import AsyncClient, aconnect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import InputError, KatanaError

@@ -21,8 +21,7 @@ from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen
 from katana450.server.view.controls import GestureGate, refuse, set_value
-from katana450.server.view.panel_folder import FolderContext
-from katana450.server.view.panel_tabs import SCENE
+from katana450.server.view.panel_folder import SCENE, FolderContext
 from katana450.server.view.scene_objects import COLOUR
 
 NOTHING = "nothing yet"

@@ -14,7 +14,7 @@ from katana450.extensions.phone.address import phone_address
 from katana450.server.api.fields import ROOT
 from katana450.server.web.bodies import TOO_MANY
 from katana450.server.web.http_api import RouteContext
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
 """QR codes that are drawn per second, and in a burst, for all pages together."""

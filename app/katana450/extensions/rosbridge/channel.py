@@ -31,8 +31,8 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.channel import Channel, GoneError, JsonChannel, WebSocketJsonChannel
+from katana450.server.web.limits import TokenBucket
 from katana450.server.web.program_socket import BURST, FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, RATE
-from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 TICK = 0.02

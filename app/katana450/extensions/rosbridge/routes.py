@@ -32,8 +32,8 @@ from katana450.extensions.rosbridge.servoing import Units
 from katana450.server.service.participants import actor_of
 from katana450.server.web.admission import LIMIT_CLOSE_CODE, address_of, client_of, reserved
 from katana450.server.web.channel import BAD_REQUEST_CLOSE_CODE
-from katana450.server.web.connection_limit import ConnectionLimit
 from katana450.server.web.http_api import RouteContext
+from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.program_socket import serve_socket
 
 MESHES = "/rosbridge/meshes"

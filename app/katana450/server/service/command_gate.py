@@ -21,10 +21,9 @@ from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.last_pause import LastPause
-from katana450.server.service.least_delay import check_in_time
+from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import ClearBy, ClearRights, StopRecord
+from katana450.server.service.stop_state import ClearBy, ClearRights, LastPause, StopRecord
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)

@@ -19,10 +19,10 @@ from katana450.server.api import answers, requests
 from katana450.server.service import serialize
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budget, BusyError
-from katana450.server.service.derived import once
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer, give_back
+from katana450.server.service.serialize import once
 
 ACCEPTED, REQUESTED = Verdict.ACCEPTED.value, "requested"
 """Outcomes in answers that do not come from the arm's process."""

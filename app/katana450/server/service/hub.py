@@ -25,17 +25,16 @@ from katana450.server.service.driver_watch import DriverWatch
 from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
-from katana450.server.service.known_pages import KnownPages
-from katana450.server.service.names import renamed
+from katana450.server.service.known_pages import KnownPages, renamed
 from katana450.server.service.participants import (
     Participant,
+    ShownPictures,
     Takeover,
     key_of,
     presser_of,
     session_of,
 )
 from katana450.server.service.people import People
-from katana450.server.service.pictures import ShownPictures
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath

@@ -1,9 +1,10 @@
-"""Conversion of states, findings, objects and other values into API answers."""
+"""Conversion of states, findings, objects and other values into API answers, once a snapshot."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
+from weakref import WeakKeyDictionary
 
 import msgspec
 
@@ -28,9 +29,13 @@ from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.derived import once
 from katana450.server.service.event_log import UNITS, LogLine
 from katana450.server.service.hub import Hub
+
+T = TypeVar("T")
+
+_FOUND: WeakKeyDictionary[Snapshot, dict[str, Any]] = WeakKeyDictionary()
+"""Values by snapshot and name, dropped with the snapshot. For the gateway's thread alone."""
 
 
 def finding(found: control.Finding) -> answers.Finding:
@@ -348,3 +353,15 @@ def hexadecimal(colour: Colour) -> str:
 def loop(loop_timing: LoopTiming) -> answers.Loop:
     """Return the timing of the control loop as an answer."""
     return msgspec.convert(loop_timing, answers.Loop, from_attributes=True)
+
+
+def once(snapshot: Snapshot, name: str, work: Callable[[], T]) -> T:
+    """Return the result of ``work``, computed at the first request of ``name`` for ``snapshot``.
+
+    An error is raised and not kept.
+    """
+    found = _FOUND.setdefault(snapshot, {})
+    if name not in found:
+        found[name] = work()
+    value: T = found[name]
+    return value

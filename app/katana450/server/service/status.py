@@ -15,7 +15,7 @@ from katana450.arm.control.state import State, Status
 from katana450.arm.control.supervision import tracking_error
 from katana450.arm.runtime.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
-from katana450.server.service.names import addressed
+from katana450.server.service.known_pages import addressed
 from katana450.server.service.participants import Participant
 from katana450.server.service.runner import StatusLine
 

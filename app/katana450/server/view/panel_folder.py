@@ -1,4 +1,4 @@
-"""Controls that an extension adds to a tab of the panel."""
+"""The tabs of the panel, and the controls that an extension adds to one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,29 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.service.hub import Hub
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.panel_tabs import PanelTabs
+from katana450.server.view.display_options import add_themes
+
+DRIVE, SCENE = "Drive", "Scene"
+"""Labels of the tabs of the core. The tabs of built-in extensions are between them."""
+
+
+class PanelTabs:
+    """The tabs of a panel. A tab exists as soon as something is put into it."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Add the empty group of tabs to ``gui``."""
+        self._gui = gui
+        self._group = gui.add_tab_group()
+        self._tabs: dict[str, viser.GuiTabHandle] = {}
+
+    def tab(self, label: str) -> viser.GuiTabHandle:
+        """Return the tab ``label``, a context in which controls are added to it."""
+        if label not in self._tabs:
+            self._tabs[label] = self._group.add_tab(label)
+            if label == SCENE:
+                with self._tabs[label]:
+                    add_themes(self._gui)
+        return self._tabs[label]
 
 
 class PanelFolder(Protocol):

@@ -15,7 +15,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.server.view.controls import Listen, set_value
-from katana450.server.view.pose_display import BASE, SHOULDER, UNITS, PoseDisplay
+from katana450.server.view.readout import BASE, SHOULDER, UNITS, PoseDisplay
 
 MAX_TYPED_POSITION = 1.0
 """Maximum [m] of a typed coordinate, beyond any tool point of the arm.

@@ -22,16 +22,14 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.display_options import DisplayOptions
+from katana450.server.view.display_options import DisplayOptions, add_scene_tab
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes
 from katana450.server.view.panel import Panel
-from katana450.server.view.panel_folder import AddFolders
-from katana450.server.view.panel_tabs import DRIVE, SCENE, PanelTabs
+from katana450.server.view.panel_folder import DRIVE, SCENE, AddFolders, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
-from katana450.server.view.scene_tab import add_scene_tab
 from katana450.server.view.scenery import Scenery
 from katana450.server.view.tint import Tint
 from katana450.server.view.view_updater import ViewUpdater

@@ -17,8 +17,8 @@ from viser import _messages as wire
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.errors import LeaseError
+from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.hub import Hub
-from katana450.server.service.least_delay import check_in_time
 from katana450.server.viser_bridge.frames import FrameSlot, Stamp, slot_of
 from katana450.server.viser_bridge.guard import Guard
 

@@ -17,8 +17,8 @@ import msgspec
 from viser import _messages as wire
 
 from katana450.server.viser_bridge.guard import Guard
+from katana450.server.web.limits import TokenBucket
 from katana450.server.web.security import MAX_MESSAGE_BYTES
-from katana450.server.web.token_bucket import TokenBucket
 
 log = logging.getLogger(__name__)
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from ipaddress import IPv6Address
 
 from katana450.caching import cached_property
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
 

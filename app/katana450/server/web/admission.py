@@ -21,7 +21,7 @@ from katana450.server.service.participants import actor_of
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import TOO_MANY, refusal
-from katana450.server.web.connection_limit import ConnectionLimit
+from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.security import FOR_PROGRAMS
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
 

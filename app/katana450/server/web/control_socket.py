@@ -20,7 +20,7 @@ from katana450.server.service.people import Connection, ConnectionKind
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 RATE, BURST = 160.0, 320.0
 """Maximum rate [1/s] and burst of requests: per second ten heartbeats, 25 jogs, 30 queries, and the

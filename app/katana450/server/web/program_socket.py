@@ -45,8 +45,7 @@ from katana450.server.web.channel import (
     JsonChannel,
     WebSocketJsonChannel,
 )
-from katana450.server.web.connection_limit import ConnectionLimit
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import ConnectionLimit, TokenBucket
 
 log = logging.getLogger(__name__)
 

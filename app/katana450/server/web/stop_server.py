@@ -39,7 +39,7 @@ from katana450.server.web.authenticator import (
     Authenticator,
     framing_fault,
 )
-from katana450.server.web.token_bucket import TokenBucket
+from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
 

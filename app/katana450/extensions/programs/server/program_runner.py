@@ -39,9 +39,9 @@ from katana450.server.api import program_requests as requests
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.dispatcher import ACCEPTED
 from katana450.server.service.hub import Hub
-from katana450.server.service.last_pause import LastPause
 from katana450.server.service.participants import Participant, session_of
 from katana450.server.service.runner import Runner, StatusLine
+from katana450.server.service.stop_state import LastPause
 
 log = logging.getLogger(__name__)
 

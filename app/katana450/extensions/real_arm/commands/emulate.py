@@ -7,7 +7,7 @@ import threading
 from argparse import Namespace
 
 from katana450.arm.robot.loader import load
-from katana450.assembly.output import say
+from katana450.assembly.log_output import say
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.posture import loads_of_robot
 from katana450.extensions.real_arm.emulator.server import EmulatorServer

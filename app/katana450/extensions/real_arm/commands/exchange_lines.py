@@ -7,7 +7,7 @@ from argparse import Namespace
 from dataclasses import fields
 from pathlib import Path
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec, RequestReceived
 from katana450.extensions.real_arm.codec.host_codec import (

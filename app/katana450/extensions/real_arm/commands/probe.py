@@ -12,7 +12,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.cli.version import version
 from katana450.extensions.real_arm.codec import requests as req

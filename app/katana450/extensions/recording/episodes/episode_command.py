@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode_folder import DISCARDED, EpisodeFolder
 from katana450.extensions.recording.episodes.interrupted import finish_interrupted

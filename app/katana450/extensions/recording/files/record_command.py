@@ -12,7 +12,7 @@ from pathlib import Path
 
 import msgspec
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export

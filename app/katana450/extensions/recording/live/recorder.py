@@ -14,8 +14,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from katana450.assembly.record_pipe import connected_to_ticks
-from katana450.assembly.supervised import READY, SupervisorPipe
+from katana450.assembly.supervised import READY, SupervisorPipe, connected_to_ticks
 from katana450.errors import InputError
 from katana450.extension import ServerFacts
 from katana450.extensions.recording.live.running_scripts import RunningScripts

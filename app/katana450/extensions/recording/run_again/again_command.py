@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.atomic import write_files, writer_of
 from katana450.cli.main import main

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from katana450.assembly.log_lines import printable
+from katana450.assembly.log_output import printable
 from katana450.errors import InputError
 from katana450.extensions.programs.script.measures import title_of, unit_of
 from katana450.extensions.recording.episodes.episode_file import shown_part

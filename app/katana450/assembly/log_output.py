@@ -1,13 +1,16 @@
-"""Log lines that clients can neither forge nor multiply.
+"""Output of a server, which must run even where nothing can be written.
 
-Their texts can neither begin a line nor colour one, and a flood of events makes few lines.
+Clients can neither forge nor multiply log lines: their texts can neither begin a line nor colour
+one, and a flood of events makes few lines.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import sys
 import time
+from contextlib import suppress
 
 FORMAT = "%(asctime)s %(levelname)s %(message)s"
 
@@ -78,3 +81,21 @@ def start_log() -> None:
     handler.addFilter(RepetitionFilter())
     logging.basicConfig(handlers=[handler])
     logging.getLogger("katana450").setLevel(logging.INFO)
+
+
+def say(text: str) -> None:
+    """Print ``text`` at once. If that fails, report it on standard error and print nothing more."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        drop_output(error)
+
+
+def drop_output(error: OSError) -> None:
+    """Report that standard output cannot be written, and discard it from now on."""
+    # The rest of the buffer is written at the end of the process, which would fail again.
+    with suppress(OSError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
+    print(f"katana450: The output cannot be written: {error.strerror}.", file=sys.stderr)
