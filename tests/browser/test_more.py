@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import zxingcpp
 
-from katana450.extensions.phone.address import own_address
+from katana450.extensions.phone import own_address
 from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage

@@ -73,7 +73,7 @@ def test_failed_start_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
     assert "leaked" not in errors
 
 
-def ended_amid_work(_config: object, _supervisor: SupervisorPipe) -> None:
+def ended_amid_work(_supervisor: SupervisorPipe) -> None:
     holding = threading.Event()
 
     def plan() -> None:
@@ -88,7 +88,7 @@ def ended_amid_work(_config: object, _supervisor: SupervisorPipe) -> None:
 
 
 def test_end_amid_work_of_a_thread_lists_no_leaks(capfd: pytest.CaptureFixture[str]) -> None:
-    supervisor = Supervisor([child_spec("it", "It", ended_amid_work, None, 5.0)], threading.Event())
+    supervisor = Supervisor([child_spec("it", "It", ended_amid_work, 5.0)], threading.Event())
     supervisor.start()
     process = supervisor._children["it"].process
     process.join(60.0)

@@ -8,8 +8,8 @@ from urllib.parse import unquote_to_bytes
 
 import pytest
 
-from katana450.extensions.phone import address as phone
-from katana450.extensions.phone.address import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
+from katana450.extensions import phone
+from katana450.extensions.phone import LINK_REQUIRED, LOOPBACK_ONLY, phone_address
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import ask

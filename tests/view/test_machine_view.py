@@ -21,7 +21,7 @@ from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.extensions.joint_view.machine_view import MachinePanel, MachineView, page
+from katana450.extensions.joint_view import MachinePanel, MachineView, page
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.recording.playback.drawing import RunDrawing
 from katana450.extensions.recording.playback.folder import CONTEXTS

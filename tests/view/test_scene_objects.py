@@ -26,8 +26,8 @@ from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.objects.handles import ObjectHandles
 from katana450.extensions.objects.objects_panel import NOTHING, ObjectsPanel
 from katana450.maths.water.environment import TableTop
+from katana450.server.view.paint import Tint
 from katana450.server.view.scene_objects import SceneObjectNodes
-from katana450.server.view.tint import Tint
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 

@@ -12,8 +12,8 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
+from katana450.server.view.paint import Tint
 from katana450.server.view.scenery import Workcell
-from katana450.server.view.tint import Tint
 from tests.viser_bridge.internals import nodes
 
 

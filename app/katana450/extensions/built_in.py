@@ -13,14 +13,14 @@ EXTENSIONS = (
             CliCommand(
                 "access",
                 "give people links with which they sign in",
-                f"{HERE}.server_commands.access_options:add_access_options",
-                f"{HERE}.server_commands.access:access",
+                f"{HERE}.server_commands.options:add_access_options",
+                f"{HERE}.server_commands.commands:access",
             ),
             CliCommand(
                 "people",
                 "list who is connected, and disconnect people",
-                f"{HERE}.server_commands.people_options:add_people_options",
-                f"{HERE}.server_commands.people:people",
+                f"{HERE}.server_commands.options:add_people_options",
+                f"{HERE}.server_commands.commands:people",
             ),
         ),
         handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
@@ -107,7 +107,7 @@ EXTENSIONS = (
             ),
         ),
     ),
-    Extension("phone", routes=f"{HERE}.phone.route:phone_routes"),
+    Extension("phone", routes=f"{HERE}.phone:phone_routes"),
     Extension(
         "recording",
         (
@@ -219,7 +219,7 @@ EXTENSIONS = (
         folder=f"{HERE}.objects.objects_panel:ObjectsFolder",
     ),
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
-    Extension("joint_view", joint_view=f"{HERE}.joint_view.machine_view:MachineView"),
+    Extension("joint_view", joint_view=f"{HERE}.joint_view:MachineView"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water.nodes:WaterLayer"),
     Extension("ellipsoid", view_layer=f"{HERE}.ellipsoid.layer:EllipsoidLayer"),

@@ -88,7 +88,9 @@ def content_of(what: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return ``value`` made of the types of JSON."""
+    """Return ``value`` made of the types of JSON; of a plan its duration alone."""
+    if isinstance(value, Plan):
+        return {"seconds": value.duration}
     return msgspec.to_builtins(value, enc_hook=_described, str_keys=True)
 
 
@@ -101,8 +103,6 @@ def _described(value: Any) -> Any:
             # A mesh has thousands, which are not copied.
             few = value.size <= MAX_ITEMS
             return value.ravel().tolist() if few else f"{value.size} values"
-        case Plan():
-            return {"seconds": value.duration}
     return type(value).__name__
 
 

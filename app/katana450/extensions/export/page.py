@@ -18,7 +18,7 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.export.playback import chosen
-from katana450.extensions.joint_view.machine_view import FLOOR_GAP
+from katana450.extensions.joint_view import FLOOR_GAP
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.progress import progress
 from katana450.extensions.water.nodes import WaterLayer

@@ -18,8 +18,8 @@ from katana450.arm.robot.visual import Visual
 from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.server.view.paint import Tint
 from katana450.server.view.scene import Window
-from katana450.server.view.tint import Tint
 from katana450.server.viser_bridge.posing import place, turn
 
 COLOUR = (148, 163, 184)

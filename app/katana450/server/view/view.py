@@ -25,13 +25,12 @@ from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import DisplayOptions, add_scene_tab
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
-from katana450.server.view.paint import PaintNodes
+from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.panel import Panel
 from katana450.server.view.panel_folder import DRIVE, SCENE, AddFolders, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.scene import Colour, Gap, GhostNodes
 from katana450.server.view.scenery import Scenery
-from katana450.server.view.tint import Tint
 from katana450.server.view.view_updater import ViewUpdater
 from katana450.server.viser_bridge.presets import Preset
 

@@ -1,20 +1,33 @@
-"""The address at which a phone reaches this server, and its QR code."""
+"""The address at which a phone reaches this server, with its QR code, and the route to it."""
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import socket
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
 import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
+from katana450.server.api.fields import ROOT
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address
+from katana450.server.web.bodies import TOO_MANY
+from katana450.server.web.http_api import RouteContext
+from katana450.server.web.limits import TokenBucket
+
+CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
+"""QR codes that are drawn per second, and in a burst, for all pages together."""
 
 LOOPBACK_ONLY = (
     "This server listens on this machine only, so a phone cannot reach it. The person in "
     "charge of this arm can open it to the network, and give you an access link."
 )
+
 NO_ADDRESS = "This machine has no address in a network, so a phone cannot reach it."
 """Reasons for which there is no address for a phone."""
 
@@ -22,11 +35,34 @@ LINK_REQUIRED = (
     "The code holds only this address. The phone also needs an access link: a person's own, from "
     "the person in charge of this arm."
 )
+
 NO_LINK = "Everybody who opens this address can drive the arm."
+
 NOT_SECURE = "Without https, others in the network can read what the phone sends."
 
 ELSEWHERE = ("192.0.2.1", 9)
 """An address outside every network (RFC 5737), to which nothing is sent."""
+
+
+def phone_routes(context: RouteContext) -> list[Route]:
+    """Return the one route, which answers with the address of this server for a phone."""
+    hub, authenticator = context.hub, context.authenticator
+    codes = TokenBucket(CODES_PER_SECOND, CODES_BURST, hub.clock())
+
+    async def phone(request: Request) -> Response:
+        context.identity(request)
+        if not codes.take(hub.clock()):
+            raise HTTPException(TOO_MANY, "Too many requests. Wait a moment.")
+        found = await asyncio.to_thread(
+            phone_address,
+            authenticator.address,
+            request.headers["host"],
+            hub.stop_path.main_port,
+            requires_link=authenticator.requires_link,
+        )
+        return Response(msgspec.json.encode(found), media_type="application/json")
+
+    return [Route(f"{ROOT}/phone", phone)]
 
 
 class PhoneAddress(msgspec.Struct, frozen=True):

@@ -22,13 +22,12 @@ from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extensions.objects.handles import HANDLES, ObjectHandles
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
 from katana450.server.view.display_options import LogProblem
-from katana450.server.view.paint import PaintNodes
+from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.panel_folder import DRIVE, SCENE, AddFolders, PanelTabs
 from katana450.server.view.readout import style
 from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
-from katana450.server.view.tint import Tint
 from katana450.server.view.view import ViewOptions
 from katana450.server.view.view_updater import READOUT_INTERVAL, ViewUpdater
 

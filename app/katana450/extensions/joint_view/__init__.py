@@ -1,1 +1,0 @@
-"""The scene and the panel of a robot that is driven joint by joint."""

@@ -1,1 +1,0 @@
-"""The address of the server for a phone, as a QR code."""
