@@ -11,6 +11,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_builder import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
+from katana450.extensions.programs.planning.curves import line_between
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run, step
 from katana450.extensions.programs.script.script import parse
@@ -112,7 +113,7 @@ def test_no_path_changes_its_branch(chain: Chain) -> None:
         end = start.moved(start.position + rng.normal(size=3) * 2.5e-3 * length(chain))
         if chain.n >= 6:
             end = replace(end, rotation=so3.exp(0.6 * rng.normal(size=3)) @ start.R)
-        curve = made.planning.line(made.target, end)
+        curve = line_between(made.target, end)
         try:
             path = made.planning.path(made.q, curve, kinematics.branch_of(made.q))
         except InputError:

@@ -140,7 +140,7 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
     legs, on = list(pairwise(points)), 0
     for sigma in np.linspace(0.0, 1.0, 301).tolist():
         T = forward(chain, q_at(path, sigma))
-        desired = np.array([each.c0 for each in curve.at(Jet.variable(sigma))])
+        desired = np.array([each.c0 for each in curve.at(Jet.variable(sigma))[:5]])
         assert T[:3, 3] == pytest.approx(desired[:3], abs=1e-14)
         target = ToolTarget.at(chain, q_at(path, sigma))
         assert (target.pitch, target.roll) == pytest.approx(tuple(desired[3:]), abs=1e-13)

@@ -56,6 +56,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
@@ -428,6 +429,9 @@ def test_target_of_an_older_version_is_read_and_has_its_digest(state: State) -> 
     pose = Codec().decoded(Target, form)
     np.testing.assert_array_equal(pose.T[:3], np.column_stack((np.eye(3), (0.1, 0.2, 0.3))))
     assert target_content(pose) == ("ToolPose", {"position": pose.position, "R": pose.R})
+    rows = [{"position": [x, 0.0, 0.3], "R": np.eye(3).tolist()} for x in (0.1, 0.2, 0.3)]
+    lines = Codec().decoded(Curve, {"is": "PoseLines", "vias": rows, "blend": [0.5]})
+    assert lines.at(Jet.variable(1.0)).target.apart(lines.vias[-1]) == (0.0, 0.0)
     five = Codec().decoded(
         Target, {"is": "ToolTarget", "position": [1, 2, 3], "pitch": 0.1, "roll": 0.2}
     )

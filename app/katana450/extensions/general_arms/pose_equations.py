@@ -25,7 +25,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, sin_cos
-from katana450.maths.planning.posture import JointJets, ThreeJets
+from katana450.maths.planning.posture import JointJets, ThreeJets, ToolJets
 
 PASSES: Final = 5
 """Number of steps on jets: angles and three derivatives, and one to spare."""
@@ -41,25 +41,6 @@ SOLVED: Final = 1e-12
 
 WILD: Final = 1.0
 """[rad] Step after which the method is given up."""
-
-
-class PoseJets(NamedTuple):
-    """The pose of the tool as jets: the tool point x, y, z, and the columns of its rotation."""
-
-    x: Jet
-    y: Jet
-    z: Jet
-    columns: tuple[ThreeJets, ThreeJets, ThreeJets]
-
-    @property
-    def T(self) -> FloatArray:
-        """The poses at N places, or at one, (N, 4, 4)."""
-        numbers = [*(each for column in self.columns for each in column), *self[:3]]
-        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(each.c0) for each in numbers)), axis=1)
-        T = np.zeros((len(rows), 4, 4))
-        T[:, :3] = rows.reshape(-1, 4, 3).swapaxes(1, 2)
-        T[:, 3, 3] = 1.0
-        return T
 
 
 class RegularPosture(NamedTuple):
@@ -181,7 +162,7 @@ class PoseEquations:
         A = np.concatenate((turns @ J[:3], J[3:]))
         return A, np.concatenate((turns @ look.error[:3], look.error[3:])), look.matrix
 
-    def solved(self, q: FloatArray, given: Sequence[Jet], pose: PoseJets) -> JointJets:
+    def solved(self, q: FloatArray, given: Sequence[Jet], pose: ToolJets) -> JointJets:
         """Return the joints as jets at N places of a curve of poses, from angles `q` (N, n) [rad].
 
         ``given``: the locked joints. The angles may be off by little.
@@ -202,9 +183,10 @@ class PoseEquations:
                 joints[k] = joints[k] + Jet(*(each[:, place] for each in turns))
         return tuple(joints)
 
-    def _lacking(self, q: Sequence[Jet], pose: PoseJets) -> list[Jet]:
+    def _lacking(self, q: Sequence[Jet], pose: ToolJets) -> list[Jet]:
         """Return what the joints lack of ``pose``, as m jets."""
         point, columns, turning = self._moved(q)
+        assert pose.columns is not None
         target: Sequence[Vector] = pose.columns
         if self.chain.n < 6:
             s, c = sin_cos(q[0])

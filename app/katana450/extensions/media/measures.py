@@ -15,7 +15,6 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.planning.curves import ToolCoordinates
 from katana450.extensions.programs.planning.pose_path import PosePath
 from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.programs.run.program import Program
@@ -185,8 +184,8 @@ def _turned(path: ToolPath | PosePath, sigma: FloatArray, q: FloatArray) -> Floa
     """Return the errors (N,) [rad] of the orientation of the tool at joint angles `q` (N, n)."""
     if isinstance(path, PosePath):
         return path.turned_off(sigma, q)
-    tool: ToolCoordinates = path.curve.at(Jet.variable(sigma))
-    pitch, roll = (np.broadcast_to(each.c0, sigma.shape) for each in tool[3:])
+    tool = path.curve.at(Jet.variable(sigma))
+    pitch, roll = (np.broadcast_to(each.c0, sigma.shape) for each in tool[3:5])
     found = [ToolTarget.at(path.chain, each) for each in q]
     off = [
         (each.pitch - pitch[number], each.roll - roll[number]) for number, each in enumerate(found)

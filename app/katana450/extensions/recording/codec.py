@@ -30,8 +30,6 @@ from katana450.caching import cached_property
 from katana450.extensions.programs.planning.curves import (
     Curve,
     Linear,
-    PoseCurve,
-    PoseLines,
     PoseTurn,
     Swing,
     ToolArc,
@@ -62,8 +60,7 @@ from katana450.maths.planning.plan import Plan, Segment
 
 MEMBERS: Final[Mapping[Any, Any]] = {
     Path: JointPath | ToolPath | TrajectoryPath | PosePath,
-    Curve: ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn,
-    PoseCurve: TurnedCurve | PoseTurn | PoseLines,
+    Curve: ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn | TurnedCurve | PoseTurn,
     Callable: Linear | Swing,
     Command: Union[classes_of(Command)],  # noqa: UP007
 }

@@ -28,7 +28,7 @@ WRITTEN = ("cup", "T_base_cup", "slosh", "film", "wetted")
 OF_MOTION = ("course", "middle", "velocity")
 
 
-CLASSES: Mapping[str, str] = {"ToolPose": "ToolTarget"}
+CLASSES: Mapping[str, str] = {"ToolPose": "ToolTarget", "PoseLines": "ToolLines"}
 """Present names of classes that had another one."""
 
 COMMANDS: Mapping[str, str] = {

@@ -6,15 +6,62 @@ Lengths in m, angles in rad.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import FiveAxisArm
 from katana450.maths.kinematics.branch import Branch, Shoulder
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.closed_form import closed_form
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import JETS, Jet, atan2, sin_cos, sqrt
 
 FiveJets = tuple[Jet, Jet, Jet, Jet, Jet]
 JointJets = tuple[Jet, ...]
 ThreeJets = tuple[Jet, Jet, Jet]
+
+
+class ToolJets(NamedTuple):
+    """The tool on a curve as jets, in the freedoms of a `ToolTarget`.
+
+    Attributes:
+        x, y, z: the tool point in {S} [m].
+        pitch, roll: the orientation of a five-axis arm of the family [rad].
+        columns: those of the rotation of the tool; None if pitch and roll count.
+    """
+
+    x: Jet
+    y: Jet
+    z: Jet
+    pitch: Jet
+    roll: Jet
+    columns: tuple[ThreeJets, ThreeJets, ThreeJets] | None = None
+
+    @staticmethod
+    def turned(point: ThreeJets, columns: tuple[ThreeJets, ThreeJets, ThreeJets]) -> ToolJets:
+        """Return the tool at ``point`` with the rotation of these columns."""
+        return ToolJets(*point, Jet.constant(0.0), Jet.constant(0.0), columns)
+
+    @property
+    def T(self) -> FloatArray:
+        """The poses (N, 4, 4) at N places, or at one, of a tool with a rotation."""
+        assert self.columns is not None
+        numbers = [*(entry for column in self.columns for entry in column), *self[:3]]
+        rows = np.stack(np.broadcast_arrays(*(np.atleast_1d(jet.c0) for jet in numbers)), axis=1)
+        T = np.zeros((len(rows), 4, 4))
+        T[:, :3] = rows.reshape(-1, 4, 3).swapaxes(1, 2)
+        T[:, 3, 3] = 1.0
+        return T
+
+    @property
+    def target(self) -> ToolTarget:
+        """The target at one place."""
+        if self.columns is not None:
+            return ToolTarget.of(self.T[0])
+        *point, pitch, roll = (float(np.asarray(jet.c0)) for jet in self[:5])
+        return ToolTarget(frozen(point), pitch, roll)
 
 
 def point_by_exponentials(chain: Chain, q: JointJets) -> ThreeJets:

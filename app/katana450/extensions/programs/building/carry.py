@@ -8,7 +8,7 @@ import numpy as np
 
 from katana450.extensions.programs.building.plan_builder import PlanBuilder
 from katana450.extensions.programs.planning.approach import UP
-from katana450.extensions.programs.planning.tool_planning import AnyCurve
+from katana450.extensions.programs.planning.curves import Curve, arc_between, line_between
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.plan import JOIN_TOLERANCE
 
@@ -22,7 +22,7 @@ def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
     The tool keeps its present orientation up to the last part. An object that is held upright stays
     upright unless ``to`` has another orientation.
     """
-    at, hand, planning = builder.target, builder.hand, builder.planning
+    at, hand = builder.target, builder.hand
     here = math.atan2(at.position[1], at.position[0])
     there = math.atan2(to.position[1], to.position[0])
     radius = math.hypot(at.position[0], at.position[1])
@@ -31,12 +31,12 @@ def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
     turn = hand.way_round(here, there)
     beside = np.array((radius * math.cos(there), radius * math.sin(there), raised.position[2]))
     over = hand.turned(raised, beside, turn)
-    curves: list[AnyCurve] = []
+    curves: list[Curve] = []
     if (raised.position != at.position).any():
-        curves.append(planning.line(at, raised))
+        curves.append(line_between(at, raised))
     if abs(turn) > JOIN_TOLERANCE:
-        curves.append(planning.arc(np.zeros(3), UP, turn, 0.0, raised, over))
+        curves.append(arc_between(np.zeros(3), UP, turn, 0.0, raised, over))
     if max(over.apart(to)) > JOIN_TOLERANCE:
-        curves.append(planning.line(over, to))
+        curves.append(line_between(over, to))
     if curves:
         builder.lead(curves, name)

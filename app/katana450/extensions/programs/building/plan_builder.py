@@ -20,9 +20,10 @@ from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, MoveFingers
 from katana450.extensions.programs.language.step_target import ScriptFrame, StepTarget
 from katana450.extensions.programs.planning.approach import Approach
+from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.hand_planning import HandPlanning, hand_of
 from katana450.extensions.programs.planning.out_of_reach import unreached
-from katana450.extensions.programs.planning.tool_planning import AnyCurve, ToolPlanning, planning_of
+from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -184,7 +185,7 @@ class PlanBuilder:
     @property
     def planning(self) -> ToolPlanning:
         """The planning of the present tool."""
-        return planning_of(self.plan_context.arm.kinematics_to(self.state.tool), self.state)
+        return ToolPlanning(self.plan_context.arm.kinematics_to(self.state.tool), self.state)
 
     @property
     def hand(self) -> HandPlanning:
@@ -225,7 +226,7 @@ class PlanBuilder:
             name,
         )
 
-    def lead(self, curves: Sequence[AnyCurve], name: str, tool_speed: float = TOOL_SPEED) -> None:
+    def lead(self, curves: Sequence[Curve], name: str, tool_speed: float = TOOL_SPEED) -> None:
         """Append the tool's motion along ``curves``, from its present pose, on the same branch.
 
         ``tool_speed``: maximum speed of the tool point [m/s]. Raises as ``follow``.
@@ -243,7 +244,7 @@ class PlanBuilder:
             q = path.end
         self.follow(paths, name, tool_speed)
 
-    def pace(self, curve: AnyCurve, duration: float, name: str) -> None:
+    def pace(self, curve: Curve, duration: float, name: str) -> None:
         """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
 
         Raises as ``follow``.

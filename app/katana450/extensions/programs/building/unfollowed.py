@@ -10,9 +10,9 @@ import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.extensions.programs.planning.out_of_reach import farthest, near_points
 from katana450.extensions.programs.planning.pose_path import LostPathError
-from katana450.extensions.programs.planning.tool_planning import AnyCurve
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import ToolTarget
@@ -40,7 +40,7 @@ LEFT = 1e-4
 def unfollowed(
     builder: PlanBuilder,
     refused: InputError,
-    curve: AnyCurve,
+    curve: Curve,
     branch: AnyBranch,
     remedies: Iterator[str],
 ) -> InputError:
@@ -74,10 +74,9 @@ def line_remedies(
 
     ``refused``: why the whole line is not.
     """
-    line = builder.planning.line
 
     def possible(tried: ToolTarget) -> bool:
-        return _possible(builder, lambda: builder.lead([line(start, tried)], "line"))
+        return _possible(builder, lambda: builder.lead([line_between(start, tried)], "line"))
 
     for pitch in _other_pitch(end, possible):
         yield f"with `pitch: {pitch:g}` at its end"

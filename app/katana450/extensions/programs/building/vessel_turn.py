@@ -20,8 +20,7 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_builder import PlanBuilder
 from katana450.extensions.programs.planning.approach import UP
-from katana450.extensions.programs.planning.curves import PoseTurn, ToolLine, ToolTurn
-from katana450.extensions.programs.planning.tool_planning import AnyCurve, ToolPlanning
+from katana450.extensions.programs.planning.curves import Curve, PoseTurn, ToolLine, ToolTurn
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
@@ -68,12 +67,12 @@ class VesselTurn(ABC):
     def angles(self, tilts: FloatArray) -> FloatArray:
         """Return the angles (N,) at which the vessel has these tilts. Raises InputError."""
 
-    @abstractmethod
-    def line(self, start: float, end: float) -> AnyCurve:
+    def line(self, start: float, end: float) -> Curve:
         """Return the even turn from one angle to another."""
+        return self.by(np.array((0.5 * (start + end), 0.5 * (end - start))))
 
     @abstractmethod
-    def by(self, angles: FloatArray) -> AnyCurve:
+    def by(self, angles: FloatArray) -> Curve:
         """Return the turn by a polynomial of ``angles`` (n,), in powers of 2 sigma - 1."""
 
 
@@ -86,7 +85,6 @@ class Tilting(VesselTurn):
         lip: (3,) the point of the lip about which the cup tilts [m].
         axis: unit vector (3,), level, about which it does.
         axis_in_pose: the same in the frame of the rotation of a `ToolTarget`.
-        planning: that of the tool.
         end: angle at the end of the pour.
     """
 
@@ -94,7 +92,6 @@ class Tilting(VesselTurn):
     lip: FloatArray
     axis: FloatArray
     axis_in_pose: FloatArray
-    planning: ToolPlanning
     end: float
 
     def angles(self, tilts: FloatArray) -> FloatArray:
@@ -103,18 +100,7 @@ class Tilting(VesselTurn):
             raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
         return tilts
 
-    def line(self, start: float, end: float) -> AnyCurve:
-        """Return the arc of the tool about the lip."""
-        one, other = (self._tilted(tilt) if tilt else self.at for tilt in (start, end))
-        return self.planning.arc(self.lip, self.axis, end - start, 0.0, one, other)
-
-    def _tilted(self, tilt: float) -> ToolTarget:
-        position = self.lip + so3.exp(tilt * self.axis) @ (self.at.position - self.lip)
-        return ToolTarget(
-            frozen(position), rotation=frozen(so3.exp(tilt * self.axis_in_pose) @ self.at.R)
-        )
-
-    def by(self, angles: FloatArray) -> AnyCurve:
+    def by(self, angles: FloatArray) -> Curve:
         """Return the `PoseTurn`."""
         return PoseTurn(self.at, self.lip, self.axis, angles, self.axis_in_pose)
 
@@ -141,14 +127,14 @@ class Rolling(VesselTurn):
             raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
         return np.asarray(math.copysign(1.0, self.end) * rolls)
 
-    def line(self, start: float, end: float) -> AnyCurve:
+    def line(self, start: float, end: float) -> Curve:
         """Return the even roll."""
         if self.offsets is None:
             one, other = (replace(self.at, roll=self.at.roll + roll) for roll in (start, end))
             return ToolLine(one, other)
-        return self.by(np.array((0.5 * (start + end), 0.5 * (end - start))))
+        return super().line(start, end)
 
-    def by(self, angles: FloatArray) -> AnyCurve:
+    def by(self, angles: FloatArray) -> Curve:
         """Return the `ToolTurn`."""
         rolls = np.append(self.at.roll + angles[0], angles[1:])
         if self.offsets is None:
@@ -209,7 +195,7 @@ def _about_the_lip(
             moved = so3.rotation_z(turn) @ (level.position - cup)
             at = hand.turned(level, lip - held.extent[0] * toward + moved, turn)
             end = EMPTY_TILT if tilt is None else tilt
-            yield Tilting(at, frozen(lip), axis, axis_in_pose, builder.planning, end)
+            yield Tilting(at, frozen(lip), axis, axis_in_pose, end)
 
 
 def _over_basin(

@@ -12,13 +12,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import ClassVar, Final, NamedTuple, Protocol
+from typing import ClassVar, Final, Protocol
 
 import numpy as np
 
 from katana450.caching import cached_property
 from katana450.errors import InputError
-from katana450.extensions.general_arms.pose_equations import PoseJets
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -28,7 +27,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, atan2, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
-from katana450.maths.planning.posture import facing
+from katana450.maths.planning.posture import ThreeJets, ToolJets, facing
 
 TURN_LENGTH = 0.25
 """Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
@@ -46,16 +45,6 @@ Terms = list[list[float]]
 """For x, y and z of a turned vector the terms with the cosine, with the sine, and without both."""
 
 
-class ToolCoordinates(NamedTuple):
-    """The five freedoms of the tool as jets: the tool point x, y, z in {S}, pitch and roll."""
-
-    x: Jet
-    y: Jet
-    z: Jet
-    pitch: Jet
-    roll: Jet
-
-
 class Curve(Protocol):
     """The tool along a path."""
 
@@ -64,21 +53,8 @@ class Curve(Protocol):
         """The places between 0 and 1 where one formula ends and another begins, in rising order."""
         ...
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
-        ...
-
-
-class PoseCurve(Protocol):
-    """The pose of the tool along a path."""
-
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The places between 0 and 1 where one formula ends and another begins, in rising order."""
-        ...
-
-    def at(self, sigma: Jet) -> PoseJets:
-        """Return the pose at `sigma`, one place or many."""
         ...
 
 
@@ -86,17 +62,6 @@ class _OneFormula:
     """A curve of one formula, which has no joins."""
 
     joins: ClassVar[tuple[float, ...]] = ()
-
-
-class _Legs:
-    """A curve of straight legs and rounded corners."""
-
-    _line: Polyline
-
-    @property
-    def joins(self) -> tuple[float, ...]:
-        """The places where legs and corners meet."""
-        return self._line.joins
 
 
 @dataclass(frozen=True)
@@ -129,14 +94,14 @@ class ToolLine(_OneFormula):
             numbers = np.append(target.position, (target.pitch, target.roll))
             finite_array(numbers, (5,), f"The {name} of a line")
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
         x, y, z = (
             a + (b - a) * sigma
             for a, b in zip(self.start.position.tolist(), self.end.position.tolist(), strict=True)
         )
         pitch = Linear(self.start.pitch, self.end.pitch)(sigma)
-        return ToolCoordinates(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
+        return ToolJets(x, y, z, pitch, Linear(self.start.roll, self.end.roll)(sigma))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,11 +134,11 @@ class ToolArc(_OneFormula):
             raise InputError("The axis of an arc is zero; give it a direction.")
         object.__setattr__(self, "axis", frozen(self.axis / length))
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
         s, c = sin_cos(self.angle * sigma)
         x, y, z = (c * u + s * v + (f + k * sigma) for u, v, f, k in self._terms)
-        return ToolCoordinates(x, y, z, self.pitch(sigma), self.roll(sigma))
+        return ToolJets(x, y, z, self.pitch(sigma), self.roll(sigma))
 
     @cached_property
     def _terms(self) -> list[list[float]]:
@@ -209,35 +174,18 @@ class Swing:
         return self.mean + self.sine * s + self.cosine * c
 
 
-def rounded(
-    vias: FloatArray, distances: FloatArray, angles: FloatArray, blend: FloatArray
-) -> Polyline:
-    """Return the legs through the vias of a tool, with rounded corners.
-
-    Args:
-        vias: (m, k) coordinates of the tool, two or more rows.
-        distances: (m - 1,) how far each leg moves the tool point [m].
-        angles: (m - 1,) how far each leg turns the tool [rad].
-        blend: (m - 2,) see `Polyline`.
-
-    Raises InputError for fewer than two vias, and for a leg that neither moves nor turns the tool.
-    """
-    lengths = np.maximum(distances, TURN_LENGTH * angles)
-    if len(vias) < 2 or (lengths <= VIA_TOLERANCE).any():
-        raise InputError("Lines need at least two vias, each different from the one before.")
-    return Polyline(frozen(vias), lengths, blend)
-
-
 @dataclass(frozen=True, eq=False)
-class ToolLines(_Legs):
-    """Straight lines from target to target with rounded corners; pitch and roll turn evenly.
+class ToolLines:
+    """Straight lines from target to target with rounded corners, on which the tool turns evenly.
 
-    Corners are those of `Polyline`.
+    Corners are those of `Polyline`. Rotations are quaternions along it, divided by their length.
 
     Attributes:
-        vias: two or more targets, the first and last are start and end.
+        vias: two or more targets of one arm, the first and last are start and end.
         blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
             1.
+
+    Raises InputError for fewer than two vias, and for a leg that neither moves nor turns the tool.
     """
 
     vias: tuple[ToolTarget, ...]
@@ -245,17 +193,49 @@ class ToolLines(_Legs):
     _line: Polyline = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        rows = [(*via.position.tolist(), via.pitch, via.roll) for via in self.vias]
-        numbers = finite_array(rows, (len(rows), 5), "The vias of lines")
-        legs = np.diff(numbers, axis=0)
-        angles = np.abs(legs[:, 3:]).max(axis=1, initial=0.0)
-        line = rounded(numbers, np.linalg.norm(legs[:, :3], axis=1), angles, self.blend)
+        rows = self._rows()
+        numbers = finite_array(rows, (len(rows), len(rows[0]) if rows else 5), "The vias of lines")
+        legs = np.array([one.apart(other) for one, other in pairwise(self.vias)]).reshape(-1, 2)
+        lengths = np.maximum(legs[:, 0], TURN_LENGTH * legs[:, 1])
+        if len(rows) < 2 or (lengths <= VIA_TOLERANCE).any():
+            raise InputError("Lines need at least two vias, each different from the one before.")
+        line = Polyline(frozen(numbers), lengths, self.blend)
         object.__setattr__(self, "blend", line.blend)
         object.__setattr__(self, "_line", line)
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def _rows(self) -> list[list[float]]:
+        """Return the coordinates of the vias: the point, then pitch and roll, or a quaternion."""
+        rows: list[list[float]] = []
+        for via in self.vias:
+            if via.is_pitched != self.vias[0].is_pitched:
+                raise InputError("The vias of lines must be targets of one arm.")
+            if via.is_pitched:
+                turn = [via.pitch, via.roll]
+            else:
+                quaternion = so3.to_quaternion(via.R)
+                # A quaternion and its opposite are the same rotation; the nearer one is taken.
+                before = rows[-1][3:] if rows else quaternion
+                turn = (math.copysign(1.0, float(quaternion @ before)) * quaternion).tolist()
+            rows.append([*via.position.tolist(), *turn])
+        return rows
+
+    @property
+    def joins(self) -> tuple[float, ...]:
+        """The places where legs and corners meet."""
+        return self._line.joins
+
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
-        return ToolCoordinates(*self._line.at(sigma))
+        x, y, z, *turn = self._line.at(sigma)
+        if self.vias[0].is_pitched:
+            pitch, roll = turn
+            return ToolJets(x, y, z, pitch, roll)
+        length = sqrt(sum((number * number for number in turn), start=Jet.constant(0.0)))
+        w, a, b, c = (number / length for number in turn)
+        one = (1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b + w * c), 2.0 * (a * c - w * b))
+        two = (2.0 * (a * b - w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c + w * a))
+        three = (2.0 * (a * c + w * b), 2.0 * (b * c - w * a), 1.0 - 2.0 * (a * a + b * b))
+        return ToolJets.turned((x, y, z), (one, two, three))
 
 
 def screw_points(p: FloatArray, twist: FloatArray) -> ToolLine | ToolArc:
@@ -294,10 +274,10 @@ class ToolScrew(_OneFormula):
                 "along an arc instead."
             )
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
         arm = arm_of(self.chain)
-        x, y, z, _, _ = self._point_path.at(sigma)
+        x, y, z = self._point_path.at(sigma)[:3]
         # The orientation of {K} in {C} as a quaternion, turned by the twist.
         (w0, x0, y0, z0), (a, b, c), turn = self._turning
         s, k = sin_cos((0.5 * turn) * sigma)
@@ -310,7 +290,7 @@ class ToolScrew(_OneFormula):
         s, k = sin_cos(0.5 * alpha1)
         W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
         total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)
-        return ToolCoordinates(x, y, z, total + difference, total - difference)
+        return ToolJets(x, y, z, total + difference, total - difference)
 
     @cached_property
     def _point_path(self) -> ToolLine | ToolArc:
@@ -351,7 +331,7 @@ class ToolTurn(_OneFormula):
             offsets = finite_array(self.offsets, shape, "The coefficients of a path")
             object.__setattr__(self, "offsets", frozen(offsets))
 
-    def at(self, sigma: Jet) -> ToolCoordinates:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the tool at `sigma`, one place or many."""
         position = self.target.position.tolist()
         if self.offsets is None:
@@ -360,7 +340,7 @@ class ToolTurn(_OneFormula):
             ways = zip(position, self.offsets.T.tolist(), strict=True)
             x, y, z = (place + _polynomial(each, sigma) for place, each in ways)
         roll = _polynomial(self.rolls.tolist(), sigma)
-        return ToolCoordinates(x, y, z, self.target.pitch + 0.0 * sigma, roll)
+        return ToolJets(x, y, z, self.target.pitch + 0.0 * sigma, roll)
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,16 +367,18 @@ class TurnedCurve:
         """The joins of the curve of the point."""
         return self.points.joins
 
-    def at(self, sigma: Jet) -> PoseJets:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the pose at `sigma`, one place or many."""
         x, y, z = self.points.at(sigma)[:3]
         angle, terms = self._terms
         if not angle:
-            one, two, three = (tuple(map(Jet.constant, column)) for column in self.R.T.tolist())
+            one, two, three = (
+                (Jet.constant(a), Jet.constant(b), Jet.constant(c)) for a, b, c in self.R.T.tolist()
+            )
         else:
             s, c = sin_cos(angle * sigma)
             one, two, three = (_turned(each, s, c) for each in terms)
-        return PoseJets(x, y, z, (one, two, three))  # type: ignore[arg-type]
+        return ToolJets.turned((x, y, z), (one, two, three))
 
     @cached_property
     def _terms(self) -> tuple[float, list[Terms]]:
@@ -434,7 +416,7 @@ class PoseTurn(_OneFormula):
                 raise InputError(f"The {name} of a turn is not a unit vector.")
             object.__setattr__(self, name, frozen(value))
 
-    def at(self, sigma: Jet) -> PoseJets:
+    def at(self, sigma: Jet) -> ToolJets:
         """Return the pose at `sigma`, one place or many."""
         sine, cosine = sin_cos(_polynomial(self.angles.tolist(), sigma))
         beside = self.start.position - self.point
@@ -445,50 +427,40 @@ class PoseTurn(_OneFormula):
             )
         )
         axis = self.axis if self.axis_in_pose is None else self.axis_in_pose
-        turned = (_turned(_terms(c, axis), sine, cosine) for c in self.start.R.T)
-        return PoseJets(x, y, z, tuple(turned))  # type: ignore[arg-type]
+        one, two, three = (_turned(_terms(column, axis), sine, cosine) for column in self.start.R.T)
+        return ToolJets.turned((x, y, z), (one, two, three))
 
 
-@dataclass(frozen=True, eq=False)
-class PoseLines(_Legs):
-    """Straight lines from pose to pose with rounded corners.
+def line_between(start: ToolTarget, end: ToolTarget) -> Curve:
+    """Return the straight line on which the tool turns evenly from ``start`` to ``end``."""
+    if start.is_pitched:
+        return ToolLine(start, end)
+    return _evenly_turned(
+        ToolLine(ToolTarget(start.position), ToolTarget(end.position)), start, end
+    )
 
-    On each line the tool turns about one axis. Corners are those of `Polyline`; the rotations are
-    quaternions along a polyline, divided by their length.
 
-    Attributes:
-        vias: two or more poses, the first and last are start and end.
-        blend: fraction (m - 2,) of half of its shorter leg that each corner cuts off, above 0 up to
-            1.
+def arc_between(
+    centre: FloatArray,
+    axis: FloatArray,
+    angle: float,
+    climb: float,
+    start: ToolTarget,
+    end: ToolTarget,
+) -> Curve:
+    """Return the turn of the tool point from ``start`` about ``axis`` through ``centre``.
+
+    ``angle`` [rad], ``climb`` along the axis [m]. The tool turns evenly to the orientation of
+    ``end``.
     """
+    pitch, roll = Linear(start.pitch, end.pitch), Linear(start.roll, end.roll)
+    arc = ToolArc(start.position, centre, axis, angle, pitch, roll, climb)
+    return arc if start.is_pitched else _evenly_turned(arc, start, end)
 
-    vias: tuple[ToolTarget, ...]
-    blend: FloatArray
-    _line: Polyline = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        turns = [so3.to_quaternion(via.R) for via in self.vias]
-        for number, after in enumerate(turns[1:], start=1):
-            # A quaternion and its opposite are the same rotation; the nearer one is taken.
-            turns[number] = math.copysign(1.0, float(turns[number - 1] @ after)) * after
-        rows = np.array(
-            [[*via.position, *turn] for via, turn in zip(self.vias, turns, strict=True)]
-        )
-        numbers = finite_array(rows, (len(rows), 7), "The vias of lines")
-        apart = np.array([one.apart(other) for one, other in pairwise(self.vias)]).reshape(-1, 2)
-        line = rounded(numbers, apart[:, 0], apart[:, 1], self.blend)
-        object.__setattr__(self, "blend", line.blend)
-        object.__setattr__(self, "_line", line)
-
-    def at(self, sigma: Jet) -> PoseJets:
-        """Return the pose at `sigma`, one place or many."""
-        x, y, z, *turn = self._line.at(sigma)
-        length = sqrt(sum((each * each for each in turn), start=Jet.constant(0.0)))
-        w, a, b, c = (each / length for each in turn)
-        one = (1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b + w * c), 2.0 * (a * c - w * b))
-        two = (2.0 * (a * b - w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c + w * a))
-        three = (2.0 * (a * c + w * b), 2.0 * (b * c - w * a), 1.0 - 2.0 * (a * a + b * b))
-        return PoseJets(x, y, z, (one, two, three))
+def _evenly_turned(points: Curve, start: ToolTarget, end: ToolTarget) -> TurnedCurve:
+    """Return the curve along ``points`` on which the tool turns about one axis."""
+    return TurnedCurve(points, start.R, so3.log(end.R @ start.R.T))
 
 
 def _polynomial(coefficients: Sequence[float], sigma: Jet) -> Jet:
@@ -507,6 +479,7 @@ def _terms(v: FloatArray, axis: FloatArray) -> Terms:
     return terms
 
 
-def _turned(terms: Terms, sine: Jet, cosine: Jet) -> tuple[Jet, ...]:
+def _turned(terms: Terms, sine: Jet, cosine: Jet) -> ThreeJets:
     """Return the vector of ``terms``, turned by an angle."""
-    return tuple(cosine * c + sine * s + f for c, s, f in terms)
+    x, y, z = (cosine * c + sine * s + f for c, s, f in terms)
+    return x, y, z

@@ -14,7 +14,6 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.planning.approach import (
     ABOVE,
     DOWN,
@@ -30,7 +29,7 @@ from katana450.extensions.programs.planning.approach import (
 )
 from katana450.extensions.programs.planning.arm_plane import PLANAR_AXES, ROLLING_AXES, ArmPlane
 from katana450.extensions.programs.planning.grasp_frame import GraspFrame, grasp_frame
-from katana450.extensions.programs.planning.tool_planning import ToolPlanning, planning_of
+from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
@@ -223,8 +222,8 @@ class HandPlanning:
 
         None is the nearest one. The result is empty if ``target`` is out of reach.
         """
-        chain, kinematics = self._chain, self.planning.kinematics
-        if not isinstance(kinematics, DrivenTool):
+        chain, kinematics = self._chain, self.planning.by_equations
+        if kinematics is None:
             return () if self.planning.joints(q, target, None) is None else (None,)
         R = target.R
         if self.plane is not None:
@@ -391,8 +390,8 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
     reason, for an arm that cannot grasp.
     """
     arm, environment = session.require_arm(), session.environment
-    planning, axes = planning_of(arm.kinematics_to(state.tool), state), arm.chain.n
-    in_family, chain = not isinstance(planning.kinematics, DrivenTool), planning.kinematics.chain
+    planning, axes = ToolPlanning(arm.kinematics_to(state.tool), state), arm.chain.n
+    in_family, chain = planning.by_equations is None, planning.chain
     if in_family and GRASP in arm.tools:
         in_front = ArmPlane.of(chain, np.eye(4), session.ready)
         return HandPlanning(

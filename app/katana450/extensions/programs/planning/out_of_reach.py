@@ -13,7 +13,8 @@ import numpy as np
 from katana450.arm.control.messages import axis_names
 from katana450.extensions.programs.language.kinds import XYZ
 from katana450.extensions.programs.language.step_target import ScriptFrame
-from katana450.extensions.programs.planning.tool_planning import EXACT, AnyCurve, ToolPlanning
+from katana450.extensions.programs.planning.curves import Curve
+from katana450.extensions.programs.planning.tool_planning import EXACT, ToolPlanning
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
@@ -26,6 +27,7 @@ from katana450.maths.kinematics.projection import (
 )
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
+from katana450.maths.planning.jet import Jet
 from katana450.tolerances import LIMIT_SLACK
 
 STEP = 0.1
@@ -142,13 +144,13 @@ def unreached(
 
 
 def farthest(
-    planning: ToolPlanning, q: FloatArray, curve: AnyCurve, branch: AnyBranch, frame: ScriptFrame
+    planning: ToolPlanning, q: FloatArray, curve: Curve, branch: AnyBranch, frame: ScriptFrame
 ) -> str:
     """Return a sentence on the place of ``curve`` that is farthest out of reach, or ""."""
     worst: tuple[float, NearestPlace] | None = None
     for sigma in np.linspace(0.0, 1.0, SAMPLES).tolist():
         checkpoint()
-        target = planning.target_on(curve, sigma)
+        target = curve.at(Jet.variable(sigma)).target
         place = nearest_place(planning, q, target, branch, planning.priorities[1])
         missed = place.projection.position_error
         if worst is None or missed > worst[1].projection.position_error:

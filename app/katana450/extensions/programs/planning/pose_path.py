@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450.errors import InputError, PathError
-from katana450.extensions.general_arms.pose_equations import PoseEquations, PoseJets, RegularPosture
+from katana450.extensions.general_arms.pose_equations import PoseEquations, RegularPosture
 from katana450.extensions.general_arms.regularity import WALL
-from katana450.extensions.programs.planning.curves import PoseCurve
+from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.tool_path import at_place, limit_refusal
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
@@ -99,7 +99,7 @@ class PosePath(CurvePath):
     """
 
     chain: Chain
-    curve: PoseCurve
+    curve: Curve
     places: FloatArray
     terms: FloatArray
     narrow: tuple[float, ...] = ()
@@ -111,6 +111,8 @@ class PosePath(CurvePath):
         terms = finite_array(self.terms, (count - 1, 8, self.chain.n), "The terms of a path")
         if count < 2 or places[0] != 0.0 or places[-1] != 1.0 or (np.diff(places) <= 0.0).any():
             raise InputError("The places of a path must rise from 0 to 1.")
+        if self.curve.at(Jet.variable(0.0)).columns is None:
+            raise InputError("The curve of a path of poses must have rotations.")
         object.__setattr__(self, "places", frozen(places))
         object.__setattr__(self, "terms", frozen(terms))
         object.__setattr__(self, "_pieces", Pieces(self.places, self.terms))
@@ -202,7 +204,7 @@ class CurveSearch:
     """
 
     equations: PoseEquations
-    curve: PoseCurve
+    curve: Curve
     q: FloatArray
     slope: FloatArray
 
@@ -296,7 +298,7 @@ class CurveSearch:
 
     def _derivatives(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
         """Return the exact joints near `q` (N, n) at ``sigma`` and three derivatives, (4, N, n)."""
-        pose: PoseJets = self.curve.at(Jet.variable(sigma))
+        pose = self.curve.at(Jet.variable(sigma))
         zeros = np.zeros_like(sigma)
         starts = self.q[list(self.equations.locked)].tolist()
         given = [
@@ -342,4 +344,5 @@ class CurveSearch:
         return LostPathError(text, point, sigma)
 
     def _point(self, sigma: float) -> list[float]:
-        return [float(np.asarray(each.c0)) for each in self.curve.at(Jet.variable(sigma))[:3]]
+        x, y, z = self.curve.at(Jet.variable(sigma)).target.position.tolist()
+        return [x, y, z]

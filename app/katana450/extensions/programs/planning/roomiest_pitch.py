@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from katana450.errors import InputError
-from katana450.extensions.programs.planning.curves import Swing, ToolArc
+from katana450.extensions.programs.planning.curves import Curve, Swing, ToolArc
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.posture import posture
@@ -31,12 +31,18 @@ HALVINGS: Final = 12
 """Number of halvings of the steps that refine the best; the last is a thousandth of a degree."""
 
 
-def roomiest(chain: Chain, branch: Branch, arc: ToolArc) -> ToolArc:
+def roomiest(chain: Chain, branch: AnyBranch, arc: Curve) -> ToolArc:
     """Return `arc` with the swing of its pitch that keeps axes 1 to 4 farthest from their limits.
 
     The pitch is a mean plus a wave of the arc's own angle, found on a grid and then by ever smaller
-    steps. Raises InputError when no such pitch keeps the joints inside on `branch`.
+    steps. Raises InputError when no such pitch keeps the joints inside on `branch`, and for an arm
+    whose orientations are no pitches.
     """
+    if not isinstance(arc, ToolArc) or not isinstance(branch, Branch):
+        raise InputError(
+            "`roomiest` chooses the pitch of a five-axis arm, and this one has "
+            f"{chain.n} axes. Give the orientation, or leave it out to keep it."
+        )
     grid = np.array(
         list(product(np.linspace(-math.pi, math.pi, MEANS, endpoint=False), SWINGS, SWINGS))
     )
@@ -69,11 +75,11 @@ def _rooms(chain: Chain, branch: Branch, arc: ToolArc, swings: FloatArray) -> Fl
     """
     arm = arm_of(chain)
     sigma = np.linspace(0.0, 1.0, ARC_SAMPLES + 1)
-    x, y, z, _, roll = arc.at(Jet.constant(sigma))
+    tool = arc.at(Jet.constant(sigma))
     t = arc.angle * sigma
     pitch = swings @ np.stack((np.ones_like(t), np.sin(t), np.cos(t)))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        alpha = posture(arm, branch, x, y, z, Jet.constant(pitch), roll)
+        alpha = posture(arm, branch, *tool[:3], Jet.constant(pitch), tool.roll)
     room = np.full(len(swings), np.inf)
     for axis in range(4):
         q = (alpha[axis].c0 - arm.shifts[axis]) * arm.signs[axis]

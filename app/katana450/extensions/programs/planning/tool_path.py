@@ -12,7 +12,7 @@ from katana450 import tolerances
 from katana450.arm.control.messages import axis_names
 from katana450.caching import cached_property
 from katana450.errors import PathError
-from katana450.extensions.programs.planning.curves import Curve, ToolCoordinates
+from katana450.extensions.programs.planning.curves import Curve
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
@@ -20,7 +20,6 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import nearest_posture
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Coefficient, Jet
 from katana450.maths.planning.path import CurvePath
 from katana450.maths.planning.posture import FiveJets, posture
@@ -84,7 +83,7 @@ class ToolPath(CurvePath):
     def joints(self, sigma: Jet) -> FiveJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         arm = arm_of(self.chain)
-        alpha = posture(arm, self.branch, *self.curve.at(sigma))
+        alpha = posture(arm, self.branch, *self.curve.at(sigma)[:5])
         found = []
         for axis, (angle, sign, shift) in enumerate(zip(alpha, arm.signs, arm.shifts, strict=True)):
             q = sign * (angle - shift) if sign != 1.0 or shift else angle
@@ -136,15 +135,10 @@ class ToolPath(CurvePath):
         """Return angles and rates (N, 5) in any turn; values out of reach are not finite."""
         arm = arm_of(self.chain)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma)))
+            alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma))[:5])
             q = np.stack([np.broadcast_to(each.c0, sigma.shape) for each in alpha], axis=1)
             qd = np.stack([np.broadcast_to(each.c1, sigma.shape) for each in alpha], axis=1)
         return (q - arm.shifts) * arm.signs, qd * arm.signs
-
-    def _target(self, sigma: float) -> ToolTarget:
-        """Return the tool target at `sigma`."""
-        tool = ToolCoordinates(*(float(each.c0) for each in self.curve.at(Jet.variable(sigma))))  # type: ignore[arg-type]
-        return ToolTarget(np.array(tool[:3]), float(tool.pitch), float(tool.roll))  # type: ignore[arg-type]
 
     def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
         """Raise InputError for a path that leaves the reach at or before the place `bad`."""
@@ -153,7 +147,7 @@ class ToolPath(CurvePath):
             middle = 0.5 * (good + failing)
             _, qd = self._unwound(np.array([middle]))
             good, failing = (middle, failing) if np.isfinite(qd).all() else (good, middle)
-        target = self._target(failing)
+        target = self.curve.at(Jet.variable(failing)).target
         limited = LimitedArm.of(self.chain, within_limits=False)
         canonical = target.canonical(limited.arm, Priority.PITCH)
         best = nearest_posture(limited, canonical, self.branch, limited.arm.angles(self.near))
@@ -183,7 +177,7 @@ class ToolPath(CurvePath):
                 f"Axis {axis + 1} would have to leap or turn back at once {at_place(sigma)}. "
                 "Links come in line there, or the tool passes over axis 1. Lead the path around "
                 "that place.",
-                self._target(sigma).position.tolist(),
+                self.curve.at(Jet.variable(sigma)).target.position.tolist(),
             )
 
     def _refuse_limits(self, q: FloatArray, qd: FloatArray) -> None:
@@ -194,7 +188,7 @@ class ToolPath(CurvePath):
         refusal = limit_refusal(self.chain, self._sigma, q, qd)
         if refusal is not None:
             sigma, why = refusal
-            point = self._target(sigma).position.tolist()
+            point = self.curve.at(Jet.variable(sigma)).target.position.tolist()
             raise PathError(f"{why} Shift the path, or give it another pitch or roll.", point)
 
 

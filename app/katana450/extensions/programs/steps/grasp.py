@@ -23,6 +23,7 @@ from katana450.extensions.programs.building.plan_builder import GraspInfo, PlanB
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
 from katana450.extensions.programs.planning.approach import ABOVE, DOWN, FRONT, LOW, Approach
+from katana450.extensions.programs.planning.curves import line_between
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -232,7 +233,7 @@ class Grasp(Step, word="grasp"):
         start = builder.first(APPROACHES, start_at)
         builder.move_to(start, f"grasp {self.name}: approach")
         goal = hand.before(point, approach, distance)
-        builder.lead([builder.planning.line(builder.target, goal)], f"grasp {self.name}")
+        builder.lead([line_between(builder.target, goal)], f"grasp {self.name}")
         # With more than six axes, the pose alone is given.
         if not hand.is_redundant and float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")

@@ -22,6 +22,7 @@ from katana450.extensions.programs.language.declaration import Declared
 from katana450.extensions.programs.language.kinds import NAME, Object, ObjectName
 from katana450.extensions.programs.language.places import SPOT, Spot
 from katana450.extensions.programs.planning.approach import UP
+from katana450.extensions.programs.planning.curves import line_between
 from katana450.extensions.programs.steps.grasp import Grasp
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
@@ -117,7 +118,7 @@ class SetDown(Step, word="set_down"):
         above = at.moved(at.position * (1, 1, 0) + builder.target.position * UP)
         carry(builder, above, "back")
         low = at.moved(at.position + RELEASE_HEIGHT * UP)
-        builder.lead([builder.planning.line(above, low)], "set down")
+        builder.lead([line_between(above, low)], "set down")
         let_go(builder)
 
 
@@ -183,7 +184,7 @@ def let_go(builder: PlanBuilder) -> None:
 
     def draw_back(away: float) -> None:
         end = hand.retreat(q, away)
-        builder.lead([builder.planning.line(at, end)], "draw back")
+        builder.lead([line_between(at, end)], "draw back")
 
     try:
         builder.first(APPROACHES, draw_back)
@@ -207,7 +208,7 @@ def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
             carry(builder, above, f"{name}: carry")
         else:
             builder.move_to(builder.joints_of(above), f"{name}: carry")
-        builder.lead([builder.planning.line(builder.target, low)], f"{name}: lower")
+        builder.lead([line_between(builder.target, low)], f"{name}: lower")
         let_go(builder)
 
     try:
@@ -239,7 +240,7 @@ class Pick(Grasp, word="pick"):
 
         def lift(height: float) -> None:
             raised = at.moved(at.position + height * UP)
-            builder.lead([builder.planning.line(at, raised)], f"lift {self.name}")
+            builder.lead([line_between(at, raised)], f"lift {self.name}")
 
         try:
             builder.first(LIFTS, lift)

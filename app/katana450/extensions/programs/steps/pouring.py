@@ -25,13 +25,13 @@ from katana450.extensions.programs.language.expression import PLAIN
 from katana450.extensions.programs.language.kinds import NAME, ObjectName, number, whole
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import YamlValue
+from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.pour_tilt import (
     RatedTilt,
     RatePlan,
     film_after,
     tilt_for,
 )
-from katana450.extensions.programs.planning.tool_planning import AnyCurve
 from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
 
@@ -290,7 +290,7 @@ class Pour(Step, word="pour"):
         builder.note("full speed", SetSpeed(1.0), builder.state)
 
     def _pour_at_rate(
-        self, builder: PlanBuilder, duration: float, start: AnyCurve, turn: AnyCurve, end: AnyCurve
+        self, builder: PlanBuilder, duration: float, start: Curve, turn: Curve, end: Curve
     ) -> None:
         """Append ``start``, ``turn`` in ``duration`` [s], and ``end`` if all is poured."""
         builder.lead([start], POURING)

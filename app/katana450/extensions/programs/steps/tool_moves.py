@@ -40,7 +40,13 @@ from katana450.extensions.programs.language.places import (
     Pose,
 )
 from katana450.extensions.programs.language.step_target import KEPT, Angles, StepTarget
-from katana450.extensions.programs.planning.tool_planning import AnyCurve
+from katana450.extensions.programs.planning.curves import (
+    Curve,
+    ToolLines,
+    arc_between,
+    line_between,
+)
+from katana450.extensions.programs.planning.roomiest_pitch import roomiest
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import ToolTarget
@@ -96,7 +102,7 @@ class Line(Step, word="line"):
         if self.by is not None:
             offset = builder.direction(self.by, in_base=self.in_base)
             end = end.moved(frozen(start.position + offset))
-        line = builder.planning.line(start, end)
+        line = line_between(start, end)
         try:
             builder.lead([line], "line", self.feed)
         except InputError as error:
@@ -134,9 +140,9 @@ class Lines(Step, word="lines"):
                 raise InputError(f"Place {place_number}: {builder.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
-            curves = [planning.lines(vias, blend)]
+            curves: list[Curve] = [ToolLines(tuple(vias), blend)]
         else:
-            curves = [planning.line(a, b) for a, b in pairwise(vias)]
+            curves = [line_between(a, b) for a, b in pairwise(vias)]
         builder.lead(curves, "lines", self.feed)
 
 
@@ -178,14 +184,14 @@ class _Turn(Step):
         return builder.target_at(StepTarget(angles=angles, in_base=self.in_base))
 
     def follow(
-        self, builder: PlanBuilder, arc: AnyCurve, name: str, branch: AnyBranch | None = None
+        self, builder: PlanBuilder, arc: Curve, name: str, branch: AnyBranch | None = None
     ) -> None:
         """Move to the start of ``arc`` if the arm is not there, then along it."""
         planning = builder.planning
 
         def path(tried: AnyBranch) -> Path:
-            found = planning.roomiest(arc, tried) if self.is_roomiest else arc
-            return planning.path(builder.q, found, tried)
+            curve = roomiest(planning.chain, tried, arc) if self.is_roomiest else arc
+            return planning.path(builder.q, curve, tried)
 
         tool_path = builder.first(builder.branches(branch), path)
         builder.move_to(tool_path.start, f"{name}: to its start")
@@ -194,7 +200,7 @@ class _Turn(Step):
     def follow_or_advise(
         self,
         builder: PlanBuilder,
-        arc: Callable[[ToolTarget, float], AnyCurve],
+        arc: Callable[[ToolTarget, float], Curve],
         end: ToolTarget,
         size: tuple[str, float],
         branch: AnyBranch | None = None,
@@ -237,11 +243,10 @@ class Arc(_Turn, word="arc"):
         """Plan the arc. Raises InputError if the tool cannot follow it."""
         start, end = builder.target, self.turned(builder)
         centre, axis = self.seen(builder)
-        arc_of = builder.planning.arc
 
-        def arc(end: ToolTarget, fraction: float) -> AnyCurve:
+        def arc(end: ToolTarget, fraction: float) -> Curve:
             angle, climb = fraction * self.angle, fraction * self.climb
-            return arc_of(centre, axis, angle, climb, start, end)
+            return arc_between(centre, axis, angle, climb, start, end)
 
         self.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
 
@@ -275,12 +280,12 @@ class Circle(_Turn, word="circle"):
             # A level circle has no highest point: start at the point farthest in front.
             ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
-        turn, arc_of = math.tau * self.turns, builder.planning.arc
+        turn = math.tau * self.turns
 
-        def arc(end: ToolTarget, fraction: float) -> AnyCurve:
+        def arc(end: ToolTarget, fraction: float) -> Curve:
             start = centre + fraction * self.radius / math.hypot(*out) * out
             there = end.moved(frozen(start))
-            return arc_of(centre, normal, turn, 0.0, there, there)
+            return arc_between(centre, normal, turn, 0.0, there, there)
 
         size = "radius", 1e3 * self.radius
         self.follow_or_advise(builder, arc, self.turned(builder), size, self.branch)
