@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import re
+from collections.abc import Mapping
 from typing import Any, Union
 
 import msgspec
@@ -124,11 +125,9 @@ def openapi_json(kinds: tuple[type[Request], ...], served: frozenset[str] | None
         **{path: {"get": _question(path, kind)} for path, kind in READABLE.items()},
         "stop": {"post": _stop()},
         "do": {"post": _do(request, answer)},
-        "mesh": {"post": _mesh()},
-        "scene": {"get": _scene_download(), "post": _scene_upload()},
+        **_files(),
         **_scripts(),
         **_recordings(),
-        **_documents(),
     }
     names = None if served is None else {_first(path.removeprefix(ROOT)) for path in served}
     document = {
@@ -166,161 +165,168 @@ def _first(path: str) -> str:
     return path.strip("/").partition("/")[0].partition("{")[0]
 
 
-def _question(path: str, kind: type) -> dict[str, Any]:
-    return {
-        "operationId": f"get_{path}",
-        "summary": summary(kind),
-        "responses": {
-            "200": _response("The present value.", kind),
-            "409": _response("There is no such value.", answers.Refused),
-            **COMMON_RESPONSES,
-            **NOT_READY,
-        },
+def _operation(
+    name: str,
+    about: str,
+    done: Mapping[str, Any],
+    refusals: Mapping[int, str | dict[str, Any]] | None = None,
+    **more: Any,
+) -> dict[str, Any]:
+    """Describe one operation.
+
+    Args:
+        name: its name in generated clients.
+        about: one line of text.
+        done: the response of success, of status 204 if it has no content.
+        refusals: the other responses by their status, or what such an ``answers.Refused`` means,
+            beside those of every path.
+        more: further fields, such as its parameters.
+    """
+    responses = {
+        status: _response(meaning, answers.Refused) if isinstance(meaning, str) else meaning
+        for status, meaning in (COMMON_REFUSALS | dict(refusals or {})).items()
     }
+    responses[200 if "content" in done else 204] = dict(done)
+    by_text = {str(status): responses[status] for status in sorted(responses)}
+    return {"operationId": name, "summary": about, "responses": by_text, **more}
+
+
+COMMON_REFUSALS: Mapping[int, str | dict[str, Any]] = {
+    401: "A token is required.",
+    403: "The sender may not do this.",
+    429: "Too many requests, or too costly ones. `Retry-After` says when.",
+}
+"""Refusals of every path but the documents."""
+
+NOT_READY = {503: "The arm is not ready yet."}
+
+NO_VALUE = {409: "There is no such value.", **NOT_READY}
+
+NOT_NOW = {409: "The request is refused at present."}
+
+UNREADABLE = {422: "The file cannot be read.", 413: "The file is too large.", **NOT_READY}
+
+
+def _question(path: str, kind: type) -> dict[str, Any]:
+    done = _response("The present value.", kind)
+    return _operation(f"get_{path}", summary(kind), done, NO_VALUE)
 
 
 def _stop() -> dict[str, Any]:
-    return {
-        "operationId": "stop",
-        "summary": summary(requests.Stop),
-        "parameters": [
-            _query(
-                "press",
-                "Name of this press. The same name again does not count again.",
-                maxLength=MAX_PRESS_LENGTH,
-            )
-        ],
-        "responses": {"204": {"description": "The stop is requested."}, **COMMON_RESPONSES},
-    }
+    about = "Name of this press. The same name again does not count again."
+    press = _query("press", about, maxLength=MAX_PRESS_LENGTH)
+    done = {"description": "The stop is requested."}
+    return _operation("stop", summary(requests.Stop), done, parameters=[press])
 
 
 def _do(request: Any, answer: Any) -> dict[str, Any]:
     """Describe the path of single requests, by the schemas of requests and answers."""
-    return {
-        "operationId": "do",
-        "summary": "Execute one request.",
-        "description": "A request with `wait` is answered when its motion has ended; the open "
-        "connection then counts as the heartbeat. After any other motion request the program sends "
-        "ten requests a second until the arm rests, or the arm stops or pauses.",
-        "parameters": [
-            {
-                "name": "X-Program",
-                "in": "header",
-                "required": True,
-                "schema": {"type": "string", "pattern": "^[A-Za-z0-9_-]{16,64}$"},
-                "description": "A secret key that identifies the program; others never see it.",
-            },
-            {
-                "name": "X-Name",
-                "in": "header",
-                "schema": {"type": "string", "maxLength": 40},
-                "description": "The name of the program that others see.",
-            },
-        ],
-        "requestBody": {"required": True, "content": {"application/json": {"schema": request}}},
-        "responses": {
-            "200": _json_response("The request is done, or its answer.", answer),
-            "409": _json_response(
+    key = _parameter(
+        "X-Program", "A secret key that identifies the program; others never see it.", "header"
+    )
+    key |= {"required": True}
+    key["schema"]["pattern"] = "^[A-Za-z0-9_-]{16,64}$"
+    name = _parameter("X-Name", "The name of the program that others see.", "header", maxLength=40)
+    return _operation(
+        "do",
+        "Execute one request.",
+        _json_response("The request is done, or its answer.", answer),
+        {
+            409: _json_response(
                 "The request is refused at present, or its motion did not reach its end.",
                 {"anyOf": [_reference(answers.Refused), _reference(answers.Done)]},
             ),
-            "422": _response("The request is invalid.", answers.Refused),
-            "408": _response("The body was not received in time.", answers.Refused),
-            "413": _response("The body is too large.", answers.Refused),
-            **COMMON_RESPONSES,
+            422: "The request is invalid.",
+            408: "The body was not received in time.",
+            413: "The body is too large.",
         },
-    }
+        description="A request with `wait` is answered when its motion has ended; the open "
+        "connection then counts as the heartbeat. After any other motion request the program sends "
+        "ten requests a second until the arm rests, or the arm stops or pauses.",
+        parameters=[key, name],
+        requestBody=_body("application/json", request),
+    )
 
 
-def _mesh() -> dict[str, Any]:
+def _files() -> dict[str, Any]:
+    """Describe the paths of meshes and scenes, by path."""
+    parameters = [
+        _query("name", "The file's name, with its ending.") | {"required": True},
+        _query(
+            "format",
+            "wrl, stl, obj, ply, off, glb, gltf, dae, 3mf or zip, for a name "
+            "without an ending. A zip holds one such file and the files that it names.",
+        ),
+        _query("main", "Path in a zip of the file to read, if there are several."),
+        _query("unit", "mm, cm, in or m. Without it the unit is guessed and reported."),
+    ]
+    binary = {"type": "string", "format": "binary"}
     return {
-        "operationId": "upload_mesh",
-        "summary": "Upload a mesh, which `place` then uses by its key.",
-        "parameters": [
-            _query("name", "The file's name, with its ending.", required=True),
-            _query(
-                "format",
-                "wrl, stl, obj, ply, off, glb, gltf, dae, 3mf or zip, for a name "
-                "without an ending. A zip holds one such file and the files that it names.",
+        "mesh": {
+            "post": _operation(
+                "upload_mesh",
+                "Upload a mesh, which `place` then uses by its key.",
+                _response("The file is kept.", answers.Mesh),
+                UNREADABLE,
+                parameters=parameters,
+                requestBody=_body("application/octet-stream", binary),
+            )
+        },
+        "scene": {
+            "get": _operation(
+                "download_scene",
+                "Download the scene as a .zip of scene.yaml and its meshes.",
+                _content("The present scene.", "application/zip"),
+                NOT_NOW,
             ),
-            _query("main", "Path in a zip of the file to read, if there are several."),
-            _query("unit", "mm, cm, in or m. Without it the unit is guessed and reported."),
-        ],
-        **_upload("application/octet-stream", answers.Mesh),
-    }
-
-
-def _scene_upload() -> dict[str, Any]:
-    return {
-        "operationId": "upload_scene",
-        "summary": "Upload a scene, which `load` then uses by its key.",
-        **_upload("application/zip", answers.Scene),
-    }
-
-
-def _scene_download() -> dict[str, Any]:
-    return {
-        "operationId": "download_scene",
-        "summary": "Download the scene as a .zip of scene.yaml and its meshes.",
-        "responses": {
-            "200": _content("The present scene.", "application/zip"),
-            "409": _response("The request is refused at present.", answers.Refused),
-            **COMMON_RESPONSES,
+            "post": _operation(
+                "upload_scene",
+                "Upload a scene, which `load` then uses by its key.",
+                _response("The file is kept.", answers.Scene),
+                UNREADABLE,
+                requestBody=_body("application/zip", binary),
+            ),
         },
     }
 
 
 def _scripts() -> dict[str, Any]:
     """Describe the paths of scripts, by path."""
-    name = {"name": "name", "in": "path", "required": True, "schema": {"type": "string"}}
-    text = {"required": True, "content": {"text/plain": {"schema": {"type": "string"}}}}
+    name = _parameter("name", "", "path")
+    text = _body("text/plain", {"type": "string"})
+    names = _json_response("The names, and whether texts can be saved.", _OBJECT)
+    problems = _json_response("The problems, and the taught poses.", _OBJECT)
     return {
         "scripts": {
-            "get": {
-                "operationId": "list_scripts",
-                "summary": "List the names of the scripts.",
-                "responses": {
-                    "200": _json_response("The names, and whether texts can be saved.", _OBJECT),
-                    **COMMON_RESPONSES,
-                },
-            },
-            "post": {
-                "operationId": "check_script",
-                "summary": "List the problems of a script by line. Nothing is planned.",
-                "requestBody": text,
-                "responses": {
-                    "200": _json_response("The problems, and the taught poses.", _OBJECT),
-                    **COMMON_RESPONSES,
-                },
-            },
+            "get": _operation("list_scripts", "List the names of the scripts.", names),
+            "post": _operation(
+                "check_script",
+                "List the problems of a script by line. Nothing is planned.",
+                problems,
+                requestBody=text,
+            ),
         },
         "scripts/{name}": {
-            "get": {
-                "operationId": "get_script",
-                "summary": "Return the text of a script.",
-                "parameters": [name],
-                "responses": {
-                    "200": _content("The text.", "text/plain"),
-                    "404": _response("There is no script of this name.", answers.Refused),
-                    **COMMON_RESPONSES,
-                },
-            },
-            "post": {
-                "operationId": "save_script",
-                "summary": "Save a valid script under a new name in the folder of `--programs`.",
-                "parameters": [name],
-                "requestBody": text,
-                "responses": {
-                    "204": {"description": "The script is saved."},
-                    "409": _response("It cannot be saved, and why.", answers.Refused),
-                    "422": _response("It is not a valid script, and why.", answers.Refused),
-                    **COMMON_RESPONSES,
-                },
-            },
+            "get": _operation(
+                "get_script",
+                "Return the text of a script.",
+                _content("The text.", "text/plain"),
+                {404: "There is no script of this name."},
+                parameters=[name],
+            ),
+            "post": _operation(
+                "save_script",
+                "Save a valid script under a new name in the folder of `--programs`.",
+                {"description": "The script is saved."},
+                {409: "It cannot be saved, and why.", 422: "It is not a valid script, and why."},
+                parameters=[name],
+                requestBody=text,
+            ),
         },
         "script.schema.json": _document(
             "get_script_schema", "Return the JSON Schema of scripts.", "application/schema+json"
         ),
+        "openapi.json": _document("get_openapi", "Return this document.", "application/json"),
     }
 
 
@@ -331,69 +337,49 @@ def _recordings() -> dict[str, Any]:
         _query("from", "Begin [s since the epoch].", type="number"),
         _query("to", "End [s since the epoch].", type="number"),
     ]
-    number = {"name": "number", "in": "path", "required": True, "schema": {"type": "integer"}}
-    json = {"required": True, "content": {"application/json": {"schema": _OBJECT}}}
-    common = {
-        "404": _response("There is no such recording here.", answers.Refused),
-        **COMMON_RESPONSES,
-    }
-    responses = {"409": _response("Nothing was recorded, and why.", answers.Refused), **common}
+    number = _parameter("number", "", "path", type="integer")
+    file = _content("An MCAP file.", "application/octet-stream")
+    none = {404: "There is no such recording here."}
+    empty = {409: "Nothing was recorded, and why.", **none}
     return {
         "recording": {
-            "get": {
-                "operationId": "download_recording",
-                "summary": "Download what was recorded, at most ten minutes of motion.",
-                "parameters": times,
-                "responses": {
-                    "200": _content("An MCAP file.", "application/octet-stream"),
-                    **responses,
-                },
-            }
+            "get": _operation(
+                "download_recording",
+                "Download what was recorded, at most ten minutes of motion.",
+                file,
+                empty,
+                parameters=times,
+            )
         },
         "recording/script": {
-            "get": {
-                "operationId": "download_recording_script",
-                "summary": "Download a script that runs the recorded motion again.",
-                "parameters": times,
-                "responses": {"200": _content("The script.", "application/yaml"), **responses},
-            }
+            "get": _operation(
+                "download_recording_script",
+                "Download a script that runs the recorded motion again.",
+                _content("The script.", "application/yaml"),
+                empty,
+                parameters=times,
+            )
         },
         "episodes": {
-            "get": {
-                "operationId": "list_episodes",
-                "summary": "List the episodes, and the one that runs.",
-                "responses": {"200": _json_response("The lists.", _OBJECT), **common},
-            },
-            "post": {
-                "operationId": "change_episodes",
-                "summary": "Start, end, judge or change an episode.",
-                "requestBody": json,
-                "responses": {
-                    "200": _json_response("The episode.", _OBJECT),
-                    "409": _response("The request is refused at present.", answers.Refused),
-                    "422": _response("The request is invalid.", answers.Refused),
-                    **common,
-                },
-            },
+            "get": _operation(
+                "list_episodes",
+                "List the episodes, and the one that runs.",
+                _json_response("The lists.", _OBJECT),
+                none,
+            ),
+            "post": _operation(
+                "change_episodes",
+                "Start, end, judge or change an episode.",
+                _json_response("The episode.", _OBJECT),
+                {422: "The request is invalid.", **NOT_NOW, **none},
+                requestBody=_body("application/json", _OBJECT),
+            ),
         },
         "episodes/{number}": {
-            "get": {
-                "operationId": "download_episode",
-                "summary": "Download an episode.",
-                "parameters": [number],
-                "responses": {
-                    "200": _content("An MCAP file.", "application/octet-stream"),
-                    **common,
-                },
-            }
+            "get": _operation(
+                "download_episode", "Download an episode.", file, none, parameters=[number]
+            )
         },
-    }
-
-
-def _documents() -> dict[str, Any]:
-    """Describe the paths of the documents about the API, by path."""
-    return {
-        "openapi.json": _document("get_openapi", "Return this document.", "application/json"),
     }
 
 
@@ -402,24 +388,11 @@ def _document(operation: str, about: str, media: str) -> dict[str, Any]:
     return {"get": {"operationId": operation, "summary": about, "responses": responses}}
 
 
-def _upload(media: str, answer: type) -> dict[str, Any]:
-    """Describe an upload of type ``media`` that is answered with ``kept``."""
-    return {
-        "requestBody": {
-            "required": True,
-            "content": {media: {"schema": {"type": "string", "format": "binary"}}},
-        },
-        "responses": {
-            "200": _response("The file is kept.", answer),
-            "422": _response("The file cannot be read.", answers.Refused),
-            "413": _response("The file is too large.", answers.Refused),
-            **COMMON_RESPONSES,
-            **NOT_READY,
-        },
-    }
-
-
 _OBJECT = {"type": "object"}
+
+
+def _body(media: str, schema: Any) -> dict[str, Any]:
+    return {"required": True, "content": {media: {"schema": schema}}}
 
 
 def _reference(kind: type) -> dict[str, str]:
@@ -439,28 +412,16 @@ def _content(description: str, media: str) -> dict[str, Any]:
     return {"description": description, "content": {media: {"schema": {"type": "string"}}}}
 
 
-def _query(
-    name: str, description: str, *, required: bool = False, type: str = "string", **schema: Any
-) -> dict[str, Any]:
-    return {
-        "name": name,
-        "in": "query",
-        "required": required,
-        "schema": {"type": type, **schema},
-        "description": description,
-    }
+def _query(name: str, about: str, **schema: Any) -> dict[str, Any]:
+    return _parameter(name, about, "query", **schema)
 
 
-COMMON_RESPONSES = {
-    "401": _response("A token is required.", answers.Refused),
-    "403": _response("The sender may not do this.", answers.Refused),
-    "429": _response(
-        "Too many requests, or too costly ones. `Retry-After` says when.", answers.Refused
-    ),
-}
-"""Responses of every path but the documents."""
-
-NOT_READY = {"503": _response("The arm is not ready yet.", answers.Refused)}
+def _parameter(name: str, about: str, place: str, **schema: Any) -> dict[str, Any]:
+    """Describe a parameter at ``place``: in the path, the query or the header."""
+    described = {"description": about} if about else {}
+    required = {"required": place == "path"} if place != "header" else {}
+    schema = {"type": "string", **schema}
+    return {"name": name, "in": place, "schema": schema, **required, **described}
 
 
 def description_routes(context: RouteContext) -> list[BaseRoute]:
