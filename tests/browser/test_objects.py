@@ -179,10 +179,10 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     assert "assumed to be mm" in shown(page)
     np.testing.assert_allclose(place_of(reader, "ring"), (0.36, 0.0, 0.0), atol=1e-6)
 
-    # Its handle in the scene, by the box of the panel.
+    # Its handle in the scene, by a click on it.
     handle = "/handles/ring"
     page.open_tab("Scene")
-    page.frame.get_by_text("Handles on objects", exact=True).click()
+    page.page.mouse.click(*page.project(np.add(place_of(reader, "ring"), (0.0, 0.04, 0.024))))
     page.wait_ready((handle,))
     assert page.chosen("Object") == "ring"
     page.drag_arrow(handle, "y", 0.12)
@@ -198,7 +198,6 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     page.page.select_option("#unit", "")
     clear_refusals(page)
     page.keep(artefacts / "app-objects.png")
-    page.frame.get_by_text("Handles on objects", exact=True).click()
     page.frame.get_by_role("button", name="Remove", exact=True).scroll_into_view_if_needed()
     page.click_button("Remove")
     page.wait_until(lambda: objects(reader).keys() == before, "it to go")
@@ -236,17 +235,6 @@ def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
         lambda: np.allclose(place_of(reader, "cup"), start, atol=1e-9), "the cup to return"
     )
     page.page.get_by_role("button", name="Deselect").click()
-    page.wait_until(lambda: not page.shows(arrows), "no arrows")
-    # The box of the panel shows those of all objects, and keeps them when none is selected.
-    page.open_tab("Scene")
-    page.frame.get_by_text("Handles on objects", exact=True).click()
-    other.wait_until(lambda: other.shows(arrows), "the arrows of all")
-    page.page.mouse.click(*pixel_of(page, reader, "cup"))
-    page.page.wait_for_selector("#selection:not([hidden])")
-    page.page.get_by_role("button", name="Deselect").click()
-    page.page.wait_for_timeout(200)
-    assert page.shows(arrows)
-    page.frame.get_by_text("Handles on objects", exact=True).click()
     page.wait_until(lambda: not page.shows(arrows), "no arrows")
 
 

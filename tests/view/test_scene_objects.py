@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -172,22 +171,6 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     assert len(put) == 2
     assert "nothing carries it there" in shown[0]
     assert tuple(nodes._handles["cup"].position) == (0.74, 0.1, 0.0)
-
-
-def test_handles_are_shown_while_an_object_is_added() -> None:
-    nodes = ObjectHandles(Mock(), Mock(), RecordedGestures())
-
-    class Handle:
-        """A handle during whose change another thread adds one."""
-
-        @property
-        def visible(self) -> bool:
-            nodes._handles.setdefault("ball", Mock())
-            return False
-
-    nodes._handles["cup"] = Handle()  # type: ignore[assignment]
-    nodes.show(False)
-    assert set(nodes._handles) == {"cup", "ball"}
 
 
 def test_panel_shows_the_chosen_object(

@@ -19,7 +19,7 @@ from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.extensions.objects.handles import HANDLES, ObjectHandles
+from katana450.extensions.objects.handles import ObjectHandles
 from katana450.server.view.controls import GestureGate, Listen, ends, listener, set_slider
 from katana450.server.view.display_options import LogProblem
 from katana450.server.view.paint import PaintNodes, Tint
@@ -81,9 +81,6 @@ class MachinePanel:
             gui.add_html(style())
         self._folders = tuple(folders(tabs))
         with tabs.tab(SCENE):
-            self.handles = gui.add_checkbox(
-                HANDLES, initial_value=False, hint="Arrows that move objects on the table"
-            )
             self._problem = LogProblem(gui, gestures)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
@@ -196,7 +193,6 @@ class MachineView(ViewUpdater):
         state, gui = self._state_publisher.snapshot.state, self._server.gui
         with self._server.atomic():
             self._panel = MachinePanel(gui, self._robot, self._gestures, state, folders)
-        self._panel.handles.on_update(lambda _: self._handles.show(self._panel.handles.value))
 
     def show(self, snapshot: Snapshot) -> None:
         """Send the changes in ``snapshot`` to every browser."""

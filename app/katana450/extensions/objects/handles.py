@@ -21,29 +21,17 @@ from katana450.server.view.scene import node_name
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import place
 
-HANDLES = "Handles on objects"
-"""Label of the checkbox that shows them."""
-
 HANDLE = 0.09
 """Length [m] of a handle's arrows: they end outside cup and basin."""
 
 
 class HandlesLayer(ViewLayer):
-    """The handles as a layer of the scene, hidden until a person shows them."""
+    """The handles as a layer of the scene, hidden; a page shows that of the object it selects."""
 
     def attach(self, context: LayerContext) -> None:
         """Prepare for the objects of a session."""
         environment = context.session.environment
         self._handles = ObjectHandles(context.server, environment, context.gestures)
-
-    def add_controls(self, gui: viser.GuiApi) -> None:
-        """Add the checkbox that shows the handles."""
-        handles = gui.add_checkbox(
-            HANDLES,
-            initial_value=False,
-            hint="Arrows that move cup, basin and other objects on the table",
-        )
-        handles.on_update(lambda _: self._handles.show(handles.value))
 
     def follow(self, state: State) -> None:
         """Move the handles with the objects of ``state``."""
@@ -51,7 +39,7 @@ class HandlesLayer(ViewLayer):
 
 
 class ObjectHandles:
-    """One handle for each scene object. A carried object shows none."""
+    """One hidden handle for each scene object, which a page shows in its own window."""
 
     def __init__(
         self, server: viser.ViserServer, environment: Environment, gestures: GestureGate
@@ -64,17 +52,6 @@ class ObjectHandles:
         self._objects: dict[str, SceneObject] = {}
         self._seen: tuple[SceneObject, ...] = ()
         self._dragged: tuple[str, Actor] | None = None
-        self._shown = False
-
-    def show(self, visible: bool) -> None:
-        """Show or hide the handles."""
-        self._shown = visible
-        # The objects may change meanwhile, because viser calls this in a thread of its own.
-        for name, handle in tuple(self._handles.items()):
-            scene_object = self._objects.get(name)
-            shown = visible and scene_object is not None and not scene_object.carried
-            if handle.visible != shown:
-                handle.visible = shown
 
     def follow(self, state: State) -> None:
         """Move the handles with the objects of ``state``."""
@@ -93,7 +70,6 @@ class ObjectHandles:
             self._handles.pop(name).remove()
         for name in set(self._objects) - set(self._handles):
             self._handles[name] = self._handle(name)
-        self.show(self._shown)
 
     def _handle(self, name: str) -> viser.TransformControlsHandle:
         handle = self._server.scene.add_transform_controls(
