@@ -1,4 +1,4 @@
-"""Compressed glTF files of one square, as the libraries write them."""
+"""glTF files of one square, compressed or with integers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 from typing import Any
 
 import DracoPy
-import meshopt
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray
@@ -54,47 +53,27 @@ def draco(points: FloatArray) -> tuple[dict[str, Any], bytes]:
     }, data
 
 
-def quantized(name: str, count: int = 4) -> tuple[dict[str, Any], bytes]:
-    """Return the document of the square in normalized integers, and its compressed buffer.
-
-    ``name`` is that of the extension. ``count`` is the declared number of vertices.
-    """
+def quantized() -> tuple[dict[str, Any], bytes]:
+    """Return the document of the square in normalized integers, and its buffer."""
     # Rows of a multiple of four bytes, so the fourth number is unused.
     rows = np.zeros((4, 4), "<u2")
     rows[:, :3] = POINTS * 65535
-    vertices = meshopt.encode_gltf_buffer(rows, "ATTRIBUTES")
-    faces = meshopt.encode_gltf_buffer(FACES.ravel().astype("<u4"), "TRIANGLES")
-
-    def view(at: int, length: int, n: int, stride: int, mode: str) -> dict[str, Any]:
-        extension: dict[str, Any] = {"buffer": 0, "byteOffset": at, "byteLength": length}
-        extension |= {"count": n, "byteStride": stride, "mode": mode}
-        return {"buffer": 1, "byteLength": n * stride, "extensions": {name: extension}}
-
+    data = rows.tobytes() + FACES.tobytes()
     return SQUARE | {
-        "extensionsRequired": [name, "KHR_mesh_quantization"],
-        # The second buffer is a fallback that no file holds.
-        "buffers": [
-            {"byteLength": len(vertices + faces)},
-            {"byteLength": 60, "extensions": {name: {"fallback": True}}},
-        ],
+        "extensionsRequired": ["KHR_mesh_quantization"],
+        "buffers": [{"byteLength": len(data)}],
         "bufferViews": [
-            view(0, len(vertices), count, 8, "ATTRIBUTES"),
-            view(len(vertices), len(faces), 6, 2, "TRIANGLES"),
+            {"buffer": 0, "byteLength": 32, "byteStride": 8},
+            {"buffer": 0, "byteOffset": 32, "byteLength": 12},
         ],
         "accessors": [
             SQUARE["accessors"][0] | {"componentType": 5123, "normalized": True},
             SQUARE["accessors"][1],
         ],
-    }, vertices + faces
+    }, data
 
 
 def draco_glb() -> bytes:
     """Return a square compressed by Draco as .glb."""
     document, data = draco(POINTS)
-    return glb(json.dumps(document).encode(), data)
-
-
-def meshopt_glb() -> bytes:
-    """Return a square compressed by meshopt as .glb."""
-    document, data = quantized("EXT_meshopt_compression")
     return glb(json.dumps(document).encode(), data)

@@ -14,7 +14,7 @@ import pytest
 import trimesh
 
 from katana450.extras import PACKAGES
-from tests.exchange.compressed_gltf import draco_glb, meshopt_glb
+from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.test_library_formats import dae, threemf
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -118,14 +118,13 @@ def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
     for kind in ("stl", "obj", "ply", "off", "glb"):
         box.export(tmp_path / f"box.{kind}")
     (tmp_path / "draco.glb").write_bytes(draco_glb())
-    (tmp_path / "meshopt.glb").write_bytes(meshopt_glb())
     (tmp_path / "l.3mf").write_bytes(threemf())
     (tmp_path / "l.dae").write_bytes(dae())
     (tmp_path / "v.wrl").write_text(VRML, encoding="utf-8")
     found = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
     assert found.pop("draco.glb").endswith("dracopy networkx")
     assert found.pop("l.3mf").endswith("dracopy networkx")
-    assert len(found) == 8
+    assert len(found) == 7
     assert all(int(faces) >= 2 for faces in found.values()), found
 
 

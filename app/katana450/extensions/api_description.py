@@ -184,7 +184,7 @@ def _operation(
     """
     responses = {
         status: _response(meaning, answers.Refused) if isinstance(meaning, str) else meaning
-        for status, meaning in (COMMON_REFUSALS | dict(refusals or {})).items()
+        for status, meaning in {**COMMON_REFUSALS, **(refusals or {})}.items()
     }
     responses[200 if "content" in done else 204] = dict(done)
     by_text = {str(status): responses[status] for status in sorted(responses)}

@@ -1,8 +1,8 @@
 """The document of a glTF file, in the form of version 2.0, and its numbers.
 
-Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022); KHR_draco_mesh_compression;
-EXT_meshopt_compression. Only the parts that are read are listed, named as in the specification in
-snake case. The libraries that decompress are imported when a file needs them.
+Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022); KHR_draco_mesh_compression. Only
+the parts that are read are listed, named as in the specification in snake case. The library that
+decompresses is imported when a file needs it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import struct
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 from urllib.parse import unquote_to_bytes
 
 import msgspec
@@ -39,25 +39,6 @@ class Buffer(msgspec.Struct, rename="camel"):
     uri: str | None = None
 
 
-class MeshoptView(msgspec.Struct, rename="camel"):
-    """The compressed numbers of a buffer view (EXT_meshopt_compression)."""
-
-    buffer: Natural
-    byte_length: Natural
-    byte_stride: Annotated[int, msgspec.Meta(ge=2, le=256)]
-    count: Natural
-    mode: Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
-    byte_offset: Natural = 0
-    filter: Literal["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"] = "NONE"
-
-
-class ViewExtensions(msgspec.Struct):
-    """The extensions of a buffer view that are read. Both names stand for the same format."""
-
-    ext: MeshoptView | None = msgspec.field(default=None, name="EXT_meshopt_compression")
-    khr: MeshoptView | None = msgspec.field(default=None, name="KHR_meshopt_compression")
-
-
 class BufferView(msgspec.Struct, rename="camel"):
     """A part of a buffer."""
 
@@ -65,7 +46,6 @@ class BufferView(msgspec.Struct, rename="camel"):
     byte_length: Natural
     byte_offset: Natural = 0
     byte_stride: Annotated[int, msgspec.Meta(ge=1, le=252)] | None = None
-    extensions: ViewExtensions = msgspec.field(default_factory=ViewExtensions)
 
 
 class SparsePlaces(msgspec.Struct, rename="camel"):
@@ -253,9 +233,6 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 MAX_ROWS = 600_000
 """Maximum number of rows of an accessor that no buffer holds."""
 
-MAX_VIEW_BYTES = 64_000_000
-"""[bytes] Maximum size of a buffer view after decompression."""
-
 
 class Buffers:
     """The numbers of a decoded file. A buffer is read when it is needed."""
@@ -340,9 +317,7 @@ class Buffers:
         data = self._view(number)
         size = np.dtype(kind).itemsize
         item = size * columns
-        view = self._document.buffer_views[number]
-        packed = view.extensions.ext or view.extensions.khr
-        stride = (view.byte_stride if packed is None else packed.byte_stride) or item
+        stride = self._document.buffer_views[number].byte_stride or item
         if count == 0:
             return np.zeros((0, columns), kind)
         if stride < item or offset + stride * (count - 1) + item > len(data):
@@ -353,27 +328,8 @@ class Buffers:
         """Return the bytes of a buffer view."""
         if number not in self._views:
             view = self._document.buffer_views[number]
-            packed = view.extensions.ext or view.extensions.khr
-            if packed is not None:
-                self._views[number] = self._unpacked(packed)
-            else:
-                self._views[number] = self._bytes(view.buffer, view.byte_offset, view.byte_length)
+            self._views[number] = self._bytes(view.buffer, view.byte_offset, view.byte_length)
         return self._views[number]
-
-    def _unpacked(self, view: MeshoptView) -> bytes:
-        data = self._bytes(view.buffer, view.byte_offset, view.byte_length)
-        if view.count * view.byte_stride > MAX_VIEW_BYTES:
-            raise InputError(
-                f"{self._name} has over {MAX_VIEW_BYTES // 1_000_000} MB in one part when "
-                "unpacked. Save it with fewer triangles."
-            )
-        with failures_in_words(self._name):
-            import meshopt
-
-            found: npt.NDArray[Any] = meshopt.decode_gltf_buffer(
-                data, view.count, view.byte_stride, view.mode, view.filter
-            )
-            return found.tobytes()
 
     def _bytes(self, number: int, offset: int, length: int) -> bytes:
         data = self._buffer(number)

@@ -32,13 +32,11 @@ from katana450.extensions.importers.surface import (
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.srgb import to_srgb
 
-READ_EXTENSIONS = (
-    "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression",
-    "KHR_meshopt_compression",
-    "KHR_mesh_quantization",
-)
+READ_EXTENSIONS = ("KHR_draco_mesh_compression", "KHR_mesh_quantization")
 """Required extensions that are read."""
+
+MESHOPT = "_meshopt_compression"
+"""End of the names of extensions with which a file is refused."""
 
 NO_SURFACE = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture", "KHR_techniques_")
 """Prefixes of required extensions that change no surface, and are not reported."""
@@ -51,6 +49,11 @@ NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 def read_gltf(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
     """Return all triangles of the scene in metres, y up. Raises InputError for an invalid file."""
     document, binary = decoded(data, name)
+    if any(extension.endswith(MESHOPT) for extension in document.extensions_required):
+        raise InputError(
+            f"{name} is compressed with meshopt, which is not read. Save it without compression, "
+            "or with Draco."
+        )
     try:
         buffers = Buffers(document, binary, companions or Companions(), name)
         return _File(document, buffers, name).reading()
