@@ -290,7 +290,7 @@ def test_unresponsive_flooder_is_disconnected() -> None:
 
 
 def test_reserved_places_are_free_when_all_others_are_taken() -> None:
-    limit = ConnectionLimit(maximum=4, each=3)
+    limit = ConnectionLimit(maximum=4, own_maximum=3)
     with ExitStack() as stack:
 
         def takes(identity: str, reserved: int = 0) -> bool:

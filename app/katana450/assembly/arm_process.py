@@ -43,22 +43,22 @@ log = logging.getLogger(__name__)
 
 
 def run_arm(
-    config: ServerFacts, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe
+    config: ServerFacts, content: dict[bytes, bytes] | None, supervisor: SupervisorPipe
 ) -> None:
     """Run the arm in this process, from start to end. Raises KatanaError.
 
-    kept: what an earlier process gave to the supervisor; None at the first start.
+    content: what an earlier process gave to the supervisor; None at the first start.
     """
     from katana450.assembly.robot_session import find_robot
     from katana450.assembly.running_arm import RunningArm
 
-    state = None if kept is None else _unpacked(kept)
+    state = None if content is None else _unpacked(content)
     robot, scene = _with_scene(config) if state is None else (None, None)
-    found = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
-    again = kept is not None
+    described = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
+    again = content is not None
     make_driver = partial(_driver, config.options)
     arm = RunningArm(
-        config.settings, found, scene, again=again, kept=state, make_driver=make_driver
+        config.settings, described, scene, again=again, last=state, make_driver=make_driver
     )
     roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
     for tick_sender in () if config.options is None else provided("tick_sender"):
@@ -128,17 +128,17 @@ def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScen
 
 def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
     """Let the supervisor keep each new state for the next process."""
-    seen = None
+    last = None
     while not supervisor.ended.wait(KEEP_INTERVAL):
         snapshot = state_publisher.snapshot
         state = snapshot.state
         sent = True
-        if seen is None or state.objects is not seen.objects:
+        if last is None or state.objects is not last.objects:
             sent = supervisor.keep(SCENE, pickle.dumps(state.objects))
-        if state is not seen:
+        if state is not last:
             sent = supervisor.keep(KEPT, _packed(state)) and sent
-        seen = state if sent else None
-        if seen is not None:
+        last = state if sent else None
+        if last is not None:
             state_publisher.wait_for_change(snapshot, IDLE_INTERVAL, supervisor.ended.is_set)
 
 
@@ -148,9 +148,9 @@ def _packed(state: State) -> bytes:
     return pickle.dumps(replace(at_rest(state), objects=()))
 
 
-def _unpacked(kept: dict[bytes, bytes]) -> State | None:
+def _unpacked(content: dict[bytes, bytes]) -> State | None:
     """Return the state that the supervisor kept; None if it has none."""
-    if not (KEPT in kept and SCENE in kept):
+    if not (KEPT in content and SCENE in content):
         return None
-    state: State = pickle.loads(kept[KEPT])
-    return replace(state, objects=pickle.loads(kept[SCENE]))
+    state: State = pickle.loads(content[KEPT])
+    return replace(state, objects=pickle.loads(content[SCENE]))

@@ -110,8 +110,8 @@ def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
     """Return the layers that the extensions add to the scene of an arm."""
     if options is None:
         return ()
-    made = (make(options) for make in provided("view_layer"))
-    return tuple(layer for layer in made if layer is not None)
+    added = (make(options) for make in provided("view_layer"))
+    return tuple(layer for layer in added if layer is not None)
 
 
 def _nodes(options: Namespace | None, robot: Robot, environment: Environment) -> Nodes:

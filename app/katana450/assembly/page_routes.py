@@ -78,11 +78,11 @@ def page_routes(
         return index.answer(request, security.page_policy(inline, origin))
 
     async def file(request: Request) -> Response:
-        found = static.get(request.path_params["name"])
-        if found is None:
+        sent_file = static.get(request.path_params["name"])
+        if sent_file is None:
             raise HTTPException(404)
         # A web worker has the policy of its own file.
-        return found.answer(request, policy)
+        return sent_file.answer(request, policy)
 
     async def enter(request: Request) -> Response:
         """Sign in, with the token of an access link if the server requires one."""
@@ -100,9 +100,9 @@ def page_routes(
         why = authenticator.refusal(request.cookies, bearer)
         if why is not None:
             raise HTTPException(403, why)
-        found, peer = authenticator.sign_in(entry.token, response), address_of(request)
-        if found is not None:
-            actor = actor_of(replace(found, address=peer), CommandChannel.PAGE)
+        visitor, peer = authenticator.sign_in(entry.token, response), address_of(request)
+        if visitor is not None:
+            actor = actor_of(replace(visitor, address=peer), CommandChannel.PAGE)
             recorder.note("sign-in", actor, outcome=ACCEPTED)
         else:
             why = "The link is invalid or has expired."
@@ -134,10 +134,10 @@ def _viser_routes(authenticator: Authenticator) -> list[Route]:
         return viser.html.answer(request, policy)
 
     async def file(request: Request) -> Response:
-        found = viser.files.get(request.path_params["name"])
-        if found is None:
+        sent_file = viser.files.get(request.path_params["name"])
+        if sent_file is None:
             raise HTTPException(404)
-        return found.answer(request)
+        return sent_file.answer(request)
 
     return [Route("/viser/", page), Route("/viser/{name}", file)]
 
@@ -154,18 +154,18 @@ def signed_in(
 
 def page_files() -> dict[str, File]:
     """Return every file of the page by its path, with those of its scripts."""
-    found = contents()
+    files = contents()
     bundle = f'<script src="static/{PAGE_SCRIPTS}" defer></script>\n'.encode()
-    index = found[INDEX].replace(THEME_ELEMENT, b"<script>%s</script>" % found[THEME])
+    index = files[INDEX].replace(THEME_ELEMENT, b"<script>%s</script>" % files[THEME])
     head, *names, rest = DEFERRED_SCRIPT.split(index)
-    found[INDEX] = head + bundle + rest
-    found[PAGE_SCRIPTS] = b"\n".join(found[name.decode()] for name in names if name)
-    found[SCRIPTS] = b"\n".join(found[f"{name}.js"] for name in OUR_SCRIPTS)
+    files[INDEX] = head + bundle + rest
+    files[PAGE_SCRIPTS] = b"\n".join(files[name.decode()] for name in names if name)
+    files[SCRIPTS] = b"\n".join(files[f"{name}.js"] for name in OUR_SCRIPTS)
 
     def packed() -> dict[str, File]:
-        return {name: File.of(each, TYPES[Path(name).suffix]) for name, each in found.items()}
+        return {name: File.of(content, TYPES[Path(name).suffix]) for name, content in files.items()}
 
-    return kept(packed, dict[str, File], *found, *found.values())
+    return kept(packed, dict[str, File], *files, *files.values())
 
 
 def _source(script: File) -> str:

@@ -40,29 +40,29 @@ class RunningArm:
     def __init__(
         self,
         settings: Settings,
-        found: DescribedRobot,
+        described: DescribedRobot,
         scene: InitialScene | None = None,
         *,
         again: bool = False,
-        kept: State | None = None,
+        last: State | None = None,
         make_driver: Callable[[Robot, FloatArray, float], Driver | None] = lambda *_: None,
     ) -> None:
         """Prepare the arm; it does not run yet.
 
         Args:
             settings: settings of the server.
-            found: the robot.
+            described: the robot.
             scene: scene in place of the robot's own, and initial joint angles.
             again: whether the arm ran before in another process. It then begins stopped.
-            kept: last known state of that process, where the arm and its objects begin.
+            last: last known state of that process, where the arm and its objects begin.
             make_driver: returns the driver; None for that of the ideal simulation. Raises
                 KatanaError.
         """
-        robot, session, self.notes = found
+        robot, session, self.notes = described
         arm = robot.joint_group if robot.arm is None else robot.arm
         q, gripper = session.ready, 0.0
-        if kept is not None:
-            q, gripper = kept.q, kept.gripper
+        if last is not None:
+            q, gripper = last.q, last.gripper
         elif scene is not None and scene.joints is not None:
             q = scene.joints
         driver = make_driver(robot, q, gripper) or SimulatedDriver(arm, q, gripper)
@@ -77,7 +77,7 @@ class RunningArm:
             MonotonicClock(),
             settings.rate,
             settings.silence,
-            partial(restarted, kept=kept) if again else None,
+            partial(restarted, kept=last) if again else None,
             SilenceProfile.REAL_ARM if strict else driver.silence_profile,
         )
         self._silence_timeout = settings.silence
@@ -132,9 +132,9 @@ class RunningArm:
 
     def stop(self) -> None:
         """Brake to rest, end the loop, and close the pipes."""
-        ends = [each for each in (self._front_end, self._stop_end) if each is not None]
-        for each in ends:
-            each.close()
+        ends = [pipe_end for pipe_end in (self._front_end, self._stop_end) if pipe_end is not None]
+        for pipe_end in ends:
+            pipe_end.close()
         # Even at rest: a command that has just arrived may begin a motion.
         self._mailbox.put(cmd.Stop())
         end = time.monotonic() + BRAKING_TIMEOUT
@@ -144,8 +144,8 @@ class RunningArm:
         if self._tick_sender is not None:
             # Last, so that the brake is recorded too.
             self._tick_sender.close()
-        for each in ends:
-            each.join()
+        for pipe_end in ends:
+            pipe_end.join()
         # Let Python collect reference cycles when it ends.
         gc.unfreeze()
 

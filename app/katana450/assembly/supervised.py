@@ -131,17 +131,17 @@ class SupervisorPipe:
         quiet = False
         due = time.monotonic()
         while True:
-            asked = self._pipe.poll(max(due - time.monotonic(), 0.0))
-            if asked:
+            pending = self._pipe.poll(max(due - time.monotonic(), 0.0))
+            if pending:
                 message = self._pipe.recv_bytes()
                 self._heard = time.monotonic()
                 if message == END:
                     return
                 if message.startswith(NOTICE):
                     self.notify(message[len(NOTICE) :].decode())
-                asked = message == HEARTBEAT
+                pending = message == HEARTBEAT
             # The answer to a heartbeat saves a turn of this thread. Without any it comes by itself.
-            if asked or time.monotonic() >= due:
+            if pending or time.monotonic() >= due:
                 due = time.monotonic() + 1.5 * self._interval
                 # A supervisor that hangs reads nothing, and the pipe fills.
                 if self._alive() and writable(self._pipe.fileno()):

@@ -141,10 +141,10 @@ class Child:
         ends: Any = spawn.Pipe()
         self._pipe: Connection
         self._pipe, theirs = ends
-        kept = None if self._first else self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
+        content = None if self._first else self.kept if self._early_ends <= MAX_KEPT_STARTS else {}
         self.process = spawn.Process(
             target=run_supervised,
-            args=(self.spec.name, self.spec.work(kept), theirs, self.spec.heartbeat_interval),
+            args=(self.spec.name, self.spec.work(content), theirs, self.spec.heartbeat_interval),
             name=self.spec.name,
             daemon=True,
         )
@@ -299,7 +299,9 @@ class Supervisor:
             if self._turned - self._notice_at > BUSY_NOTICE_INTERVAL:
                 self._notice_at = self._turned
                 log.warning("This machine is busy: katana450 is still starting. Ctrl-C ends it.")
-            for child in [each for each in self._children.values() if each.due is None]:
+            for child in [
+                candidate for candidate in self._children.values() if candidate.due is None
+            ]:
                 alive = child.running
                 if not alive:
                     child.collect()
@@ -326,7 +328,9 @@ class Supervisor:
 
     def _wait(self, turn: float = TURN) -> None:
         """Wait for ``turn`` [s], or until a process ends."""
-        wait([each.process.sentinel for each in self._children.values() if each.due is None], turn)
+        wait(
+            [child.process.sentinel for child in self._children.values() if child.due is None], turn
+        )
         before, self._turned = self._turned, time.monotonic()
         late = self._turned - before - TURN
         for child in self._children.values():
@@ -398,5 +402,5 @@ def child_spec(
     keeps: whether the function takes the kept state too: ``function(kept, supervisor)``.
     """
     return ChildSpec(
-        name, title, lambda kept: partial(function, kept) if keeps else function, deadline
+        name, title, lambda content: partial(function, content) if keeps else function, deadline
     )

@@ -121,9 +121,9 @@ class WebServer:
         self._app = app
         self._shown.set()
 
-    def complete(self, *beside: Coroutine[Any, Any, None]) -> None:
-        """Serve all by that app, and run ``beside`` as long. Call it in the server's thread."""
-        self._beside = [asyncio.create_task(each) for each in beside]
+    def complete(self, *work: Coroutine[Any, Any, None]) -> None:
+        """Serve all by that app, and run ``work`` as long. Call it in the server's thread."""
+        self._beside = [asyncio.create_task(coroutine) for coroutine in work]
         self.ready.set()
 
     def stop(self) -> None:

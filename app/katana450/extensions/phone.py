@@ -53,14 +53,14 @@ def phone_routes(context: RouteContext) -> list[Route]:
         context.identity(request)
         if not codes.take(hub.clock()):
             raise HTTPException(TOO_MANY, "Too many requests. Wait a moment.")
-        found = await asyncio.to_thread(
+        address = await asyncio.to_thread(
             phone_address,
             authenticator.address,
             request.headers["host"],
             hub.stop_path.main_port,
             requires_link=authenticator.requires_link,
         )
-        return Response(msgspec.json.encode(found), media_type="application/json")
+        return Response(msgspec.json.encode(address), media_type="application/json")
 
     return [Route(f"{ROOT}/phone", phone)]
 

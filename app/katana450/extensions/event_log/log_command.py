@@ -17,8 +17,8 @@ def log(options: Namespace) -> int:
     """Run ``katana450 log`` and return the exit status: 1 if a line is not a record."""
     folder = options.folder or default_folder(options.port)
     if options.folder is None and not folder.is_dir() and folder.parent.is_dir():
-        found = ", ".join(str(each) for each in sorted(folder.parent.iterdir()))
-        raise InputError(f"There is no event log in {folder}. Name one of: {found or 'none'}.")
+        names = ", ".join(str(path) for path in sorted(folder.parent.iterdir()))
+        raise InputError(f"There is no event log in {folder}. Name one of: {names or 'none'}.")
     status = 0
     for line in lines_of(folder):
         if line.record is None:

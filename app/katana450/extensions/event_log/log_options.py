@@ -60,8 +60,8 @@ def _since(text: str) -> str:
     """Return the time in ``text`` as records state it, in UTC."""
     if not text:
         return ""
-    if found := AGO.fullmatch(text.strip()):
-        ago = int(found[1]) * SECONDS[found[2]]
+    if match := AGO.fullmatch(text.strip()):
+        ago = int(match[1]) * SECONDS[match[2]]
         return time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(max(time.time() - ago, 0)))
     try:
         since = datetime.fromisoformat(text)

@@ -87,8 +87,8 @@ class RecordMaker:
             self._end(key)
         for summary in self._limits.summaries(t, all_now=closing):
             self._made.append({"time": utc(self._epoch + t), **summary})
-        made, self._made = self._made, []
-        return made
+        records, self._made = self._made, []
+        return records
 
     @property
     def is_idle(self) -> bool:
@@ -140,20 +140,20 @@ class RecordMaker:
 
     def _outcome(self, note: Note) -> None:
         """Record that a command was limited or refused."""
-        given, outcome = self._commands.pop(note.ticket, None), note.what
-        if given is not None:
+        command, outcome = self._commands.pop(note.ticket, None), note.what
+        if command is not None:
             limited = outcome.verdict is Verdict.LIMITED
             why = "; ".join(map(finding_text, outcome.findings)) if limited else reason(outcome)
-            named = note._replace(actor=given.actor, outcome=outcome.verdict.value, why=why)
-            self._add(named, {"command": type(given.what).__name__})
+            named = note._replace(actor=command.actor, outcome=outcome.verdict.value, why=why)
+            self._add(named, {"command": type(command.what).__name__})
 
     def _finding(self, entry: LogEntry) -> None:
-        found = entry.finding
+        finding = entry.finding
         what = {
-            "finding": text(finding_text(found)),
-            "reason": found.reason.value,
+            "finding": text(finding_text(finding)),
+            "reason": finding.reason.value,
             "began": entry.began,
-            "amount": content_of(found.amount),
+            "amount": content_of(finding.amount),
             "command": entry.command,
         }
         self._add(Note(entry.t, "finding", entry.actor), what)
@@ -161,8 +161,8 @@ class RecordMaker:
     def _lease(self, note: Note, change: LeaseChange) -> None:
         before, after = change
         by = note.actor or SERVER
-        asked = [each for each in after.waiting if each not in before.waiting]
-        ended = [each for each in before.waiting if each not in after.waiting]
+        requests = [person for person in after.waiting if person not in before.waiting]
+        ended = [person for person in before.waiting if person not in after.waiting]
         old, new = before.holder, after.holder
         what: dict[str, Any]
         if new != old:
@@ -172,7 +172,7 @@ class RecordMaker:
                 what["from"] = text(old.name)
             if new is not None:
                 what["to"] = text(new.name)
-        elif asked:
+        elif requests:
             what, grounds = {"lease": "requested", "from": old.name if old else None}, ""
         elif ended and by is not SERVER:
             withdrawn = ended[0] == by.person
@@ -231,7 +231,8 @@ def _stream_key(note: Note, command: Command) -> StreamKey | None:
         return None
     actor = note.actor or SERVER
     subject = tuple(
-        (type(part), *(getattr(part, at, None) for at in SUBJECT)) for part in command.parts
+        (type(part), *(getattr(part, attribute, None) for attribute in SUBJECT))
+        for part in command.parts
     )
     return actor.key, actor.channel.value, str(actor.grounds), subject
 
@@ -243,14 +244,14 @@ def _who(actor: Actor | None) -> dict[str, str]:
     if actor.channel is CommandChannel.SERVER:
         return {"name": actor.name, "channel": actor.channel.value}
     person = actor.person
-    found = {
+    description = {
         "name": text(person.name),
         "role": person.role.value,
         "channel": actor.channel.value,
         "link": person.link,
         "address": text(person.address),
     }
-    return {name: value for name, value in found.items() if value}
+    return {name: value for name, value in description.items() if value}
 
 
 def _source(actor: Actor | None) -> str:

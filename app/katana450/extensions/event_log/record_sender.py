@@ -70,9 +70,9 @@ class RecordSender:
                     while True:
                         notes.append(waiting.get_nowait())
                 closing = None in notes
-                made = self._made([note for note in notes if note is not None], closing=closing)
-                if made:
-                    self._pipe.send(made)
+                records = self._made([note for note in notes if note is not None], closing=closing)
+                if records:
+                    self._pipe.send(records)
                 while self._pipe.poll():
                     self._recorder.problem = str(self._pipe.recv())
                 time.sleep(0.0 if closing else COLLECTING)
@@ -81,13 +81,13 @@ class RecordSender:
             self._recorder.enabled = False
 
     def _made(self, notes: list[Note], *, closing: bool) -> list[Record]:
-        recorder, made = self._recorder, list[Record]()
+        recorder, records = self._recorder, list[Record]()
         lost, recorder.lost = recorder.lost, 0
         try:
-            made = self._maker.made(notes, self._now(), closing=closing)
+            records = self._maker.made(notes, self._now(), closing=closing)
         except Exception:
             log.exception("The recorder met an error; it continues with the next event.")
             lost += len(notes)
         if lost:
-            made.append(record("lost", {"count": lost}, why="Too many events came at once."))
-        return made
+            records.append(record("lost", {"count": lost}, why="Too many events came at once."))
+        return records

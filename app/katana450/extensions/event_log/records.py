@@ -41,10 +41,10 @@ def utc(seconds: float) -> str:
 
 def record(kind: str, what: Any = None, **more: Any) -> Record:
     """Return a record of the present time. ``more``: further fields."""
-    made: Record = {"time": utc(time.time()), "t": round(time.perf_counter(), 3), "kind": kind}
+    content: Record = {"time": utc(time.time()), "t": round(time.perf_counter(), 3), "kind": kind}
     if what is not None:
-        made["what"] = what
-    return made | more
+        content["what"] = what
+    return content | more
 
 
 def encoded(content: Record) -> bytes:

@@ -45,8 +45,8 @@ def people(options: Namespace) -> int:
     with connect(options.url, NAME, _token(options)) as server:
         match options.act:
             case "list":
-                for each in server.people():
-                    print(line(each))
+                for person in server.people():
+                    print(line(person))
             case "kick":
                 server.kick(options.person, options.seconds, revoke=options.revoke)
             case "let-in":
@@ -57,8 +57,8 @@ def people(options: Namespace) -> int:
 def line(person: answers.ConnectedPerson) -> str:
     """Return one line about ``person``, which begins with the number."""
     connections = person.connections
-    notes = [each.kind for each in connections]
-    notes += sorted({each.address for each in connections})
+    notes = [connection.kind for connection in connections]
+    notes += sorted({connection.address for connection in connections})
     if connections:
         notes.append(f"since {connections[0].since}")
     if person.drives:

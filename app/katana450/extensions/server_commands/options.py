@@ -56,8 +56,8 @@ def add_access_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _duration(text: str) -> float:
-    found = re.fullmatch(r"(\d{1,4})([mhd])", text)
-    seconds = int(found[1]) * SECONDS[found[2]] if found else 0
+    match = re.fullmatch(r"(\d{1,4})([mhd])", text)
+    seconds = int(match[1]) * SECONDS[match[2]] if match else 0
     if not 0 < seconds <= MAX_DAYS * SECONDS["d"]:
         raise argparse.ArgumentTypeError(
             f"a time is a number and m, h or d, at most {MAX_DAYS}d, not {text!r}"

@@ -90,10 +90,10 @@ class PeopleRequests(RequestHandler):
         self.hub.recorder.note(kind, participant.actor, what, always=True)
 
     def _person(self, number: int) -> Identity:
-        found = self._people.identity(number)
-        if found is None:
+        identity = self._people.identity(number)
+        if identity is None:
             raise InputError(f"No person has the number {number} now. List the people again.")
-        return found
+        return identity
 
     def _list(self, asker: str) -> tuple[answers.ConnectedPerson, ...]:
         connections, shown = self._people.connections, self._people.shown
@@ -121,19 +121,19 @@ class PeopleRequests(RequestHandler):
             link=None if people.links is None else session,
             you=you,
             drives=session in hub.drivers,
-            asks=any(session_of(each.key) == session for each in hub.lease.waiting),
+            asks=any(session_of(other.key) == session for other in hub.lease.waiting),
             program=program.person.name if program is not None and owns else None,
             refused=people.refusals(session),
             kept_out=round(kept_out, 1) if kept_out else None,
-            connections=tuple(self._connection(each) for each in connections.get(session, ())),
+            connections=tuple(map(self._connection, connections.get(session, ()))),
         )
 
     def _name(self, identity: Identity) -> str:
         """Return the name of the link; without links, of the first participant."""
         if identity.link_name:
             return identity.link_name
-        for each in self._people.connections.get(identity.session, ()):
-            participant = self.hub.participant(each.key)
+        for connection in self._people.connections.get(identity.session, ()):
+            participant = self.hub.participant(connection.key)
             if participant is not None:
                 return participant.person.name
         return identity.name or "Somebody"

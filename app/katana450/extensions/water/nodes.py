@@ -122,10 +122,10 @@ class WaterNodes:
         _reveal(self._root, False)
 
     def _show_vessels(self, water: Water, last: Water | None) -> None:
-        for each in water.vessels:
-            before = None if last is None else last.vessel(each.name)
-            if before is None or not _same(each, before):
-                self._show_vessel(each)
+        for vessel in water.vessels:
+            before = None if last is None else last.vessel(vessel.name)
+            if before is None or not _same(vessel, before):
+                self._show_vessel(vessel)
         for name, (node, _) in self._bodies.items():
             if water.vessel(name) is None:
                 _reveal(node, False)
@@ -177,8 +177,8 @@ class WaterNodes:
             shown = number < len(water.puddles)
             _reveal(node, shown)
             if shown:
-                at, radius = water.puddles[number].at, water.puddles[number].radius
-                node.position = at
+                centre, radius = water.puddles[number].at, water.puddles[number].radius
+                node.position = centre
                 node.scale = (radius, radius, min(radius / FLAT, 1.0))
 
     def _add_glossy(

@@ -42,14 +42,14 @@ class BusyError(InputError):
         gone: Whether the debt is so large that the client must be disconnected.
     """
 
-    def __init__(self, wait: float, *, gone: bool = False) -> None:
+    def __init__(self, wait: float, *, disconnects: bool = False) -> None:
         retry = math.ceil(10.0 * wait) / 10.0
         super().__init__(
             "Your windows and programs together, or all viewers together, send too many requests. "
             f"Try again in {retry:.1f} s, and less often."
         )
         self.retry = retry
-        self.gone = gone
+        self.gone = disconnects
 
 
 class _Account:
@@ -129,7 +129,7 @@ class Budget:
         if wait > 0.0:
             # A refusal takes time too, but the shared account does not pay for it.
             accounts[0].pay(fixed)
-            raise BusyError(wait, gone=accounts[0].left(t) <= -MAX_DEBT)
+            raise BusyError(wait, disconnects=accounts[0].left(t) <= -MAX_DEBT)
         began = processor()
         try:
             yield

@@ -101,7 +101,7 @@ class CommandGate:
                     arm = self.present()
                     before, caught_up = arm.state, arm.caught_up
                     ticket = arm.deliver(command, granted)
-                    self.motions += any(each.traits.supersedes for each in command.parts)
+                    self.motions += any(part.traits.supersedes for part in command.parts)
                     self.last_pause = LastPause.after(self.last_pause, command, actor, before)
                     for note in self.delivered:
                         guarded(partial(note, command, granted, before, caught_up))()
@@ -115,14 +115,14 @@ class CommandGate:
 
     def _checked(self, command: cmd.Command, actor: Actor) -> Actor:
         """Return ``actor`` with the grounds for ``command``. Raises LeaseError without any."""
-        if not all(each.traits.while_stopped for each in command.parts):
+        if not all(part.traits.while_stopped for part in command.parts):
             self.check_runs()
             self._check_settled(actor)
-        if any(each.sample for each in command.parts):
+        if any(part.sample for part in command.parts):
             check_in_time(actor.delay, self.sample_delay)
         if actor.channel is CommandChannel.SERVER and not command.traits.protective:
             raise LeaseError("The server itself may not move the arm.")
-        return self._granted(actor, pacing=all(each.traits.pacing for each in command.parts))
+        return self._granted(actor, pacing=all(part.traits.pacing for part in command.parts))
 
     def claim(self, actor: Actor) -> Actor:
         """Return ``actor`` with the grounds on which it may command now; send no command.
@@ -253,7 +253,7 @@ class CommandGate:
         if not arm.state.waits:
             self._waits = self._waits and not arm.caught_up
         elif not self._waits:
-            causes = [each for each in arm.state.findings if each.reason in CAUSES]
+            causes = [finding for finding in arm.state.findings if finding.reason in CAUSES]
             # Also ends what is being planned for this arm.
             self.pause(causes[0])
 

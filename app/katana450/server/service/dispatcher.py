@@ -93,8 +93,8 @@ class Dispatcher:
         match request:
             case requests.Heartbeat(n=n):
                 return answers.Echo(n=n)
-            case requests.Query(at=at):
-                return self.query(at)
+            case requests.Query(at=subject):
+                return self.query(subject)
             case requests.Get(node=node, field=field, more=more):
                 arm, first = hub.present(), requests.FieldName(node=node, field=field)
                 return answers.Values(values=list(arm.nodes.read(arm.state, (first, *more))))
@@ -166,28 +166,28 @@ class Dispatcher:
                 return cmd.ClearStop()
         return request if isinstance(request, cmd.Command) else None
 
-    def query(self, at: str) -> answers.Answer:
-        """Return the answer to a ``query`` of ``at``. Raises LeaseError while there is no arm."""
+    def query(self, subject: str) -> answers.Answer:
+        """Return the answer to a ``query`` of ``subject``. Raises LeaseError without an arm."""
         hub = self._hub
-        if at == "event_log":
+        if subject == "event_log":
             return serialize.event_log(hub.event_log.lines)
-        if at == "state":
+        if subject == "state":
             return serialize.state(hub)
         arm = hub.present()
-        if at == "loop":
+        if subject == "loop":
             return serialize.loop(arm.loop_timing)
-        return once(arm.snapshot, at, lambda: self._derived(arm, at))
+        return once(arm.snapshot, subject, lambda: self._derived(arm, subject))
 
-    def _derived(self, arm: ArmHandle, at: str) -> answers.Answer:
+    def _derived(self, arm: ArmHandle, subject: str) -> answers.Answer:
         """Return the answer to a query that depends on the newest snapshot alone."""
-        match at:
+        match subject:
             case "arm":
                 return serialize.arm(arm.robot, arm.ready.tolist())
             case "links":
                 return arm.nodes.links(arm.state)
             case "branches":
                 return answers.Branches(
-                    choices=[serialize.branch_option(each) for each in arm.choices()]
+                    choices=[serialize.branch_option(choice) for choice in arm.choices()]
                 )
             case "world":
                 return arm.nodes.world(arm.state)

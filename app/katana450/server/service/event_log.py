@@ -91,10 +91,10 @@ def _credit(entry: LogEntry) -> str:
     return f"{actor.name} ({actor.channel.value}, {actor.grounds.value}), {entry.command}: "
 
 
-def _newer(event_log: Sequence[LogEntry], seen: LogEntry | None) -> list[LogEntry]:
+def _newer(event_log: Sequence[LogEntry], last: LogEntry | None) -> list[LogEntry]:
     newer: list[LogEntry] = []
     for entry in reversed(event_log):
-        if entry is seen:
+        if entry is last:
             break
         newer.append(entry)
     return newer[::-1]

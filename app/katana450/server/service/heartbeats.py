@@ -62,18 +62,18 @@ class LastHeartbeat:
         self._delays: deque[float] = deque(maxlen=RECENT_MESSAGES)
         self.open = 0
 
-    def note(self, made: float | None = None, limit: float = math.inf) -> float:
+    def note(self, sent: float | None = None, limit: float = math.inf) -> float:
         """Note that a message of the participant is being handled; return its delay [s].
 
-        ``made``: time of its making [s] on the clock of the participant. Without it the message
+        ``sent``: time of its making [s] on the clock of the participant. Without it the message
         counts from its receipt, and its delay is 0. The delay, and ``limit``, are those of
         ``LeastDelay.excess``.
         """
         t, delay = self._clock(), 0.0
-        if made is None:
+        if sent is None:
             received = t - self._age()
         else:
-            delay = self._least_delay.excess(made, t, limit)
+            delay = self._least_delay.excess(sent, t, limit)
             received = t - delay
             self._delays.append(delay)
         self._newest = max(self._newest, received)
@@ -142,14 +142,14 @@ class LeastDelay:
         self._least = self._candidate = math.inf
         self._restart(-math.inf)
 
-    def excess(self, made: float, t: float, limit: float = math.inf) -> float:
-        """Return how much longer than the least a message took that was made at ``made``.
+    def excess(self, sent: float, t: float, limit: float = math.inf) -> float:
+        """Return how much longer than the least a message took that was made at ``sent``.
 
-        ``made`` is on the clock of the sender and ``t``, the present, on that of the receiver.
+        ``sent`` is on the clock of the sender and ``t``, the present, on that of the receiver.
         ``limit``: excess [s] above which the message is not executed. While such messages come,
         their delay never counts as usual: a person who holds a key must let go first.
         """
-        delay = t - made
+        delay = t - sent
         self._candidate = min(self._candidate, delay)
         self._least = min(self._least, delay)
         self._messages += 1

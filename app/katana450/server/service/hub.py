@@ -92,7 +92,7 @@ class Hub:
     def add_handler(self, handler: RequestHandler) -> None:
         """Let ``handler`` answer its requests."""
         self.handlers.append(handler)
-        added = (kind for each in self.handlers for kind in each.request_types)
+        added = (kind for answerer in self.handlers for kind in answerer.request_types)
         self.requests = RequestDecoder(tuple(added))
 
     @property
@@ -205,16 +205,16 @@ class Hub:
         """Return the connected participant of ``key``; None if it is not connected."""
         return self._participants.get(key)
 
-    def at_scene(self, key: str, seen: int, delay: float = 0.0) -> Actor:
+    def at_scene(self, key: str, revocations: int, delay: float = 0.0) -> Actor:
         """Return the actor of a gesture at viser's controls. For any thread.
 
-        ``key``: key of the window. ``seen``, ``delay``: see ``Actor``. Raises LeaseError if the
-        window has no control socket.
+        ``key``: key of the window. ``revocations``: their number when it was received. ``delay``:
+        see ``Actor``. Raises LeaseError if the window has no control socket.
         """
         participant = self._participants.get(key)
         if participant is None:
             raise LeaseError("Open the start page to drive the arm.")
-        return Actor(participant.person, CommandChannel.SCENE, seen, delay=delay)
+        return Actor(participant.person, CommandChannel.SCENE, revocations, delay=delay)
 
     @property
     def participants(self) -> list[Participant]:
@@ -250,9 +250,11 @@ class Hub:
 
     def take(self, participant: Participant) -> None:
         """Take the lease from its holder for ``participant``. Raises LeaseError if not allowed."""
-        drove = [each for each in self.participants if self.giver(each) == self.lease.holder]
+        drove = [other for other in self.participants if self.giver(other) == self.lease.holder]
         self.gate.change(lambda lease, t: lease.take(participant.person, t), participant.actor)
-        self._takeover = Takeover(participant.person, frozenset(each.person.key for each in drove))
+        self._takeover = Takeover(
+            participant.person, frozenset(other.person.key for other in drove)
+        )
 
     def request(self, participant: Participant) -> None:
         """Request the lease from its holder for ``participant``. Raises LeaseError."""
@@ -291,16 +293,18 @@ class Hub:
         return program.person if program is not None and owns else participant.person
 
     def _numbered(self, number: int) -> Participant:
-        found = next((each for each in self.participants if each.number == number), None)
-        if found is None:
+        participant = next(
+            (candidate for candidate in self.participants if candidate.number == number), None
+        )
+        if participant is None:
             raise LeaseError("That window or program is no longer connected.")
-        return found
+        return participant
 
     def heartbeat(
-        self, participant: Participant, made: float | None = None, limit: float = math.inf
+        self, participant: Participant, sent: float | None = None, limit: float = math.inf
     ) -> float:
         """Count a message of ``participant`` as a heartbeat; see ``LastHeartbeat.note``."""
-        delay = participant.heartbeat.note(made, limit)
+        delay = participant.heartbeat.note(sent, limit)
         self._update_lease()
         return delay
 

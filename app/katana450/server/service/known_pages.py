@@ -68,9 +68,9 @@ class KnownPages:
         # A page that returns may have another address.
         person = replace(person, link=identity.link, address=identity.address)
         self._known[key] = (person, number)
-        absent = [each for each in self._known if each not in open_now and each != key]
-        for each in absent[: max(len(self._known) - MAX_PAGES, 0)]:
-            del self._known[each]
+        absent = [page for page in self._known if page not in open_now and page != key]
+        for page in absent[: max(len(self._known) - MAX_PAGES, 0)]:
+            del self._known[page]
         return person, number
 
     def rename(self, person: Person, number: int) -> None:
@@ -95,7 +95,7 @@ def addressed(words: str, name: str) -> str:
 def free_name(name: str | None, number: int, others: Iterable[Person]) -> str:
     """Return ``name``, or "Window" without one, with ``number`` where it is needed."""
     name = name or f"Window {number}"
-    return f"{name} ({number})" if any(each.name == name for each in others) else name
+    return f"{name} ({number})" if any(other.name == name for other in others) else name
 
 
 def renamed(person: Person, name: str, others: Iterable[Person]) -> Person:
@@ -113,12 +113,12 @@ def renamed(person: Person, name: str, others: Iterable[Person]) -> Person:
         raise InputError("The name is empty. Type at least one character.")
     if len(name) > MAX_NAME:
         raise InputError(f"The name has {len(name)} characters. The maximum is {MAX_NAME}.")
-    marks = "".join("m" if unicodedata.combining(each) else " " for each in name)
+    marks = "".join("m" if unicodedata.combining(character) else " " for character in name)
     if not name.isprintable() or BLANK.search(name) or "m" * (MAX_MARKS + 1) in marks:
         raise InputError("The name has characters that cannot be shown. Choose another name.")
-    if not any(each.isalnum() for each in name) or RESERVED.fullmatch(name.casefold()):
+    if not any(character.isalnum() for character in name) or RESERVED.fullmatch(name.casefold()):
         raise InputError(f"{name} is not a name of one person. Choose another name.")
     plain = name.casefold()
-    if any(each.key != person.key and each.name.casefold() == plain for each in others):
+    if any(other.key != person.key and other.name.casefold() == plain for other in others):
         raise InputError(f"The name {name} is taken. Choose another name.")
     return replace(person, name=name)

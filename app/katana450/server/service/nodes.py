@@ -29,7 +29,7 @@ class Nodes:
         """Return all nodes with their present values."""
         return answers.World(nodes=[])
 
-    def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:  # noqa: ARG002
+    def read(self, state: State, fields: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:  # noqa: ARG002
         """Return the present values of the fields. Raises InputError for an unknown name."""
         raise _not_installed()
 

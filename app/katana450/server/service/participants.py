@@ -76,12 +76,12 @@ def presser_of(cause: StopCause, known: Iterable[Person], *, links: bool) -> Act
     channel = CommandChannel.HTTP if session == cause.key else CommandChannel.PAGE
     role, link = (Role.VIEWER, session) if links else (Role.ADMIN, "")
     person = Person(cause.key, cause.by, role, link)
-    for each in known:
-        if each.key == cause.key:
-            person = each
+    for other in known:
+        if other.key == cause.key:
+            person = other
             break
-        if session_of(each.key) == session:
-            person = replace(person, role=each.role)
+        if session_of(other.key) == session:
+            person = replace(person, role=other.role)
     return Actor(person, channel, grounds=Grounds.SAFETY)
 
 
@@ -129,5 +129,5 @@ class ShownPictures:
 
     def age(self, key: str, t: float) -> float:
         """Return the age of the picture that the window ``key`` shows at ``t`` [s]."""
-        pictures = [each for each, window in self._windows.items() if window == key]
+        pictures = [picture for picture, window in self._windows.items() if window == key]
         return pictures[-1].age(t) if pictures else 0.0

@@ -154,19 +154,19 @@ class PendingAnswer:
         if arm.planning_failure:
             return FAILED, arm.planning_failure
         own = tuple(
-            each
-            for each in state.findings
-            if each.reason in ABOUT_NOW or (each.reason in GRIPPER_REASONS) == self._fingers
+            finding
+            for finding in state.findings
+            if finding.reason in ABOUT_NOW or (finding.reason in GRIPPER_REASONS) == self._fingers
         )
         state = replace(state, findings=own)
         return ENDS[state.status], sentence(state)
 
     def _program_end(self) -> tuple[str, str]:
         """Return how the run of a program has ended, and why in words."""
-        found = self._hub.runner.progress()
-        if found is not None and found.status == "done":
+        progress = self._hub.runner.progress()
+        if progress is not None and progress.status == "done":
             return REACHED, ""
-        return FAILED, (found.why if found else "") or "The program did not run."
+        return FAILED, (progress.why if progress else "") or "The program did not run."
 
     def _drop(self, why: str) -> None:
         """Drop the target of the motion, or end the run of the program, because of ``why``."""

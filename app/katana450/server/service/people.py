@@ -117,10 +117,10 @@ class People:
     @property
     def connections(self) -> dict[str, list[Connection]]:
         """The open connections by session, the oldest first."""
-        found: dict[str, list[Connection]] = {}
-        for each in self._connections:
-            found.setdefault(each.identity.session, []).append(each)
-        return found
+        connections: dict[str, list[Connection]] = {}
+        for connection in self._connections:
+            connections.setdefault(connection.identity.session, []).append(connection)
+        return connections
 
     def _remember(self, identity: Identity) -> None:
         number, _ = self._known.pop(identity.session, (0, identity))
@@ -130,14 +130,16 @@ class People:
         self._known[identity.session] = number, identity
         if len(self._known) > MAX_REMEMBERED:
             listed = self._listed
-            oldest = next((each for each in self._known if each not in listed), identity.session)
+            oldest = next(
+                (session for session in self._known if session not in listed), identity.session
+            )
             if oldest != identity.session:
                 del self._known[oldest]
                 self._refusals.pop(oldest, None)
 
     def identity(self, number: int) -> Identity | None:
         """Return the identity with ``number``; None if it is not remembered."""
-        return next((found for known, found in self._known.values() if known == number), None)
+        return next((identity for known, identity in self._known.values() if known == number), None)
 
     @property
     def shown(self) -> dict[int, Identity]:
@@ -152,8 +154,8 @@ class People:
     @property
     def _listed(self) -> set[str]:
         """The sessions that are connected or kept out."""
-        present = {each.identity.session for each in self._connections}
-        absent = {each for each in tuple(self._kept_out) if 0.0 < self.kept_out(each) < math.inf}
+        present = {connection.identity.session for connection in self._connections}
+        absent = {key for key in tuple(self._kept_out) if 0.0 < self.kept_out(key) < math.inf}
         return present | absent
 
     # Refusals
@@ -179,8 +181,8 @@ class People:
         if seconds > 0.0:
             self._kept_out[session] = self._clock() + seconds
         closed = self.connections.get(session, [])
-        for each in closed:
-            each.kicked.set()
+        for connection in closed:
+            connection.kicked.set()
         return len(closed)
 
     def restore(self, identity: Identity, kept_out: float) -> None:

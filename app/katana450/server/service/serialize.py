@@ -38,17 +38,17 @@ _FOUND: WeakKeyDictionary[Snapshot, dict[str, Any]] = WeakKeyDictionary()
 """Values by snapshot and name, dropped with the snapshot. For the gateway's thread alone."""
 
 
-def finding(found: control.Finding) -> answers.Finding:
+def finding(cause: control.Finding) -> answers.Finding:
     """Return a finding as a part of an answer, in SI units."""
-    unit = UNITS.get(found.reason)
+    unit = UNITS.get(cause.reason)
     return answers.Finding(
-        reason=found.reason.value,
-        text=finding_text(found),
-        amount=None if unit is None else found.amount,
+        reason=cause.reason.value,
+        text=finding_text(cause),
+        amount=None if unit is None else cause.amount,
         unit=unit,
-        axis=None if found.axis is None else found.axis + 1,
-        parts=found.parts,
-        seconds=found.time if found.reason is control.Reason.STOPPED else None,
+        axis=None if cause.axis is None else cause.axis + 1,
+        parts=cause.parts,
+        seconds=cause.time if cause.reason is control.Reason.STOPPED else None,
     )
 
 
@@ -59,10 +59,10 @@ def concluded(done: answers.Done, outcome: control.Outcome) -> answers.Done | an
     return msgspec.structs.replace(
         done,
         outcome=outcome.verdict.value,
-        findings=tuple(finding(each) for each in outcome.findings),
+        findings=tuple(finding(cause) for cause in outcome.findings),
         refused=tuple(
-            answers.PartRefusal(part=each.part + 1, command=tag_of(each.command), why=each.why)
-            for each in outcome.refused
+            answers.PartRefusal(part=part.part + 1, command=tag_of(part.command), why=part.why)
+            for part in outcome.refused
         ),
     )
 
@@ -127,7 +127,7 @@ def _state(arm: ArmHandle, snapshot: Snapshot) -> answers.State:
         status=now.status.value,
         moving=now.moving,
         why=sentence(now),
-        findings=[finding(each) for each in now.findings],
+        findings=[finding(cause) for cause in now.findings],
         detour=None if now.detour is None else now.detour.duration / now.speed,
         speed=now.speed,
         holder=None,
@@ -152,7 +152,7 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
     return answers.MeasuredArm(
         mode=report.mode.value,
         note=report.note,
-        acts=[each.value for each in report.mode.acts],
+        acts=[act.value for act in report.mode.acts],
         t=report.t,
         expected=report.expected.tolist(),
         tracking_error=error,
@@ -166,14 +166,14 @@ def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
     )
 
 
-def margins(found: Margins) -> answers.Margins:
+def margins(distances: Margins) -> answers.Margins:
     """Return the distances to limits, singularity and contact as a part of an answer."""
-    nearest, values = found.nearest, found.singular_values
+    nearest, values = distances.nearest, distances.singular_values
     singular = values[0] >= MAX_CONDITION * values[-1]
     return answers.Margins(
-        limit=float(found.limits[found.axis]),
-        axis=found.axis + 1,
-        limits=found.limits.tolist(),
+        limit=float(distances.limits[distances.axis]),
+        axis=distances.axis + 1,
+        limits=distances.limits.tolist(),
         smallest_singular_value=float(values[-1]),
         condition_number=None if singular else float(values[0] / values[-1]),
         manipulability=float(values.prod()),
@@ -213,28 +213,28 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
         basin_ml=water.basin / MILLILITRE,
         air_ml=water.air / MILLILITRE,
         spilled_ml=water.spilled / MILLILITRE,
-        vessels_ml={each.name: each.kept / MILLILITRE for each in water.others},
+        vessels_ml={vessel.name: vessel.kept / MILLILITRE for vessel in water.others},
         margin_to_rim=pouring.margin_to_rim(now.poured, now.objects),
     )
 
 
 def arm(robot: Robot, ready: list[float]) -> answers.Arm:
     """Return the description of ``robot``. ``ready``: posture to which Home moves."""
-    found = robot.arm
-    if found is None:
+    mounted = robot.arm
+    if mounted is None:
         joints = robot.joint_group
         jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
         return jointed.description(robot, ready)
-    names, gripper = found.chain.names, found.gripper
-    jointed = _Jointed(names, (False,) * len(names), found.limits)
+    names, gripper = mounted.chain.names, mounted.gripper
+    jointed = _Jointed(names, (False,) * len(names), mounted.limits)
     return msgspec.structs.replace(
         jointed.description(robot, ready),
-        tools={name: M.tolist() for name, M in found.tools.items()},
-        default_tool=found.default_tool,
-        freedoms=found.kinematics.freedoms,
+        tools={name: M.tolist() for name, M in mounted.tools.items()},
+        default_tool=mounted.default_tool,
+        freedoms=mounted.kinematics.freedoms,
         gripper=(gripper.closed, gripper.opened, gripper.speed) if gripper.moves else None,
         gripper_slides=gripper.slides,
-        T_base_shoulder=found.T_base_shoulder.tolist(),
+        T_base_shoulder=mounted.T_base_shoulder.tolist(),
     )
 
 
@@ -274,7 +274,7 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
     return [
         answers.JointLink(
             label=label,
-            path=[each.name for each in robot.path_to(moved[name])],
+            path=[member.name for member in robot.path_to(moved[name])],
             axis=robot.joints[name].axis.tolist(),
         )
         for name, label in zip(names, joint_labels(robot), strict=True)
@@ -283,7 +283,7 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
 
 def event_log(lines: Sequence[LogLine]) -> answers.EventLog:
     """Return lines of the event log as an answer."""
-    return answers.EventLog(lines=[log_line(each) for each in lines])
+    return answers.EventLog(lines=[log_line(line) for line in lines])
 
 
 def log_line(line: LogLine) -> answers.LogLine:
@@ -326,20 +326,21 @@ def objects(arm: ArmHandle) -> answers.Objects:
     return answers.Objects(
         objects=[
             answers.SceneObject(
-                name=each.name,
-                shape=each.shape.value,
-                size=list(each.size),
-                T=arm.environment.pose(each, x).tolist(),
-                can_be_held=each.can_be_held,
-                held=each.held,
-                mesh=None if each.solid is None else each.solid.key,
-                scale=each.scale,
-                colour=each.appearance.colour and hexadecimal(each.appearance.colour),
-                opacity=each.appearance.opacity,
-                hidden=each.appearance.hidden,
-                fixed=each.fixed,
+                name=scene_object.name,
+                shape=scene_object.shape.value,
+                size=list(scene_object.size),
+                T=arm.environment.pose(scene_object, x).tolist(),
+                can_be_held=scene_object.can_be_held,
+                held=scene_object.held,
+                mesh=None if scene_object.solid is None else scene_object.solid.key,
+                scale=scene_object.scale,
+                colour=scene_object.appearance.colour
+                and hexadecimal(scene_object.appearance.colour),
+                opacity=scene_object.appearance.opacity,
+                hidden=scene_object.appearance.hidden,
+                fixed=scene_object.fixed,
             )
-            for each in now.objects
+            for scene_object in now.objects
         ]
     )
 
@@ -360,8 +361,8 @@ def once(snapshot: Snapshot, name: str, work: Callable[[], T]) -> T:
 
     An error is raised and not kept.
     """
-    found = _FOUND.setdefault(snapshot, {})
-    if name not in found:
-        found[name] = work()
-    value: T = found[name]
+    results = _FOUND.setdefault(snapshot, {})
+    if name not in results:
+        results[name] = work()
+    value: T = results[name]
     return value

@@ -109,7 +109,7 @@ def arm_status(state: State, report: ArmReport) -> dict[str, Any]:
     return {
         "mode": report.mode.value,
         "note": report.note,
-        "acts": {each.value: each.hazard for each in report.mode.acts},
+        "acts": {act.value: act.hazard for act in report.mode.acts},
         "lag": round(math.degrees(float(np.abs(state.setpoint - state.q).max())), 1),
         "error": round(math.degrees(tracking_error(report, state.q)[0]), 1),
         "age": round(state.t - report.t, 2),
@@ -189,14 +189,14 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         "own_program": decides and not mine,
         "asked": person in lease.waiting,
         "asking": [
-            {"number": each.number, "name": each.person.name}
-            for each in hub.participants
-            if decides and each.person in lease.waiting
+            {"number": other.number, "name": other.person.name}
+            for other in hub.participants
+            if decides and other.person in lease.waiting
         ],
         "others": [
-            {"number": each.number, "name": each.person.name}
-            for each in hub.participants
-            if mine and each.person != person and each.person.role.may_drive
+            {"number": other.number, "name": other.person.name}
+            for other in hub.participants
+            if mine and other.person != person and other.person.role.may_drive
         ],
         "taken": "" if taker is None else f"{taker} took over from you.",
         "planning": planning,
@@ -206,7 +206,7 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
         "age": round(age, 1) if age >= MIN_SHOWN_AGE else 0,
         **{
             key: value
-            for each in hub.handlers
-            for key, value in each.page_status(participant).items()
+            for handler in hub.handlers
+            for key, value in handler.page_status(participant).items()
         },
     }

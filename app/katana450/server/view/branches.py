@@ -101,15 +101,15 @@ class BranchList:
                 self._draw(self._seen)
 
     def _draw(self, state: State) -> None:
-        found = self._find(state)
-        rows = _rows(found, state.branch)
+        options = self._find(state)
+        rows = _rows(options, state.branch)
         if rows != self._table.content:
             self._table.content = rows
         wanted = self._ghost_choice.value
         if wanted != NONE and not self._ghosts:
             # Made on the first request: three more arms are half of the data that a page loads.
             self._ghosts = [self._ghost(number) for number in range(len(self._branches))]
-        for ghost, choice in zip(self._ghosts, found, strict=False):
+        for ghost, choice in zip(self._ghosts, options, strict=False):
             branch = choice.metrics.branch
             visible = wanted in (OTHERS, str(branch)) and branch != state.branch
             visible = visible and not choice.refusal
@@ -126,7 +126,7 @@ class BranchList:
         return ghost
 
 
-def _rows(found: tuple[BranchOption, ...], now: AnyBranch) -> str:
+def _rows(options: tuple[BranchOption, ...], now: AnyBranch) -> str:
     """Return the table as HTML, with one row per branch and the branch ``now`` marked."""
     head = "".join(f"<th>{escape(heading)}</th>" for heading in HEADINGS)
     rows = "".join(
@@ -135,7 +135,7 @@ def _rows(found: tuple[BranchOption, ...], now: AnyBranch) -> str:
         f"<th><i style='background:rgb{colour}'></i>{choice.metrics.branch}</th>"
         + "".join(f"<td>{escape(cell)}</td>" for cell in cells_of(choice))
         + "</tr>"
-        for choice, colour in zip(found, COLOURS, strict=False)
+        for choice, colour in zip(options, COLOURS, strict=False)
     )
     return (
         f"<div class='k450'><table class='branches'><thead><tr>{head}</tr></thead>"

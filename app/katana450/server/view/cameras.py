@@ -74,8 +74,8 @@ def camera_pose(preset: Preset, robot: Robot, state: State) -> CameraPose:
     size = float(np.linalg.norm(up))
     up = up / size if size > MIN_UP_SINE else -T[:3, 2]
     scale = scale_of(robot)
-    behind, above, ahead = scale * BEHIND, scale * ABOVE, scale * AHEAD
-    return CameraPose(_triple(p - behind * x + above * up), _triple(p + ahead * x))
+    behind, above, distance = scale * BEHIND, scale * ABOVE, scale * AHEAD
+    return CameraPose(_triple(p - behind * x + above * up), _triple(p + distance * x))
 
 
 def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
@@ -84,8 +84,8 @@ def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
     if scale_of(robot) == 1.0:
         return look
     corners = np.array(list(itertools.product(*np.transpose(robot.bounds).tolist())))
-    found = fitted(corners, np.subtract(look.target, look.position))
-    return CameraPose(_triple(found.eye), _triple(found.target))
+    whole = fitted(corners, np.subtract(look.target, look.position))
+    return CameraPose(_triple(whole.eye), _triple(whole.target))
 
 
 def scale_of(robot: Robot) -> float:

@@ -52,14 +52,14 @@ class PaintNodes:
         looks = state.appearance
         if looks is self._seen or looks == self._seen:
             return
-        for name in {name for each in (self._seen, looks) for name, _ in each.changed}:
+        for name in {name for appearance in (self._seen, looks) for name, _ in appearance.changed}:
             if name in self._links.shapes:
                 self._show_link(name, looks.of(name))
         self._seen = looks
 
     def _show_link(self, name: str, look: LinkAppearance) -> None:
-        for made in self._links.shapes[name]:
-            made.visible = look.choice is DisplayMode.MADE
+        for shape in self._links.shapes[name]:
+            shape.visible = look.choice is DisplayMode.MADE
         if look.choice is DisplayMode.PAINTED and name not in self._coats:
             path, surfaces = self._links.path[name], self._links.links[name].shapes
             shapes = [

@@ -93,7 +93,7 @@ class PoseForm:
 
     def _chosen_priority(self) -> Priority:
         chosen = self._priority.value
-        return next(each for each, (name, _) in self._priorities.items() if name == chosen)
+        return next(priority for priority, (name, _) in self._priorities.items() if name == chosen)
 
     def _chosen(self) -> PoseDisplay:
         return PoseDisplay(*UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)

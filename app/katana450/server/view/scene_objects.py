@@ -214,9 +214,9 @@ class ObjectShape:
 
 
 def _merged(visual: Visual) -> Drawn:
-    made = visual.mesh
-    made.merge_vertices(merge_tex=True, merge_norm=True)
-    return _of(made)
+    mesh = visual.mesh
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    return _of(mesh)
 
 
 def _hull(solid: Solid) -> Any:
@@ -233,9 +233,9 @@ def _hull(solid: Solid) -> Any:
 
 def form(scene_object: SceneObject) -> Any:
     """Return a trimesh [m] of the object in its size, on z = 0 of its own frame; a mesh as hull."""
-    made = _hull(scene_object.solid) if scene_object.solid is not None else _plain(scene_object)
-    made.apply_scale(scene_object.scale)
-    return made
+    mesh = _hull(scene_object.solid) if scene_object.solid is not None else _plain(scene_object)
+    mesh.apply_scale(scene_object.scale)
+    return mesh
 
 
 def _plain(scene_object: SceneObject) -> Any:
@@ -245,15 +245,15 @@ def _plain(scene_object: SceneObject) -> Any:
 
     match scene_object.shape:
         case Shape.BOX:
-            made, height = trimesh.creation.box(scene_object.size), scene_object.size[2]
+            mesh, height = trimesh.creation.box(scene_object.size), scene_object.size[2]
         case Shape.CYLINDER | Shape.VESSEL:
             radius, height = scene_object.size
-            made = trimesh.creation.cylinder(radius, height, sections=FACETS)
+            mesh = trimesh.creation.cylinder(radius, height, sections=FACETS)
         case _:
             height = 2.0 * scene_object.size[0]
-            made = trimesh.creation.icosphere(subdivisions=3, radius=scene_object.size[0])
-    made.apply_translation((0.0, 0.0, 0.5 * height))
-    return made
+            mesh = trimesh.creation.icosphere(subdivisions=3, radius=scene_object.size[0])
+    mesh.apply_translation((0.0, 0.0, 0.5 * height))
+    return mesh
 
 
 def _of(mesh: Any) -> Drawn:

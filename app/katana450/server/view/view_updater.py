@@ -63,15 +63,15 @@ class ViewUpdater:
             self.failed.set()
 
     def _follow(self) -> None:
-        seen = self._state_publisher.snapshot
+        shown = self._state_publisher.snapshot
         settled = True
         while not self._stopping.is_set():
             # The read-out has a longer interval and needs one more update after the last change.
             snapshot = self._state_publisher.wait_for_change(
-                seen, 0.5 if settled else READOUT_INTERVAL, self._stopping.is_set
+                shown, 0.5 if settled else READOUT_INTERVAL, self._stopping.is_set
             )
-            settled = snapshot is seen
-            seen = snapshot
+            settled = snapshot is shown
+            shown = snapshot
             due = time.perf_counter() + self._interval
             self.show(snapshot)
             # The scene is on its way meanwhile.

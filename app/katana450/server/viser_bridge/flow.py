@@ -63,16 +63,16 @@ class FlowControl:
         missing = self._sent - count
         if not 0 <= missing <= len(self._in_flight):
             return False
-        seen = [self._in_flight.popleft() for _ in range(len(self._in_flight) - missing)]
+        frames = [self._in_flight.popleft() for _ in range(len(self._in_flight) - missing)]
         if not self.counts:
             # The first frames contain the whole scene, so their delay says little about later ones.
             self.counts = True
-            self._bytes = sum(each.size for each in self._in_flight)
-        elif seen:
-            size = sum(each.size for each in seen)
+            self._bytes = sum(frame.size for frame in self._in_flight)
+        elif frames:
+            size = sum(frame.size for frame in frames)
             filled = 2 * self._bytes >= self._window
             self._bytes -= size
-            delay = t - seen[-1].t
+            delay = t - frames[-1].t
             known = (
                 delay
                 if self._min_delay is None
@@ -80,7 +80,7 @@ class FlowControl:
             )
             self._min_delay = min(known, delay, MAX_LINE_DELAY)
             self._reported_at = t
-            if t - seen[0].t > self._min_delay + OVERDUE:
+            if t - frames[0].t > self._min_delay + OVERDUE:
                 self._window = max(self._window // 2, MIN_IN_FLIGHT_BYTES)
             elif filled:
                 # A window that was never filled is untested. If the connection became slow, all of

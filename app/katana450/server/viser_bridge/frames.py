@@ -203,7 +203,7 @@ def in_parts(window: Sequence[Any]) -> list[Sequence[Any]]:
         for message in window
         if isinstance(message, wire.SetSceneNodeVisibilityMessage) and not message.visible
     )
-    seen: list[Any] = []
+    visible: list[Any] = []
     panel: list[Any] = []
     unseen: list[Any] = []
     for message in window[:-1]:
@@ -213,8 +213,8 @@ def in_parts(window: Sequence[Any]) -> list[Sequence[Any]]:
         elif f"{name}/".startswith(hidden):
             unseen.append(message)
         else:
-            seen.append(message)
-    return [part for part in (seen, panel, [*unseen, window[-1]]) if part]
+            visible.append(message)
+    return [part for part in (visible, panel, [*unseen, window[-1]]) if part]
 
 
 async def produce(line: Any, buffer: Any, client_id: int, backlog_done_message: Any = None) -> None:

@@ -90,12 +90,12 @@ class MessageFilter:
             return self._drop("none", "it is too long or not binary", t, NO_MESSAGE)
         try:
             fields = msgspec.msgpack.decode(data)
-            made = fields.pop(MADE, None)
-            if made is not None and not math.isfinite(made):
+            sent = fields.pop(MADE, None)
+            if sent is not None and not math.isfinite(sent):
                 raise ValueError
             match fields:
                 case {"type": str(kind), "count": int(count), **rest} if kind == SEEN and not rest:
-                    return FilterResult(Ruling.DROP, seen=count, made=made)
+                    return FilterResult(Ruling.DROP, seen=count, made=sent)
             message = wire.Message.deserialize(msgspec.msgpack.encode(fields))
         except Exception as error:
             # A message that viser's decoder rejects, by any error, is not passed to viser.
@@ -103,7 +103,7 @@ class MessageFilter:
         objection = self._guard.objection(message)
         if objection is not None:
             return self._drop(type(message).__name__, objection, t)
-        return FilterResult(Ruling.PASS, message=message, made=made)
+        return FilterResult(Ruling.PASS, message=message, made=sent)
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
         self.dropped[kind] += 1

@@ -134,7 +134,7 @@ class _Line:
         """Pass messages until either side closes; ``upstream`` is the connection to viser."""
         self._hub.pictures.show(self._key, self._flow)
         directions = (self._down(), self._up(), upstream.wait_closed())
-        tasks = [asyncio.create_task(each) for each in directions]
+        tasks = [asyncio.create_task(direction) for direction in directions]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             for task in done:

@@ -80,13 +80,13 @@ def load() -> ViserPage:
 
 def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
     """Return the page before and after the place of our scripts, and its files."""
-    found = LOADER.search(html)
-    decoder = DECODER.search("" if found is None else found[4])
-    if found is None or decoder is None or html.count("<script") != 1:
+    loader = LOADER.search(html)
+    decoder = DECODER.search("" if loader is None else loader[4])
+    if loader is None or decoder is None or html.count("<script") != 1:
         raise ConfigurationError(
             f"{INDEX} is not the page of the pinned viser: install the pinned version."
         )
-    packed, style_size, size = found[1], int(found[2]), int(found[3])
+    packed, style_size, size = loader[1], int(loader[2]), int(loader[3])
     decompress = zstandard.ZstdDecompressor().decompress
     both = decompress(_bytes(packed), max_output_size=style_size + size)
     style, program = both[:style_size].decode(), both[style_size:]
@@ -95,7 +95,7 @@ def _unpacked(html: str) -> tuple[str, str, Mapping[str, File]]:
         PROGRAM: File.of(program, "text/javascript; charset=utf-8", zstd=True),
         DECODER_FILE: File.of(wasm, "application/wasm"),
     }
-    head, rest = html[: found.start()], html[found.end() :]
+    head, rest = html[: loader.start()], html[loader.end() :]
     return f"{head}<style>{style}</style>", rest, files
 
 

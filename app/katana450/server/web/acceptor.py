@@ -126,7 +126,7 @@ class Acceptor:
         self._listening.setblocking(False)
         self._protocol, self._tls = protocol, tls
         work = (self._accept(), self._watch())
-        self._tasks = [asyncio.create_task(each) for each in work]
+        self._tasks = [asyncio.create_task(coroutine) for coroutine in work]
         return self
 
     def close(self) -> None:
@@ -248,7 +248,9 @@ class Acceptor:
             return
         prefixes = Counter(connection.prefix for connection in self._waiting.values())
         crowded, _ = prefixes.most_common(1)[0]
-        oldest = next(each for each in self._waiting.values() if each.prefix == crowded)
+        oldest = next(
+            candidate for candidate in self._waiting.values() if candidate.prefix == crowded
+        )
         self._report("Too many connections wait; closed the oldest of %s.", oldest.client[0])
         self._forget(oldest)
         oldest.close()

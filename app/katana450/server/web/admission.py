@@ -49,9 +49,9 @@ def client_of(authenticator: Authenticator, connection: HTTPConnection) -> Ident
 
     Return None for an unknown client where the server requires a link.
     """
-    found = authenticator.identity(connection.cookies)
-    if found is not None:
-        return found
+    visitor = authenticator.identity(connection.cookies)
+    if visitor is not None:
+        return visitor
     if authenticator.requires_link:
         return authenticator.program("", authorization_of(connection))
     return Identity(address_of(connection), None, Role.ADMIN)
@@ -68,8 +68,8 @@ def authorization_of(connection: HTTPConnection) -> str:
 
 def identity(authenticator: Authenticator, connection: HTTPConnection) -> str | None:
     """Return the session of ``client_of``."""
-    found = client_of(authenticator, connection)
-    return None if found is None else found.session
+    visitor = client_of(authenticator, connection)
+    return None if visitor is None else visitor.session
 
 
 def reserved(hub: Hub, authenticator: Authenticator, client: Identity, places: int) -> int:

@@ -145,17 +145,17 @@ class Authenticator:
         value = cookies.get(self._cookie, "")
         if self._access is not None:
             known = self._access.check_session(value, time.time())
-            found = None if known is None else identity_of(*known)
+            visitor = None if known is None else identity_of(*known)
         else:
-            found = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
-        return self._admitted(found, stopping=stopping)
+            visitor = Identity(value, None, Role.ADMIN) if len(value) == SESSION_SIZE else None
+        return self._admitted(visitor, stopping=stopping)
 
     def refusal(self, cookies: Mapping[str, str], authorization: str = "") -> str | None:
         """Return why an admin keeps out the sender of these headers; None if no admin does."""
-        found = self.program("", authorization, cookies, stopping=True)
+        visitor = self.program("", authorization, cookies, stopping=True)
         if self._access is None:
-            found = self.identity(cookies, stopping=True)
-        return None if found is None else self.kept_out(found.session)
+            visitor = self.identity(cookies, stopping=True)
+        return None if visitor is None else self.kept_out(visitor.session)
 
     def kept_out(self, session: str) -> str | None:
         """Return why an admin keeps out the identity of ``session``; None if no admin does."""
@@ -165,10 +165,10 @@ class Authenticator:
         again = f" Come back in {math.ceil(seconds)} s." if seconds < math.inf else ""
         return f"{KICKED}{again} Your STOP still works."
 
-    def _admitted(self, found: Identity | None, *, stopping: bool) -> Identity | None:
-        """Return ``found``, or None if it is kept out and not ``stopping`` the arm."""
-        if found is None or stopping or not self._people.kept_out(found.session):
-            return found
+    def _admitted(self, visitor: Identity | None, *, stopping: bool) -> Identity | None:
+        """Return ``visitor``, or None if it is kept out and not ``stopping`` the arm."""
+        if visitor is None or stopping or not self._people.kept_out(visitor.session):
+            return visitor
         return None
 
     def program(
@@ -190,11 +190,11 @@ class Authenticator:
         scheme, _, token = authorization.partition(" ")
         if scheme.lower() == "bearer":
             known = self._access.check(token.strip(), time.time())
-            found = None if known is None else identity_of(*known)
-            found = self._admitted(found, stopping=stopping)
+            visitor = None if known is None else identity_of(*known)
+            visitor = self._admitted(visitor, stopping=stopping)
         else:
-            found = self.identity(cookies or {}, stopping=stopping)
-        return None if found is None else replace(found, name=f"{found.name}, {name}")
+            visitor = self.identity(cookies or {}, stopping=stopping)
+        return None if visitor is None else replace(visitor, name=f"{visitor.name}, {name}")
 
     async def run_while_authorised(
         self,
@@ -223,8 +223,8 @@ class Authenticator:
                     if identity() is None:
                         return EXPIRED
         finally:
-            for each in (task, kicked):
-                each.cancel()
+            for waiting in (task, kicked):
+                waiting.cancel()
             with suppress(asyncio.CancelledError):
                 await task
 
@@ -233,12 +233,12 @@ class Authenticator:
         max_age = None
         if self._access is None:
             value = secrets.token_urlsafe(16)
-            found: Identity | None = Identity(value, None, Role.ADMIN)
+            visitor: Identity | None = Identity(value, None, Role.ADMIN)
         else:
             known = self._access.check(token, time.time())
             if known is None:
                 return None
-            found = identity_of(*known)
+            visitor = identity_of(*known)
             max_age = int(known[1].expires - time.time())
             value = self._access.session(known[0])
         response.set_cookie(
@@ -249,7 +249,7 @@ class Authenticator:
             httponly=True,
             samesite="strict",
         )
-        return found
+        return visitor
 
 
 def identity_of(number: str, grant: Grant) -> Identity:

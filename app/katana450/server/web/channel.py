@@ -153,7 +153,10 @@ class Channel(ABC):
 
     async def run(self, participant: Participant) -> None:
         """Receive and send until one side closes the connection."""
-        tasks = [asyncio.create_task(each) for each in (self._send(), self._receive(participant))]
+        tasks = [
+            asyncio.create_task(coroutine)
+            for coroutine in (self._send(), self._receive(participant))
+        ]
         self.hub.stop_news.listeners.add(self._hurry)
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)

@@ -143,9 +143,9 @@ class Api:
         return query
 
     async def _stop(self, request: Request) -> Response:
-        found = self._identity(request, stopping=True)
+        sender = self._identity(request, stopping=True)
         press = request.query_params.get("press", "")[:MAX_PRESS_LENGTH]
-        self._hub.stop(actor_of(found, CommandChannel.HTTP), press or None)
+        self._hub.stop(actor_of(sender, CommandChannel.HTTP), press or None)
         return Response(status_code=204)
 
     async def _do(self, request: Request) -> Response:
@@ -202,22 +202,22 @@ class Api:
         If the sender closes the connection before it, is disconnected by an admin, or its link
         ends, its program leaves as if a socket were closed, so a moving arm stops.
         """
-        found: list[answers.Answer] = []
+        results: list[answers.Answer] = []
 
         async def work() -> None:
             answer = asyncio.create_task(pending.answer())
             # The body was received, so the next message is that the connection was closed.
-            gone = asyncio.ensure_future(request.receive())
+            closed = asyncio.ensure_future(request.receive())
             try:
-                await asyncio.wait((answer, gone), return_when=asyncio.FIRST_COMPLETED)
+                await asyncio.wait((answer, closed), return_when=asyncio.FIRST_COMPLETED)
                 if answer.done():
-                    found.append(answer.result())
+                    results.append(answer.result())
             finally:
                 if not answer.done():
                     self._forget(participant.person.key)
-                for each in (answer, gone):
-                    each.cancel()
-                await asyncio.gather(answer, gone, return_exceptions=True)
+                for task in (answer, closed):
+                    task.cancel()
+                await asyncio.gather(answer, closed, return_exceptions=True)
 
         def current() -> Identity | None:
             token = request.headers.get("authorization", "")
@@ -227,7 +227,7 @@ class Api:
         identity = replace(identity, session=session_of(key))
         connection = Connection(identity, kind, address_of(request), key=key)
         why = await self._authenticator.run_while_authorised(current, work(), connection)
-        return found[0] if found else answers.Refused(why=why or "The connection was closed.")
+        return results[0] if results else answers.Refused(why=why or "The connection was closed.")
 
     def _refused(self, request: Request) -> None:
         """Add one to the refused requests of the sender of ``request``."""
@@ -241,13 +241,13 @@ class Api:
 
     def _identity(self, request: Request, *, stopping: bool = False) -> Identity:
         headers = request.headers
-        found = self._authenticator.program(
+        sender = self._authenticator.program(
             headers.get(NAME, ""),
             headers.get("authorization", ""),
             request.cookies,
             stopping=stopping,
         )
-        if found is None:
+        if sender is None:
             why = self._authenticator.refusal(request.cookies, headers.get("authorization", ""))
             self._hub.recorder.note(
                 "sign-in",
@@ -261,7 +261,7 @@ class Api:
             why = self._authenticator.kept_out(SHARED_SESSION)
             if why is not None and KEY in headers:
                 raise HTTPException(403, why)
-        return replace(found, address=address_of(request))
+        return replace(sender, address=address_of(request))
 
     def _participant(self, request: Request, identity: Identity) -> Participant:
         """Return the participant that sends ``request``, which joins if necessary.

@@ -30,10 +30,10 @@ class TokenBucket:
 class ConnectionLimit:
     """Places for concurrent connections or requests."""
 
-    def __init__(self, maximum: int, each: int) -> None:
-        """Provide ``maximum`` places in total, and at most ``each`` for one identity."""
+    def __init__(self, maximum: int, own_maximum: int) -> None:
+        """Provide ``maximum`` places in total, and at most ``own_maximum`` for one identity."""
         self._maximum = maximum
-        self._each = each
+        self._own_maximum = own_maximum
         self._taken: Counter[str] = Counter()
 
     @contextmanager
@@ -43,7 +43,7 @@ class ConnectionLimit:
         ``reserved``: number of places that ``identity`` has even if all others are taken.
         """
         own = self._taken[identity]
-        free = own < reserved or (own < self._each and self._taken.total() < self._maximum)
+        free = own < reserved or (own < self._own_maximum and self._taken.total() < self._maximum)
         if not free:
             yield False
             return

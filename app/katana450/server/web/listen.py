@@ -91,9 +91,9 @@ def listen_beside(main: socket.socket, host: str, port: int | None) -> socket.so
     """
     if port is not None:
         return listen(host, port, "--stop-port")
-    beside: int = main.getsockname()[1] + 1
+    stop_port: int = main.getsockname()[1] + 1
     try:
-        return listen(host, beside if beside <= MAX_PORT else 0)
+        return listen(host, stop_port if stop_port <= MAX_PORT else 0)
     except ConfigurationError:
         return listen(host, 0)
 

@@ -138,9 +138,9 @@ class ProgramChannel(Channel):
         """Return the state with the watched fields, except those of removed objects."""
         now = serialize.state(self.hub)
         values: list[answers.Value] = []
-        for each in self._watched:
+        for field in self._watched:
             with suppress(InputError):
-                values += arm.nodes.read(arm.state, (each,))
+                values += arm.nodes.read(arm.state, (field,))
         return msgspec.structs.replace(now, fields=tuple(values))
 
     def greet(self, participant: Participant) -> None:
@@ -187,13 +187,13 @@ async def serve_socket(
     def current_identity() -> Identity | None:
         return authenticator.program(name, token, socket.cookies)
 
-    found = client_of(authenticator, socket)
-    budget = budgets.of(address_of(socket) if found is None else found.session)
+    sender = client_of(authenticator, socket)
+    budget = budgets.of(address_of(socket) if sender is None else sender.session)
     await socket.accept()
     channel = line(socket)
     if budget.is_exhausted():
-        if found is not None:
-            actor = actor_of(found, CommandChannel.WEBSOCKET, address_of(socket))
+        if sender is not None:
+            actor = actor_of(sender, CommandChannel.WEBSOCKET, address_of(socket))
             hub.recorder.refuse("connection", actor, InputError(BUDGET_EXHAUSTED))
         await channel.close(LIMIT_CLOSE_CODE, BUDGET_EXHAUSTED)
         return
@@ -258,24 +258,24 @@ class LineServer:
         def current_identity() -> Identity | None:
             return self._authenticator.program(hello.name, f"Bearer {hello.token}")
 
-        found = current_identity()
+        sender = current_identity()
         session, places = "", 0
-        if found is not None:
-            session = found.session
-            places = reserved(self._hub, self._authenticator, found, RESERVED_LINES)
+        if sender is not None:
+            session = sender.session
+            places = reserved(self._hub, self._authenticator, sender, RESERVED_LINES)
         # Without links all programs of this machine share one budget, but not their places.
         budget = self._budgets.of(session if self._authenticator.requires_link else client[0])
         acceptor = self._acceptor
-        kept = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
-        with self._places.taken(session, places) as free, kept:
+        exemption = nullcontext() if acceptor is None else acceptor.kept((client[0], client[1]))
+        with self._places.taken(session, places) as free, exemption:
             if free:
                 why = self._authenticator.refusal({}, f"Bearer {hello.token}") or TOKEN_REQUIRED
                 program = ProgramClient(current_identity, CommandChannel.TCP, client[0], why)
                 await _serve(self._hub, self._authenticator, budget, line, program)
             else:
                 why = f"At most {LINES} programs can connect, and {LINES_EACH} with one link."
-                if found is not None:
-                    actor = actor_of(found, CommandChannel.TCP, client[0])
+                if sender is not None:
+                    actor = actor_of(sender, CommandChannel.TCP, client[0])
                     self._hub.recorder.refuse("connection", actor, InputError(why))
                 await line.close(0, why)
 
@@ -302,18 +302,18 @@ async def _serve(
     client: ProgramClient,
     make: Callable[[Hub, JsonChannel, Budget], Greets] = ProgramChannel,
 ) -> None:
-    found = client.identity()
-    if found is None:
+    sender = client.identity()
+    if sender is None:
         refused = replace(stranger(client.address), channel=client.channel)
         hub.recorder.note("sign-in", refused, outcome=REFUSED, why=client.why)
         await line.close(SIGN_IN_CLOSE_CODE, client.why)
         return
     program = make(hub, line, budget)
     page = secrets.token_hex(16)
-    found = replace(found, address=client.address)
-    participant = hub.join(found, page, program.notify, line.arrival, client.channel)
+    sender = replace(sender, address=client.address)
+    participant = hub.join(sender, page, program.notify, line.arrival, client.channel)
     program.greet(participant)
-    connection = Connection(found, client.kind, client.address, key=participant.person.key)
+    connection = Connection(sender, client.kind, client.address, key=participant.person.key)
     try:
         why = await authenticator.run_while_authorised(
             client.identity, program.run(participant), connection

@@ -54,7 +54,7 @@ def page_policy(inline: str, stop_origin: str | None = None) -> str:
 
 def content_policy(*, ends: Iterable[str], **sources: Iterable[str]) -> str:
     """Return a content security policy: ``sources`` by their kind, then ``ends`` as they are."""
-    parts = [f"{kind}-src {' '.join(each)}" for kind, each in sources.items()]
+    parts = [f"{kind}-src {' '.join(allowed)}" for kind, allowed in sources.items()]
     return "; ".join((*parts, *ends))
 
 

@@ -133,9 +133,9 @@ class StopServer:
             why = "Sign in at the start page, or send a token."
             reply = refused(path, HTTPStatus.UNAUTHORIZED, why)
             return await self.delayed(_readable_by(origin, reply), client)
-        asked = {name: values[0] for name, values in parse_qs(query).items()}
-        press = asked.get("press", "")[:MAX_PRESS_LENGTH]
-        page = asked.get("page", "") if path == STOP_PATHS[0] else ""
+        parameters = {name: values[0] for name, values in parse_qs(query).items()}
+        press = parameters.get("press", "")[:MAX_PRESS_LENGTH]
+        page = parameters.get("page", "") if path == STOP_PATHS[0] else ""
         channel = CommandChannel.PAGE if path == STOP_PATHS[0] else CommandChannel.HTTP
         return _readable_by(origin, await self._stop(identity, channel, press, client, page))
 
@@ -244,13 +244,13 @@ class StopServer:
         pipe.press(StopPress(cause, actor))
         if stopped is None:
             log.info("STOP arrived on its own port.")
-            kept = self._kept < MAX_KEPT
-            self._kept += kept
+            open_after = self._kept < MAX_KEPT
+            self._kept += open_after
             try:
-                with self._acceptor.kept(client) if kept else nullcontext():
+                with self._acceptor.kept(client) if open_after else nullcontext():
                     stopped = await pipe.executed(press, CONFIRM_TIMEOUT)
             finally:
-                self._kept -= kept
+                self._kept -= open_after
         return _stop_reply(stopped)
 
     def _present(self, press: str) -> tuple[StopCause | None, bool]:
