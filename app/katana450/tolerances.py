@@ -75,7 +75,3 @@ SAME_ROTATION: Final = 1e-9
 
 # [m] Maximum distance of a pose; beyond it the sum of a few coordinates can overflow.
 FARTHEST: Final = 1e300
-
-# [1, m] Maximum deviation of axis 1 from upright, and of the tool point from axis 5, for mapping a
-# workspace; it is negligible beside a voxel.
-MAPPED_ARM: Final = 1e-6

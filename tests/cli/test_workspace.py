@@ -134,7 +134,7 @@ def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
     """Interrupt a map that takes minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()
     out = tmp_path / "map.npz"
-    command = [sys.executable, "-m", "katana450", "workspace", "--voxel", "2", "--out", str(out)]
+    command = [sys.executable, "-m", "katana450", "workspace", "--voxel", "5", "--out", str(out)]
     with (
         closing(os.fdopen(master, "rb", buffering=0)) as terminal,
         subprocess.Popen(command, cwd=ROOT, stderr=slave, stdout=subprocess.PIPE) as process,

@@ -25,7 +25,7 @@ FOUND = ReachabilityMap(POINTS, FRACTION)
 
 @pytest.fixture(scope="module")
 def survey(arm: MountedArm) -> Survey:
-    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.05, 36, 24)
+    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.05, 36, 24, arm.ready((0.0,) * 5))
     return Survey(reachability, voxel=0.02)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.reachability.reachability import VoxelGrid
+from katana450.extensions.reachability.map import VoxelGrid
 
 CENTER = (0.01, -0.02, 0.3)
 REACH = 0.25

@@ -12,7 +12,7 @@ from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.reachability.map import MapOptions, survey_of
-from katana450.extensions.reachability.pose_reachability import PoseReachability, rotations
+from katana450.extensions.reachability.reachability import Reachability, rotations
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -36,8 +36,8 @@ DEEP = -9.0
 
 def reachability(
     chain: Chain, home: FloatArray, *, table: float = DEEP, pitches: int = 5, rolls: int = 2
-) -> PoseReachability:
-    return PoseReachability(chain, STAND, table, pitches, rolls, home)
+) -> Reachability:
+    return Reachability(chain, STAND, table, pitches, rolls, home)
 
 
 def inside(chain: Chain, count: int, seed: int) -> FloatArray:

@@ -437,9 +437,7 @@ class Arm:
             fraction of orientations. Of arms with four axes, and from six on, its ``at_home`` tells
             where the tool can have the orientation that it has in ``ready``.
 
-        Raises:
-            InputError: the numbers are invalid, or the map would take too long.
-            RobotDescriptionError: axis 1 of the arm is not upright.
+        Raises InputError for invalid numbers, and for a map that would take too long.
 
         >>> map = arm.reachability(0.1, pitches=12, rolls=8)
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())

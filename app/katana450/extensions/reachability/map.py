@@ -8,25 +8,81 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.swivel import SevenAxes
-from katana450.extensions.reachability.pose_reachability import PoseReachability
-from katana450.extensions.reachability.reachability import (
-    BoolArray,
-    IntArray,
-    Reachability,
-    VoxelGrid,
-)
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.extensions.reachability.reachability import BoolArray, IntArray, Reachability
+from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 
 POSES = 65536
 """Poses per chunk: 50 MB each, and enough chunks for a progress bar and all cores."""
+
+
+MIN_VOXEL = 1e-3
+"""[m] Minimum edge of a voxel: the accuracy of the arm's joints at the tool."""
+
+
+@dataclass(frozen=True)
+class VoxelGrid:
+    """Voxels of edge ``size`` [m] whose corners lie on multiples of it in the base frame.
+
+    Flat indices run over z first.
+
+    Attributes:
+        size: edge of a voxel [m].
+        first: index of the lowest voxel in x, y, z; voxel i reaches from i * size to (i + 1) *
+            size.
+        shape: number of voxels in x, y, z.
+    """
+
+    size: float
+    first: tuple[int, int, int]
+    shape: tuple[int, int, int]
+
+    @staticmethod
+    def around(center: npt.ArrayLike, reach: float, size: float, table: float) -> VoxelGrid:
+        """Return the voxels of the ball of ``reach`` [m] about ``center`` (3,), above ``table``.
+
+        ``table`` is a height z [m]; voxels with their centre below it are left out. Raises
+        InputError for an invalid ``size``, and for a table above the reach.
+        """
+        middle = finite_array(center, (3,), "The centre of the grid")
+        if not MIN_VOXEL <= size <= reach:
+            raise InputError(
+                f"The edge of a voxel is {1e3 * size:g} mm; it must be from "
+                f"{1e3 * MIN_VOXEL:g} to {1e3 * reach:.0f} mm."
+            )
+        top = float(middle[2]) + reach
+        if not -math.inf < table < top:
+            raise InputError(
+                f"A table at {1e3 * table:g} mm leaves no reachable space above it. The tool "
+                f"reaches up to {1e3 * top:.0f} mm."
+            )
+        low = np.floor((middle - reach) / size).astype(int).tolist()
+        high = np.ceil((middle + reach) / size).astype(int).tolist()
+        low[2] = max(low[2], math.ceil(table / size - 0.5))
+        high[2] = max(high[2], low[2] + 1)
+        (x, y, z), (nx, ny, nz) = low, (b - a for a, b in zip(low, high, strict=True))
+        return VoxelGrid(size, (x, y, z), (nx, ny, nz))
+
+    def __len__(self) -> int:
+        return math.prod(self.shape)
+
+    def chunks(self, length: int) -> list[range]:
+        """Return all flat indices in their order, in ranges of ``length``."""
+        return [range(len(self))[at : at + length] for at in range(0, len(self), length)]
+
+    def centers(self, indices: npt.ArrayLike) -> FloatArray:
+        """Return the centres (N, 3) of the voxels ``indices`` (N,), in the base frame [m]."""
+        cells = np.stack(np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape), axis=-1)
+        centers: FloatArray = (cells + np.array(self.first) + 0.5) * self.size
+        return centers
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +113,7 @@ class Survey:
     Raises InputError for an invalid voxel or table.
     """
 
-    reachability: Reachability | PoseReachability
+    reachability: Reachability
     voxel: float
 
     def __post_init__(self) -> None:
@@ -67,7 +123,8 @@ class Survey:
     @cached_property
     def grid(self) -> VoxelGrid:
         """The voxels of the survey."""
-        return self.reachability.grid(self.voxel)
+        arm = self.reachability
+        return VoxelGrid.around(arm.middle, arm.reach, self.voxel, arm.table)
 
     def chunks(self) -> list[range]:
         """Return the chunks, the arguments of ``count``."""
@@ -92,11 +149,8 @@ class Survey:
         )
 
 
-VOXEL, PITCHES, ROLLS = 0.02, 36, 24
-"""Defaults of five-axis arms: edge of a voxel [m], and numbers of steps."""
-
 ROUND: Final = 0.005
-"""[m] The edge of a voxel of other arms is a multiple of this."""
+"""[m] The edge of a voxel is a multiple of this by default."""
 
 
 class Fineness(NamedTuple):
@@ -114,6 +168,7 @@ class Fineness(NamedTuple):
     poses: int
 
 
+FAMILY: Final = Fineness(32, 36, 24, 20_000_000_000)
 CLOSED: Final = Fineness(16, 24, 6, 100_000_000)
 PLANE: Final = Fineness(20, 36, 1, 100_000_000)
 SWIVEL: Final = Fineness(10, 12, 4, 10_000_000)
@@ -147,18 +202,12 @@ def survey_of(
         home: (n,) joint angles of Home [rad].
         options: what is mapped.
 
-    Raises:
-        InputError: a value is out of range, or the map would take too long.
-        RobotDescriptionError: axis 1 of a five-axis arm is not upright.
+    Raises InputError for a value out of range, and for a map that would take too long.
     """
     table, voxel, pitches, rolls = options
     kinematics = kinematics_of(chain)
-    if isinstance(kinematics, FiveAxisKinematics):
-        steps = PITCHES if pitches is None else pitches, ROLLS if rolls is None else rolls
-        reach = Reachability(chain, T_base_shoulder, table, *steps)
-        return Survey(reach, VOXEL if voxel is None else voxel)
     fineness = _fineness(kinematics)
-    reachability = PoseReachability(
+    reachability = Reachability(
         chain,
         T_base_shoulder,
         table,
@@ -180,6 +229,8 @@ def survey_of(
 
 
 def _fineness(kinematics: Kinematics) -> Fineness:
+    if isinstance(kinematics, FiveAxisKinematics):
+        return FAMILY
     if isinstance(kinematics, ClosedForm):
         return CLOSED if kinematics.chain.n == 6 else PLANE
     if isinstance(kinematics, SevenAxes):

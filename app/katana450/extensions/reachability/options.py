@@ -25,7 +25,7 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         "--voxel",
         type=float,
         metavar="MM",
-        help="edge of a voxel, mm (default: 20, or what suits an arm outside the family)",
+        help="edge of a voxel, mm (default: what suits the arm, 20 for the Katana450)",
     )
     parser.add_argument(
         "--pitches",

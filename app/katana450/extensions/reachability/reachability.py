@@ -1,199 +1,222 @@
-"""The fraction of tool orientations that a 5-axis arm can have at a point.
+"""The fraction of tool orientations that an arm can have at a point.
 
-At a point off axis 1 a 5-axis arm is free in two angles of the tool: its pitch, by which the roll
-axis leans in the arm's plane through the point, and its roll about that axis. Pitch and roll are
-each tried in equal steps over a full turn. The fraction counts the pairs for which a posture holds
-the tool at the point with every joint inside its limits, and elbow, wrist and tool point not below
-the table. Contacts of bodies are not checked: links may cross each other or the table's edge.
+The orientations that are tried depend on what the arm can choose:
 
-Everything is computed on the canonical arm (maths/kinematics/arm.py). If its plane passes beside
-axis 1, there are two planes through a point, one for each shoulder posture; the same pitch and roll
-in both count once. A tool point beside the roll axis moves as the tool rolls, so each roll is
-computed separately.
+    six and more axes   directions of the z axis of the tool, spread evenly over the sphere, with
+                        turns about each; orientations in the base frame.
+    five-axis family    pitches and rolls in equal steps over a full turn. The roll axis leans by
+                        the pitch in the plane of the arm through the point. Where this plane passes
+                        beside axis 1, there are two, one for each shoulder posture; the same pitch
+                        and roll in both count once.
+    four axes           directions of the tool in the upright plane of the arm through the point.
+                        Either shoulder posture may hold them.
+    all others          any orientation counts as one.
+
+Of six and four axes the orientation of the tool at Home is tried too, and reported by itself. With
+four axes that is its direction in the plane. An orientation counts if a posture takes it with every
+joint inside its limits, and no axis from the third on is below the table where its link begins.
+Contacts of bodies are not checked. Of seven axes the swivel is tried at some angles, and a
+numerical search begins at few postures; so both can miss an orientation, but count none too many.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import ClassVar, Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
-from katana450.errors import InputError, RobotDescriptionError
+from katana450.caching import cached_property
+from katana450.errors import InputError
+from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.closed_form import ClosedForm
+from katana450.extensions.general_arms.descent import Descent
+from katana450.extensions.general_arms.links import DHLinks, links_of
+from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.regularity import Regularity
+from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import se3, so3
-from katana450.maths.geometry.arrays import FloatArray, finite_array
-from katana450.maths.kinematics.arm import FiveAxisArm, arm_of
-from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse_batch import inverse_batch
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
+
+BoolArray = npt.NDArray[np.bool]
+"""An array of truth values."""
 
 IntArray = npt.NDArray[np.int64]
 """An array of 64-bit integers."""
 
-MIN_VOXEL = 1e-3
-"""[m] Minimum edge of a voxel: the accuracy of the arm's joints at the tool."""
+MAX_STEPS: Final = 720
+"""Maximum number of steps of a turn: half a degree, finer than the straightness of the links."""
+
+SWIVELS: Final = 16
+"""Number of angles of the swivel of seven axes that are tried for a pose."""
+
+SEEDS: Final = 6
+"""Number of postures from which a numerical search for a pose begins."""
 
 
-@dataclass(frozen=True)
-class VoxelGrid:
-    """Voxels of edge ``size`` [m] whose corners lie on multiples of it in the base frame.
-
-    Flat indices run over z first.
+class Orientations(Protocol):
+    """The orientations that an arm can choose from at a point.
 
     Attributes:
-        size: edge of a voxel [m].
-        first: index of the lowest voxel in x, y, z; voxel i reaches from i * size to (i + 1) *
-            size.
-        shape: number of voxels in x, y, z.
+        number: how many are tried.
+        poses_at_once: the number of poses that are solved at once for each point.
+        has_home: whether the last one is that at Home.
     """
 
-    size: float
-    first: tuple[int, int, int]
-    shape: tuple[int, int, int]
+    @property
+    def number(self) -> int: ...  # noqa: D102
+    @property
+    def poses_at_once(self) -> int: ...  # noqa: D102
+    @property
+    def has_home(self) -> bool: ...  # noqa: D102
 
-    @staticmethod
-    def around(center: npt.ArrayLike, reach: float, size: float, table: float) -> VoxelGrid:
-        """Return the voxels of the ball of ``reach`` [m] about ``center`` (3,), above ``table``.
-
-        ``table`` is a height z [m]; voxels with their centre below it are left out. Raises
-        InputError for an invalid ``size``, and for a table above the reach.
-        """
-        middle = finite_array(center, (3,), "The centre of the grid")
-        if not MIN_VOXEL <= size <= reach:
-            raise InputError(
-                f"The edge of a voxel is {1e3 * size:g} mm; it must be from "
-                f"{1e3 * MIN_VOXEL:g} to {1e3 * reach:.0f} mm."
-            )
-        top = float(middle[2]) + reach
-        if not -math.inf < table < top:
-            raise InputError(
-                f"A table at {1e3 * table:g} mm leaves no reachable space above it. The tool "
-                f"reaches up to {1e3 * top:.0f} mm."
-            )
-        low = np.floor((middle - reach) / size).astype(int).tolist()
-        high = np.ceil((middle + reach) / size).astype(int).tolist()
-        low[2] = max(low[2], math.ceil(table / size - 0.5))
-        high[2] = max(high[2], low[2] + 1)
-        (x, y, z), (nx, ny, nz) = low, (b - a for a, b in zip(low, high, strict=True))
-        return VoxelGrid(size, (x, y, z), (nx, ny, nz))
-
-    def __len__(self) -> int:
-        return math.prod(self.shape)
-
-    def chunks(self, length: int) -> list[range]:
-        """Return all flat indices in their order, in ranges of ``length``."""
-        return [range(len(self))[at : at + length] for at in range(0, len(self), length)]
-
-    def centers(self, indices: npt.ArrayLike) -> FloatArray:
-        """Return the centres (N, 3) of the voxels ``indices`` (N,), in the base frame [m]."""
-        cells = np.stack(np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape), axis=-1)
-        centers: FloatArray = (cells + np.array(self.first) + 0.5) * self.size
-        return centers
-
-
-BoolArray = npt.NDArray[np.bool]
-
-MAX_STEPS = 720
-"""Maximum number of steps of a turn: half a degree, finer than the straightness of the links."""
+    def possible(self, p: FloatArray) -> BoolArray:
+        """Return (N, number) whether each is possible at `p` (N, 3) [m] in {S}."""
 
 
 @dataclass(frozen=True, eq=False)
-class Reachability:
-    """The test of orientations at points.
+class PoseSolver:
+    """The test of poses of one arm.
 
     Attributes:
-        chain: the arm with its tool, in {S}.
-        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
-        table: height z of the table in the base frame [m].
-        pitches: number of pitches in a turn.
-        rolls: number of rolls in a turn.
-
-    Raises InputError for a number of steps outside 1 to MAX_STEPS, and RobotDescriptionError for an
-    arm whose axis 1 is not upright.
+        solver: its kinematics.
+        accepts: returns (N,) whether postures (N, n) [rad] may be taken.
     """
 
-    chain: Chain
-    T_base_shoulder: FloatArray
-    table: float
+    solver: Kinematics
+    accepts: Callable[[FloatArray], BoolArray]
+
+    @property
+    def chain(self) -> Chain:
+        """The chain."""
+        return self.solver.chain
+
+    def taken(self, T: FloatArray) -> BoolArray:
+        """Return (N,) whether a posture inside the limits takes the pose, for `T` (N, 4, 4)."""
+        match self.solver:
+            case ClosedForm():
+                return self._exact(self.solver.solve_batch(T), T)
+            case SevenAxes():
+                return self._with_swivel(self.solver, T)
+            case Numerical():
+                return self._searched(self.solver, T)
+        return self._exact(self.solver.inverse_batch(T), T)
+
+    def _with_swivel(self, solver: SevenAxes, T: FloatArray) -> BoolArray:
+        low, high = self.chain.lower[solver.swivel], self.chain.upper[solver.swivel]
+        step = (high - low) / SWIVELS
+        swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
+        taken = np.zeros(len(T), dtype=np.bool)
+        # Those in the middle take the most poses, which the others need not try.
+        for swivel in swivels[np.argsort(np.abs(swivels - 0.5 * (low + high)), kind="stable")]:
+            left = np.flatnonzero(~taken)
+            q = solver.at_swivels(T[left], np.full(len(left), swivel))
+            taken[left] = self._exact(q, T[left])
+        return taken
+
+    def _searched(self, solver: Numerical, T: FloatArray) -> BoolArray:
+        taken = np.zeros(len(T), dtype=np.bool)
+        hint = None
+        for number, pose in enumerate(T):
+            q = np.array(solver.solve(pose, hint, SEEDS))
+            taken[number] = self._exact(q[None, None], pose[None])[0]
+            # The next pose is often near this one.
+            hint = q if taken[number] else None
+        return taken
+
+    def _exact(self, q: FloatArray, T: FloatArray) -> BoolArray:
+        """Return (N,) whether one of `q` (N, k, n) is inside the limits and takes `T` (N, 4, 4)."""
+        taken = np.zeros(len(T), dtype=np.bool)
+        taken[self.exact(q, T)[0]] = True
+        return taken
+
+    def exact(
+        self, q: FloatArray, T: FloatArray, axes: int | None = None
+    ) -> tuple[IntArray, IntArray]:
+        """Return the pose and the number of each of `q` (N, k, n) that takes `T` (N, 4, 4).
+
+        It is inside the limits of the first ``axes``, of all by default.
+        """
+        chain, slack = self.chain, tolerances.LIMIT_SLACK
+        lower, upper = chain.lower[:axes] - slack, chain.upper[:axes] + slack
+        inside = ((q[..., :axes] >= lower) & (q[..., :axes] <= upper)).all(axis=-1)
+        pose, branch = np.nonzero(inside)
+        # Postures for a pose out of reach are only near it.
+        distance, turn = errors_of(chain, q[pose, branch][:, None], T[pose])
+        # The swivels are solved for the exact arm, beside which the file describes this one.
+        off = 0.0
+        if isinstance(self.solver, ClosedForm | SevenAxes):
+            off = self.solver.rounding.offset
+        exact = (distance <= tolerances.SAME_POSITION + off) & (
+            turn <= tolerances.SAME_ROTATION + off
+        )
+        good = exact[:, 0]
+        good[good] = self.accepts(q[pose[good], branch[good]])
+        return pose[good], branch[good]
+
+
+@dataclass(frozen=True, eq=False)
+class PitchesAndRolls:
+    """The pitches and rolls that an arm of the five-axis family chooses from.
+
+    A tool point beside the roll axis moves as the tool rolls, so each roll is then solved by
+    itself; else one posture gives all rolls. Everything is computed on the canonical arm, whose
+    frame is {C} (maths/kinematics/arm.py).
+    """
+
+    solver: PoseSolver
     pitches: int
     rolls: int
 
-    def __post_init__(self) -> None:
-        check_steps(self.pitches, self.rolls)
-        lean = float(np.linalg.norm(self.T_base_canonical[:3, 2] - (0.0, 0.0, 1.0)))
-        if lean > tolerances.MAPPED_ARM:
-            raise RobotDescriptionError(
-                "The workspace of this arm cannot be mapped: axis 1 must be upright, and it leans "
-                f"by {math.degrees(lean):.3g} deg."
-            )
+    has_home: ClassVar[bool] = False
 
     @property
-    def _arm(self) -> FiveAxisArm:
-        return arm_of(self.chain)
-
-    @property
-    def T_base_canonical(self) -> FloatArray:
-        """The pose (4, 4) of the canonical arm's frame {C} in the base frame [m]."""
-        return self.T_base_shoulder @ se3.inverse(self._arm.T_C_S)
-
-    @property
-    def orientations(self) -> int:
-        """The number of pairs of pitch and roll that are tried at a point."""
+    def number(self) -> int:
+        """The number of pairs of pitch and roll."""
         return self.pitches * self.rolls
 
     @property
     def poses_at_once(self) -> int:
-        """The number of poses of each point that are solved at once."""
+        """The number of pitches."""
         return self.pitches
 
-    @property
-    def reach(self) -> float:
-        """The maximum distance of the tool from the origin of {C} [m]."""
-        arm = self._arm
-        return math.hypot(abs(arm.a) + arm.l1 + arm.l2 + arm.l3, arm.d) + arm.off_axis
-
-    def grid(self, voxel: float) -> VoxelGrid:
-        """Return the voxels of edge ``voxel`` [m] that may have a reachable point."""
-        return VoxelGrid.around(self.T_base_canonical[:3, 3], self.reach, voxel, self.table)
-
-    def count(self, points: FloatArray) -> IntArray:
-        """Return the number of possible orientations (N,) at ``points`` (N, 3), base frame [m]."""
-        T_base_C = self.T_base_canonical
-        p = (points - T_base_C[:3, 3]) @ T_base_C[:3, :3]
-        within = (points[:, 2] >= self.table) & ((p * p).sum(axis=1) <= self.reach**2)
-        near = np.flatnonzero(within)
-        counts = np.zeros(len(points), dtype=np.int64)
-        possible = np.zeros((len(near) * self.pitches, self.rolls), dtype=np.bool)
-        beside = self._arm.off_axis > 0.0
+    def possible(self, p: FloatArray) -> BoolArray:
+        """Return (N, number) whether each pair is possible at `p` (N, 3) [m] in {S}."""
+        arm = arm_of(self.solver.chain)
+        p_C = p @ arm.T_C_S[:3, :3].T + arm.T_C_S[:3, 3]
+        possible = np.zeros((len(p) * self.pitches, self.rolls), dtype=np.bool)
+        beside = arm.off_axis > 0.0
         for roll in range(self.rolls if beside else 1):
             # The rolls that a posture can take: all of them, or only the one that it is for.
             rolls = slice(roll, roll + 1) if beside else slice(None)
-            for poses in self.tool_poses(p[near], roll):
+            for poses in self._tool_poses(p_C, roll):
                 T = poses.reshape(-1, 4, 4)
-                q = inverse_batch(self.chain, T)
-                pose, branch = np.nonzero(self._free(q))
-                # Postures for a pose out of reach are only near it.
-                exact = _same(forward_batch(self.chain, q[pose, branch]), T[pose])
-                pose, branch = pose[exact], branch[exact]
-                rollable = self._rollable(q[pose, branch, 4])
-                if beside:
-                    rollable = rollable[:, :1]
+                q = self.solver.solver.inverse_batch(T)
+                pose, branch = self.solver.exact(q, T, axes=4)
+                rollable = self._rollable(q[pose, branch, 4])[:, : 1 if beside else None]
                 for number in range(q.shape[1]):
-                    here = branch == number
-                    possible[pose[here], rolls] |= rollable[here]
-        counts[near] = possible.reshape(len(near), self.orientations).sum(axis=1)
-        return counts
+                    on_branch = branch == number
+                    possible[pose[on_branch], rolls] |= rollable[on_branch]
+        return possible.reshape(len(p), self.number)
 
-    def tool_poses(self, p: FloatArray, roll: int = 0) -> Iterator[FloatArray]:
+    def _tool_poses(self, p: FloatArray, roll: int = 0) -> Iterator[FloatArray]:
         """Yield T_S_tool (N, pitches, 4, 4) at ``p`` (N, 3) of {C} [m], at a step of the roll.
 
         Pitch 0 is outward and positive pitch downwards. The first item is for the arm facing the
         points. If that gives another plane, a second item is for the arm with its back to them.
         """
-        arm = self._arm
+        arm = arm_of(self.solver.chain)
         phi = np.linspace(0.0, math.tau, self.pitches, endpoint=False)
         angle = roll * math.tau / self.rolls
         rho = np.hypot(p[:, 0], p[:, 1])[:, None]
@@ -215,34 +238,13 @@ class Reachability:
 
     def _rollable(self, theta5: FloatArray) -> BoolArray:
         """Return (N, rolls) whether axis 5 can add each roll to its angle ``theta5`` (N,) [rad]."""
-        lower, upper = self.chain.lower[4], self.chain.upper[4]
+        lower, upper = self.solver.chain.lower[4], self.solver.chain.upper[4]
         slack = tolerances.LIMIT_SLACK
-        rolls = np.arange(self.rolls) * (math.tau / self.rolls) * self._arm.signs[4]
+        turn = arm_of(self.solver.chain).signs[4] * math.tau / self.rolls
+        rolls = turn * np.arange(self.rolls)
         beyond_lower = np.mod(theta5[:, None] + rolls - lower + slack, math.tau)
         fits: BoolArray = beyond_lower <= upper - lower + 2.0 * slack
         return fits
-
-    def _free(self, q: FloatArray) -> BoolArray:
-        """Return (N, B) whether axes 1 to 4 are within limits, and the arm above the table."""
-        slack = tolerances.LIMIT_SLACK
-        lower, upper = self.chain.lower[:4] - slack, self.chain.upper[:4] + slack
-        inside = ((q[..., :4] >= lower) & (q[..., :4] <= upper)).all(axis=-1)
-        return np.asarray(inside & self.clear(q))
-
-    def clear(self, q: FloatArray) -> BoolArray:
-        """Return (...) whether elbow and wrist are not below the table at ``q`` (..., 5) [rad]."""
-        arm = self._arm
-        alpha = arm.canonical(q)
-        elbow = self.T_base_canonical[2, 3] - arm.l1 * np.sin(alpha[..., 1])
-        wrist = elbow - arm.l2 * np.sin(alpha[..., 1] + alpha[..., 2])
-        return np.asarray(np.minimum(elbow, wrist) >= self.table)
-
-
-def check_steps(pitches: int, rolls: int) -> None:
-    """Raise InputError for a number of steps outside 1 to MAX_STEPS."""
-    for name, steps in (("pitches", pitches), ("rolls", rolls)):
-        if not 1 <= steps <= MAX_STEPS:
-            raise InputError(f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}.")
 
 
 def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -> FloatArray:
@@ -261,8 +263,304 @@ def _roll_frames(p: FloatArray, c: FloatArray, s: FloatArray, phi: FloatArray) -
     return T
 
 
-def _same(Ta: FloatArray, Tb: FloatArray) -> BoolArray:
-    """Return (N,) whether poses (N, 4, 4) agree, entry by entry."""
-    gap = np.abs(Ta - Tb)
-    in_place = gap[:, :3, 3].max(axis=1) <= tolerances.SAME_POSITION
-    return np.asarray(in_place & (gap[:, :3, :3].max(axis=(1, 2)) <= tolerances.SAME_ROTATION))
+STARTS: Final = 4
+"""Number of postures from which a search begins, those with the nearest tool points first."""
+
+SAMPLES: Final = 20_000
+"""Number of random postures from which these are taken."""
+
+EFFORT: Final = 60
+"""Maximum effort of one search, in looks."""
+
+REACHED: Final = 1e-6
+"""[m] Distance from a point up to which the tool point is there."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointSearch:
+    """The search of the point alone, for an arm that chooses no orientation.
+
+    Attributes:
+        chain: the chain.
+        accepts: returns (N,) whether postures (N, n) [rad] may be taken.
+    """
+
+    chain: Chain
+    accepts: Callable[[FloatArray], BoolArray]
+
+    number: ClassVar[int] = 1
+    poses_at_once: ClassVar[int] = 64
+    """A search takes about as long as this number of poses in closed form."""
+    has_home: ClassVar[bool] = False
+
+    @cached_property
+    def _descent(self) -> Descent:
+        search = Numerical(self.chain, links_of(self.chain, exact=False))
+        return Descent(search, Regularity(self.chain.n))
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, FloatArray]:
+        """Postures (M, n) [rad] that may be taken, and their tool points (M, 3) [m]."""
+        chain = self.chain
+        q = np.random.default_rng(chain.n).uniform(chain.lower, chain.upper, (SAMPLES, chain.n))
+        q = q[self.accepts(q)]
+        return q, forward_batch(chain, q)[:, :3, 3]
+
+    def possible(self, p: FloatArray) -> BoolArray:
+        """Return (N, 1) whether the tool point can be at `p` (N, 3) [m] in {S}."""
+        return np.array([self._reaches(point) for point in p], dtype=np.bool).reshape(-1, 1)
+
+    def _reaches(self, point: FloatArray) -> bool:
+        q, points = self._table
+        if not len(q):
+            return False
+        goal = self._descent.goal(ToolTarget.of(se3.from_rotation_translation(np.eye(3), point)))
+        far = ((points - point) ** 2).sum(axis=1)
+        for start in q[np.argsort(far, kind="stable")[:STARTS]].tolist():
+            end = self._descent.run(goal, tuple(start), Priority.POSITION, EFFORT).q
+            look = self._descent.look(goal, end)
+            near = self._descent.misses(look, Priority.POSITION)[0] <= REACHED
+            if near and self.accepts(np.array([end]))[0]:
+                return True
+        return False
+
+
+UPRIGHT: Final = 1e-6
+"""[1] Cosine between axes 1 and 4 up to which the plane of the arm is upright."""
+
+FACING: Final = 2
+"""Number of branches whose shoulder faces the tool point; they come first."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneDirections:
+    """The directions that are tried for one arm.
+
+    Attributes:
+        form: its closed form.
+        solver: the test of poses.
+        turns: (2, K) the turn about axis 4 [rad] that gives each direction: if the shoulder faces
+            the point, and if it has its back to it.
+    """
+
+    form: ClosedForm
+    solver: PoseSolver
+    turns: FloatArray
+
+    has_home: ClassVar[bool] = True
+
+    @classmethod
+    def of(
+        cls, form: ClosedForm, solver: PoseSolver, steps: int, home: FloatArray
+    ) -> PlaneDirections | None:
+        """Return ``steps`` directions in a turn, and as the last that at ``home`` (4,) [rad].
+
+        None for an arm whose plane is not upright.
+        """
+        chain = form.chain
+        up, across = chain.S[:3, 0], chain.S[:3, 3]
+        if abs(float(up @ across)) > UPRIGHT:
+            return None
+        outward = np.cross(up, across)
+        # A turn about axis 4 adds to an angle in this plane.
+        plane = np.stack((outward, np.cross(across, outward)))
+        seen = plane @ chain.M[:3, :3]
+        # The axis of the tool that lies in the plane; of two the first.
+        axis = int(np.round(np.linalg.norm(seen, axis=0), 6).argmax())
+        start = math.atan2(seen[1, axis], seen[0, axis])
+        T = forward(chain, home)
+        at_home = plane @ so3.exp(-float(home[0]) * up) @ T[:3, axis]
+        there = math.atan2(at_home[1], at_home[0])
+        away = np.array(form.solve(T, home.tolist())) - home
+        away -= math.tau * np.round(away / math.tau)
+        if int(np.abs(away).max(axis=1).argmin()) >= FACING:
+            there = math.pi - there
+        angles = np.append(np.linspace(0.0, math.tau, steps, endpoint=False), there)
+        # Seen from the back of the arm, outward is opposite.
+        return cls(form, solver, np.stack((angles - start, math.pi - angles - start)))
+
+    @property
+    def number(self) -> int:
+        """The number of directions, and that at Home."""
+        return int(self.turns.shape[1])
+
+    @property
+    def poses_at_once(self) -> int:
+        """All of them."""
+        return self.number
+
+    def possible(self, p: FloatArray) -> BoolArray:
+        """Return (N, K) whether each direction is possible at `p` (N, 3) [m] in {S}."""
+        chain, count = self.form.chain, self.turns.shape[1]
+        T = np.zeros((len(p), count, 4, 4))
+        T[..., 3, 3] = 1.0
+        T[..., :3, 3] = p[:, None]
+        T[:, 0, :3, :3] = chain.M[:3, :3]
+        # The point alone decides axis 1, apart from the side that faces it.
+        pans = self.form.solve_batch(T[:, 0])[:, ::FACING, 0]
+        found = np.zeros((len(p), count), dtype=np.bool)
+        for pan, turns in zip(pans.T, self.turns, strict=True):
+            turned = np.array([so3.exp(turn * chain.S[:3, 3]) for turn in turns])
+            panned = np.array([so3.exp(angle * chain.S[:3, 0]) for angle in pan]).reshape(-1, 3, 3)
+            T[..., :3, :3] = panned[:, None] @ (turned @ chain.M[:3, :3])
+            found |= self.solver.taken(T.reshape(-1, 4, 4)).reshape(len(p), count)
+        return found
+
+
+POSES_OF_SEARCH: Final = 64
+"""Number of poses in closed form that take about as long as a search."""
+
+GOLDEN: Final = math.pi * (3.0 - math.sqrt(5.0))
+"""[rad] Golden angle, by which neighbouring directions on a sphere are turned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rotations:
+    """The orientations that six and more axes choose from.
+
+    Attributes:
+        solver: the test of poses.
+        R: rotations (K, 3, 3) in {S}, that at Home last.
+    """
+
+    solver: PoseSolver
+    R: FloatArray
+
+    has_home: ClassVar[bool] = True
+
+    @property
+    def number(self) -> int:
+        """The number of rotations."""
+        return len(self.R)
+
+    @property
+    def poses_at_once(self) -> int:
+        """All of them. A search counts as many, so that its progress is seen."""
+        is_search = isinstance(self.solver.solver, Numerical)
+        return self.number * (POSES_OF_SEARCH if is_search else 1)
+
+    def possible(self, p: FloatArray) -> BoolArray:
+        """Return (N, number) whether each is possible at `p` (N, 3) [m] in {S}."""
+        T = np.zeros((len(p), self.number, 4, 4))
+        T[..., :3, :3] = self.R
+        T[..., :3, 3] = p[:, None]
+        T[..., 3, 3] = 1.0
+        return self.solver.taken(T.reshape(-1, 4, 4)).reshape(len(p), self.number)
+
+
+@dataclass(frozen=True, eq=False)
+class Reachability:
+    """The test of orientations at points.
+
+    Attributes:
+        chain: the arm with its tool, in {S}.
+        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
+        table: height z of the table in the base frame [m].
+        pitches: number of pitches in a turn; from six axes on of directions of the tool.
+        rolls: number of rolls in a turn, for each pitch or direction.
+        home: (n,) joint angles of Home [rad].
+
+    Raises InputError for a number of steps outside 1 to MAX_STEPS.
+    """
+
+    chain: Chain
+    T_base_shoulder: FloatArray
+    table: float
+    pitches: int
+    rolls: int
+    home: FloatArray
+
+    def __post_init__(self) -> None:
+        for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
+            if not 1 <= steps <= MAX_STEPS:
+                raise InputError(
+                    f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}."
+                )
+
+    @cached_property
+    def _links(self) -> DHLinks:
+        return links_of(self.chain, exact=False)
+
+    @cached_property
+    def _orientations(self) -> Orientations:
+        kinematics, chain = kinematics_of(self.chain), self.chain
+        solver, plane = PoseSolver(kinematics, self.clear), None
+        if chain.n >= 6:
+            R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
+            at_home = forward(chain, self.home)[None, :3, :3]
+            return Rotations(solver, np.concatenate((R, at_home)))
+        if isinstance(kinematics, FiveAxisKinematics):
+            return PitchesAndRolls(solver, self.pitches, self.rolls)
+        if chain.n == 4 and isinstance(kinematics, ClosedForm):
+            plane = PlaneDirections.of(kinematics, solver, self.pitches, self.home)
+        return PointSearch(chain, self.clear) if plane is None else plane
+
+    @property
+    def orientations(self) -> int:
+        """The number of orientations that are tried at a point."""
+        return self._orientations.number
+
+    @property
+    def poses_at_once(self) -> int:
+        """The number of poses of each point that are solved at once."""
+        return self._orientations.poses_at_once
+
+    @property
+    def reach(self) -> float:
+        """A bound on the distance of the tool from ``middle`` [m]."""
+        return self._links.reach
+
+    @property
+    def middle(self) -> FloatArray:
+        """The place (3,) on axis 1 where link 1 begins, in the base frame [m]."""
+        return (self.T_base_shoulder @ self._links.T_S_1)[:3, 3]
+
+    def count(self, points: FloatArray) -> IntArray:
+        """Return the counts (N, 2) at ``points`` (N, 3), in the base frame [m].
+
+        The first is the number of possible orientations, the second 1 if that at Home is one. Of an
+        arm without that at Home, it is the first alone (N,).
+        """
+        far = ((points - self.middle) ** 2).sum(axis=1) > self.reach**2
+        near = np.flatnonzero((points[:, 2] >= self.table) & ~far)
+        p = (points[near] - self.T_base_shoulder[:3, 3]) @ self.T_base_shoulder[:3, :3]
+        possible = self._orientations.possible(p)
+        counts = np.zeros((len(points), 2), dtype=np.int64)
+        counts[near, 0] = possible.sum(axis=1)
+        counts[near, 1] = possible[:, -1]
+        return counts if self._orientations.has_home else counts[:, 0]
+
+    def clear(self, q: FloatArray) -> BoolArray:
+        """Return (N,) whether no axis from the third on is below the table at `q` (N, n) [rad]."""
+        links, alpha = self._links, q + self._links.shift
+        T: FloatArray = np.broadcast_to(self.T_base_shoulder @ links.T_S_1, (len(q), 4, 4))
+        lowest = np.full(len(q), np.inf)
+        turn = np.zeros((len(q), 4, 4))
+        turn[:, 2, 2] = turn[:, 3, 3] = 1.0
+        for k in range(links.n - 1):
+            c, s = np.cos(alpha[:, k]), np.sin(alpha[:, k])
+            turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c, -s, s, c
+            T = T @ turn @ links.link(k)
+            if k > 0:
+                lowest = np.minimum(lowest, T[:, 2, 3])
+        return np.asarray(lowest >= self.table)
+
+
+def rotations(directions: int, rolls: int) -> FloatArray:
+    """Return rotations (directions * rolls, 3, 3) that are spread evenly.
+
+    Their z axes lie on a spiral over the sphere, at the golden angle from one to the next, each
+    with ``rolls`` turns about it.
+    """
+    heights = 1.0 - (2.0 * np.arange(directions) + 1.0) / directions
+    across = np.sqrt(1.0 - heights * heights)
+    azimuth = GOLDEN * np.arange(directions)
+    z = np.stack((across * np.cos(azimuth), across * np.sin(azimuth), heights), axis=1)
+    found = []
+    for direction in z:
+        other = np.eye(3)[int(np.abs(direction).argmin())]
+        x = np.cross(other, direction)
+        x /= np.linalg.norm(x)
+        R = np.column_stack((x, np.cross(direction, x), direction))
+        found += [R @ so3.rotation_z(math.tau * roll / rolls) for roll in range(rolls)]
+    return np.array(found)
