@@ -15,7 +15,7 @@ import numpy as np
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import se3

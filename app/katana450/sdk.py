@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from katana450.extension import ExtraProcess as ExtraProcess
     from katana450.extension import ServerFacts as ServerFacts
     from katana450.extension import TickSender as TickSender
-    from katana450.extensions.programs.building.plan_builder import PlanBuilder as PlanBuilder
+    from katana450.extensions.programs.building.plan_state import PlanState as PlanState
     from katana450.extensions.programs.building.step import Step as Step
     from katana450.extensions.programs.language import kinds as kinds
     from katana450.server.api import answers as answers

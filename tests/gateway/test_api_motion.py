@@ -22,7 +22,7 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
 from katana450.extensions.programs.planning.pose_path import PosePath
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run, step
@@ -49,14 +49,14 @@ def every(arms: Mapping[str, Chain], others: Mapping[str, Chain]) -> pytest.Mark
     return pytest.mark.parametrize("chain", cases)
 
 
-def builder(chain: Chain) -> PlanBuilder:
+def begin_plan(chain: Chain) -> PlanState:
     session = session_of(chain)
-    return PlanBuilder(PlanContext(session, np.eye(4)), begun(session))
+    return PlanState(PlanContext(session, np.eye(4)), begun(session))
 
 
 def program(chain: Chain, *steps: str) -> Program:
     """Return the steps as a program from the ready posture."""
-    made = builder(chain)
+    made = begin_plan(chain)
     text = "frame: base\nsteps:\n" + "".join(f"  - {each}\n" for each in steps)
     return compiled(parse(text), made.plan_context, made.state)
 
@@ -92,7 +92,7 @@ def on_paths(states: list[State]) -> list[tuple[PosePath, float, FloatArray]]:
 
 def middle(chain: Chain) -> FloatArray:
     """Return the tool point (3,) [mm] of the ready posture."""
-    made = builder(chain)
+    made = begin_plan(chain)
     return 1e3 * made.target.position
 
 

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.arm_plane import ArmPlane
 from katana450.extensions.programs.planning.hand_planning import HandPlanning
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from tests.general_arms.driven import begun, session_of
-from tests.general_arms.programs import builder
+from tests.general_arms.programs import begin_plan
 from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
 
 
 def hand(chain: Chain) -> HandPlanning:
     """Return the hand of an arm whose tool frame is its grasp frame."""
-    made: PlanBuilder = builder(chain)
+    made: PlanState = begin_plan(chain)
     return HandPlanning(made.planning, np.eye(4), np.eye(4), 0.1, one_jaw=False, plane=None)
 
 

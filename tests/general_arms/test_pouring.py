@@ -17,7 +17,7 @@ from katana450.assembly.robot_session import describe_robot, find_arm
 from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import TICK, PlanContext
+from katana450.extensions.programs.building.plan_state import TICK, PlanContext
 from katana450.extensions.programs.building.vessel_turn import UNDERSIDES
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.curves import PoseTurn

@@ -19,7 +19,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.path import joint_derivatives
 from tests.general_arms.driven import TICK, session_of
 from tests.general_arms.programs import (
-    builder,
+    begin_plan,
     every,
     length,
     middle,
@@ -63,7 +63,7 @@ def test_arm_of_few_or_many_axes_follows_lines_and_circles(chain: Chain) -> None
     points = 1e3 * forward_batch(chain, joint_derivatives(line, sigma)[0])[:, :3, 3]
     np.testing.assert_allclose(points, p + np.outer(sigma, (0.0, 20.0, 0.0)), atol=1e-6)
     np.testing.assert_allclose(circle.end, circle.start, atol=1e-9)
-    np.testing.assert_allclose(circle.end, builder(chain).q, atol=1e-8)
+    np.testing.assert_allclose(circle.end, begin_plan(chain).q, atol=1e-8)
 
 
 def test_three_axes_choose_no_orientation() -> None:
@@ -73,7 +73,7 @@ def test_three_axes_choose_no_orientation() -> None:
 
 def test_arm_without_fingers_has_no_hand() -> None:
     with pytest.raises(InputError, match="has no gripper"):
-        _ = builder(UR5E).hand
+        _ = begin_plan(UR5E).hand
 
 
 @every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X})
@@ -114,7 +114,7 @@ def test_path_refuses_numbers_that_are_no_path() -> None:
 
 
 def test_angles_that_gimbal_lock_hides_are_asked_for() -> None:
-    made = builder(UR5E)
+    made = begin_plan(UR5E)
     target = made.planning.oriented(made.target, Angles(math.pi / 2, 0.0, 0.0), np.eye(3))
     with pytest.raises(InputError, match="`roll`, `pitch` and `yaw` together"):
         made.planning.oriented(target, Angles(yaw=0.3), np.eye(3))

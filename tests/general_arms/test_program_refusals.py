@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.curves import line_between
 from katana450.extensions.programs.run.program import Program, compiled
@@ -24,7 +24,7 @@ from tests.general_arms.driven import TICK, pose, session_of
 from tests.general_arms.programs import (
     REST,
     angles_of,
-    builder,
+    begin_plan,
     every,
     length,
     plans,
@@ -106,7 +106,7 @@ def test_line_beside_a_singularity_turns_the_wrist_within_its_limits() -> None:
 
 @every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X, **REST})
 def test_no_path_changes_its_branch(chain: Chain) -> None:
-    made, rng, found = builder(chain), np.random.default_rng(4), 0
+    made, rng, found = begin_plan(chain), np.random.default_rng(4), 0
     kinematics = made.plan_context.arm.kinematics
     for _ in range(12):
         start = made.target

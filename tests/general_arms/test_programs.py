@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control import commands as cmd
-from katana450.extensions.programs.building.plan_builder import UntimedPath
+from katana450.extensions.programs.building.plan_state import UntimedPath
 from katana450.extensions.programs.language.step_target import StepTarget
 from katana450.extensions.programs.planning.pose_path import PosePath
 from katana450.extensions.programs.steps.moves import Home, Joints, Move, Nudge, Via
@@ -22,7 +22,7 @@ from tests.general_arms.programs import (
     REST,
     SOME,
     angles_of,
-    builder,
+    begin_plan,
     every,
     length,
     middle,
@@ -37,12 +37,12 @@ from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, SK
 
 @every(SOME, REST)
 def test_move_to_a_point_keeps_the_orientation_and_is_followed(chain: Chain) -> None:
-    made = builder(chain)
+    made = begin_plan(chain)
     session = made.plan_context.session
     start = made.state
     T = pose(session, start)
     there = T[:3, 3] + (0.0, 0.02, -0.02)
-    Move(StepTarget(position=there)).build(made)
+    made = Move(StepTarget(position=there)).build(made)
     _, untimed = made.actions[-1]
     assert isinstance(untimed, UntimedPath)
     reached = pose(session, settled(session, start, [cmd.Follow(untimed.timed().plan)]))
@@ -53,16 +53,16 @@ def test_move_to_a_point_keeps_the_orientation_and_is_followed(chain: Chain) -> 
 
 @every(SOME, {})
 def test_joints_nudge_via_and_home_are_planned(chain: Chain) -> None:
-    made = builder(chain)
+    made = begin_plan(chain)
     q = np.array(made.q)
     turned = q + 0.1
-    Joints(turned).build(made)
+    made = Joints(turned).build(made)
     np.testing.assert_allclose(made.q, turned, atol=1e-9)
-    Nudge(0, -0.2).build(made)
+    made = Nudge(0, -0.2).build(made)
     assert made.q[0] == pytest.approx(turned[0] - 0.2)
-    Via((StepTarget(joints=q + 0.05), StepTarget(joints=q - 0.05)), 0.5).build(made)
+    made = Via((StepTarget(joints=q + 0.05), StepTarget(joints=q - 0.05)), 0.5).build(made)
     np.testing.assert_allclose(made.q, q - 0.05, atol=1e-9)
-    Home().build(made)
+    made = Home().build(made)
     np.testing.assert_allclose(made.q, q, atol=1e-9)
 
 
@@ -206,7 +206,7 @@ def test_swivel_of_seven_axes_turns_where_it_must() -> None:
 @pytest.mark.cases(1)
 @every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"Panda": PANDA})
 def test_trajectory_of_all_joints_is_followed(chain: Chain) -> None:
-    q = np.degrees(builder(chain).q)
+    q = np.degrees(begin_plan(chain).q)
     rows = [[0.5 * number, *(q + 5.0 * number).tolist()] for number in range(4)]
     made = program(chain, f"trajectory: {{through: {rows}}}")
     np.testing.assert_allclose(played(chain, made)[-1].setpoint, np.radians(q + 15.0), atol=1e-9)

@@ -11,7 +11,7 @@ import pytest
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run

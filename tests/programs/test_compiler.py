@@ -9,7 +9,7 @@ import pytest
 
 from katana450.errors import CancelledError, InputError
 from katana450.extensions.programs.building.actions import PutObject
-from katana450.extensions.programs.building.plan_builder import PlanBuilder, UntimedPath
+from katana450.extensions.programs.building.plan_state import PlanState, UntimedPath
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.compiler import FINDING, TIMING, Compiler, PlanningStage
 from katana450.extensions.programs.run.program import compiled
@@ -144,37 +144,54 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
     assert max(gaps) < 0.25
 
 
+def test_a_refused_attempt_leaves_no_trace_in_the_plan(stage: Stage) -> None:
+    begin = PlanState(stage.plan_context, stage.begin())
+    turned = begin.q + 0.1
+
+    def attempt(plan: PlanState, option: str) -> PlanState:
+        after = plan.move_to(turned, option)
+        if option == "refused":
+            raise InputError("not this way")
+        assert plan.is_brief
+        return after
+
+    plan = begin.first(("refused", "taken"), attempt)
+    assert [name for name, _ in plan.actions] == ["taken"]
+    assert plan.q == pytest.approx(turned)
+    assert not plan.is_brief
+    assert begin.actions == ()
+    with pytest.raises(InputError, match="not this way"):
+        begin.first(("refused", "refused"), attempt)
+
+
 @pytest.fixture
 def untimed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Replace the timing of paths, whose duration does not matter here."""
     monkeypatch.setattr(UntimedPath, "timed", lambda self: self)
 
 
-def layout(stage: Stage, text: str) -> tuple[PlanBuilder, Compiler]:
-    builder = PlanBuilder(stage.plan_context, stage.begin())
-    return builder, Compiler(parse(text), builder)
+def layout(stage: Stage, text: str) -> Compiler:
+    return Compiler(parse(text), PlanState(stage.plan_context, stage.begin()))
 
 
 @pytest.mark.usefixtures("untimed")
 def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
-    builder, found = layout(stage, PourDemo(basin=NEAR).text)
-    names = [task.name for task in found.tasks()]
+    names = [task.name for task in layout(stage, PourDemo(basin=NEAR).text).tasks()]
     # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1
-    assert builder.taken is None
 
 
 @pytest.mark.usefixtures("untimed")
 def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
     with pytest.raises(InputError, match="cannot be emptied into basin") as refused:
-        layout(stage, text)[1].tasks()
+        layout(stage, text).tasks()
     assert "other pitch" not in str(refused.value)
 
 
 @pytest.mark.usefixtures("untimed")
 def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
     with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:
-        layout(stage, PourDemo(basin=(740.0, 600.0)).text)[1].tasks()
+        layout(stage, PourDemo(basin=(740.0, 600.0)).text).tasks()
     assert "with a pitch of 30.0 deg" in str(refused.value)

@@ -8,7 +8,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler
@@ -190,7 +190,7 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
 
 
 def test_tool_point_is_measured_in_the_frame_of_the_script(stage: Stage, empty: State) -> None:
-    p = PlanBuilder(stage.plan_context, empty).target.position
+    p = PlanState(stage.plan_context, empty).target.position
     T = stage.plan_context.T_base_shoulder
     for frame, z in (("shoulder", p[2]), ("base", (T[:3, :3] @ p + T[:3, 3])[2])):
         bounds = f"{{at_least: {1e3 * z - 0.1:.4f}, at_most: {1e3 * z + 0.1:.4f}}}"
@@ -238,9 +238,9 @@ def test_number_of_copies_of_a_step_is_bounded(stage: Stage, empty: State) -> No
     with pytest.raises(ScriptError, match=f"more than {MAX_COPIES} situations") as refused:
         planned(stage, 5 * one + home, empty)
     assert refused.value.problems[0].line == 7
-    builder = PlanBuilder(stage.plan_context, empty)
-    assert Compiler(parse(HEAD + 4 * one + home), builder).tasks()
-    assert Compiler(parse(HEAD + 8 * (one + home)), builder).tasks()
+    begin = PlanState(stage.plan_context, empty)
+    assert Compiler(parse(HEAD + 4 * one + home), begin).tasks()
+    assert Compiler(parse(HEAD + 8 * (one + home)), begin).tasks()
 
 
 def test_arrangement_after_different_ends_is_planned(stage: Stage, empty: State) -> None:

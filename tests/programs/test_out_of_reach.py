@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.messages import AXIS_NAMES
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.planning.out_of_reach import unreached
@@ -28,15 +28,15 @@ START = "  - move: {x: 400, y: 0, z: 300, pitch: 30, roll: 0}\n"
 
 
 @pytest.fixture
-def builder(stage: Stage) -> PlanBuilder:
+def begin(stage: Stage) -> PlanState:
     T = stage.plan_context.T_base_shoulder
-    return PlanBuilder(stage.plan_context, stage.begin(), ScriptFrame.of(T, in_base=True))
+    return PlanState(stage.plan_context, stage.begin(), ScriptFrame.of(T, in_base=True))
 
 
-def said(builder: PlanBuilder, target: ToolTarget) -> str:
+def said(begin: PlanState, target: ToolTarget) -> str:
     """Return the message about ``target``."""
-    assert builder.frame is not None
-    return unreached(builder.planning, builder.q, target, None, builder.frame)
+    assert begin.frame is not None
+    return unreached(begin.planning, begin.q, target, None, begin.frame)
 
 
 def nearest_by_search(chain: Chain, target: ToolTarget) -> float:
@@ -68,11 +68,11 @@ def targets(count: int) -> list[ToolTarget]:
     return [ToolTarget(np.array(row[:3]), row[3], 0.0) for row in rows]
 
 
-def test_amount_is_the_distance_to_the_nearest_point(builder: PlanBuilder) -> None:
+def test_amount_is_the_distance_to_the_nearest_point(begin: PlanState) -> None:
     stretched = limited = 0
     for target in targets(24):
-        found = AMOUNT.search(said(builder, target))
-        by_search = nearest_by_search(builder.chain, target)
+        found = AMOUNT.search(said(begin, target))
+        by_search = nearest_by_search(begin.chain, target)
         if found is None:
             # Printed with one decimal: what is missed by less is not looked for here.
             continue
@@ -82,11 +82,11 @@ def test_amount_is_the_distance_to_the_nearest_point(builder: PlanBuilder) -> No
     assert min(stretched, limited) >= 3
 
 
-def test_named_axis_binds(builder: PlanBuilder) -> None:
+def test_named_axis_binds(begin: PlanState) -> None:
     """Without the limit that is named the place is nearer, and without any other one it is not."""
-    chain, named = builder.chain, set()
+    chain, named = begin.chain, set()
     for target in targets(40):
-        found = AMOUNT.search(said(builder, target))
+        found = AMOUNT.search(said(begin, target))
         limits = [] if found is None else LIMIT.findall(found[2])
         if found is None or len(limits) != 1:
             continue
@@ -108,10 +108,10 @@ def test_named_axis_binds(builder: PlanBuilder) -> None:
     assert len(named) >= 2
 
 
-def test_roll_beyond_its_limit_is_named(builder: PlanBuilder) -> None:
+def test_roll_beyond_its_limit_is_named(begin: PlanState) -> None:
     p: FloatArray = np.array((0.4, 0.0, 0.1))
     target = ToolTarget(p, math.radians(30.0), math.radians(175.0))
-    why = said(builder, target)
+    why = said(begin, target)
     assert "the roll is 3.5 deg beyond what the arm can have" in why
     assert "axis 5, wrist roll, is at its limit of 171.5 deg" in why
     found = re.search(r"`roll: (\S+)`", why)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.run.program import compiled
@@ -21,38 +22,38 @@ POINT = re.compile(r"`\{x: (\S+), y: (\S+), z: (\S+)\}`")
 
 
 @pytest.fixture
-def builder(stage: Stage) -> PlanBuilder:
-    return PlanBuilder(stage.plan_context, stage.begin())
+def begin(stage: Stage) -> PlanState:
+    return PlanState(stage.plan_context, stage.begin())
 
 
-def refusal(builder: PlanBuilder, frame: str, p: tuple[float, ...], pitch: float) -> str:
+def refusal(begin: PlanState, frame: str, p: tuple[float, ...], pitch: float) -> str:
     """Return why the tool cannot be at ``p`` [mm] with ``pitch`` [deg]; empty if it can."""
     text = PLACE.format(frame=frame, x=p[0], y=p[1], z=p[2], pitch=pitch)
     script = parse(text)
     (step,) = script.steps
-    T = builder.plan_context.T_base_shoulder
-    builder.frame = ScriptFrame.of(T, in_base=script.in_base)
+    T = begin.plan_context.T_base_shoulder
+    plan = replace(begin, frame=ScriptFrame.of(T, in_base=script.in_base))
     try:
         # Only whether it can be reached; the way there is not planned.
-        builder.joints_at(step.step.to)  # type: ignore[union-attr]
+        plan.joints_at(step.step.to)  # type: ignore[union-attr]
     except InputError as error:
         return str(error)
     return ""
 
 
 @pytest.mark.parametrize("frame", ["shoulder", "base"])
-def test_suggested_places_are_reached(builder: PlanBuilder, frame: str) -> None:
+def test_suggested_places_are_reached(begin: PlanState, frame: str) -> None:
     rng = np.random.default_rng(19)
     pitches = points = 0
     for _ in range(60):
         *p, pitch = np.round(rng.uniform((-600, -600, -300, -90), (700, 600, 600, 90)), 1).tolist()
-        why = refusal(builder, frame, tuple(p), pitch)
+        why = refusal(begin, frame, tuple(p), pitch)
         if found := PITCH.search(why):
             pitches += 1
-            assert refusal(builder, frame, tuple(p), float(found[1])) == ""
+            assert refusal(begin, frame, tuple(p), float(found[1])) == ""
         if found := POINT.search(why):
             points += 1
-            assert refusal(builder, frame, tuple(map(float, found.groups())), pitch) == ""
+            assert refusal(begin, frame, tuple(map(float, found.groups())), pitch) == ""
         assert not why or f"({p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f}) mm in the {frame} frame" in why
     assert pitches > 2
     assert points > 20

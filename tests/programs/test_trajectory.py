@@ -15,7 +15,7 @@ from katana450.arm.control.scene_objects import SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline, TrajectoryPath

@@ -10,7 +10,7 @@ import numpy as np
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase, Run

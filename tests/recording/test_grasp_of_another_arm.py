@@ -13,7 +13,7 @@ from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase, Run

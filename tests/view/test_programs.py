@@ -18,7 +18,7 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.timeline import Timeline
 from katana450.extensions.programs.script.pour import PourDemo

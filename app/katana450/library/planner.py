@@ -14,9 +14,9 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.general_arms.nearest import nearest_pose
-from katana450.extensions.programs.building.plan_builder import (
-    PlanBuilder,
+from katana450.extensions.programs.building.plan_state import (
     PlanContext,
+    PlanState,
     UntimedPath,
 )
 from katana450.extensions.programs.language.places import ROOMIEST
@@ -61,15 +61,15 @@ class Planner:
         self, goals: Sequence[npt.ArrayLike], start: npt.ArrayLike | None, seed: int
     ) -> Plan:
         """Plan to each of ``goals`` in turn: joint angles (n,) [rad] or a pose (4, 4)."""
-        builder = self._builder(start, seed)
+        plan = self._plan(start, seed)
         for goal in goals:
             if dimensions(goal) == 2:
-                self._to_pose(builder, goal)
+                plan = self._to_pose(plan, goal)
             else:
-                builder.move_to(self.kinematics.chain.check_q(goal), "plan")
-        if not builder.actions:
+                plan = plan.move_to(self.kinematics.chain.check_q(goal), "plan")
+        if not plan.actions:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
-        return _timed(builder)
+        return _timed(plan)
 
     def line(
         self,
@@ -91,9 +91,7 @@ class Planner:
             _checked(angles),
             in_base=in_base,
         )
-        builder = self._builder(start)
-        step.build(builder)
-        return _timed(builder)
+        return _timed(step.build(self._plan(start)))
 
     def circle(
         self,
@@ -131,37 +129,34 @@ class Planner:
             turns=count,
             branch=branch,
         )
-        builder = self._builder(start)
-        circle.build(builder)
-        if start is None:
-            del builder.actions[:-1]
-        return _timed(builder)
+        plan = circle.build(self._plan(start))
+        return _timed(plan if start is not None else replace(plan, actions=plan.actions[-1:]))
 
-    def _to_pose(self, builder: PlanBuilder, goal: npt.ArrayLike) -> None:
+    def _to_pose(self, plan: PlanState, goal: npt.ArrayLike) -> PlanState:
         """Plan to the nearest reachable posture that takes the pose ``goal`` (4, 4)."""
         T = self.frame.to_shoulder(goal)
-        solutions = IKSolutions(self.kinematics, T, builder.q).feasible
+        solutions = IKSolutions(self.kinematics, T, plan.q).feasible
         if not solutions:
-            nearest = nearest_pose(self.kinematics, T, q_hint=builder.q)
+            nearest = nearest_pose(self.kinematics, T, q_hint=plan.q)
             why = nearest.reason or "only the nearest pose is"
             raise InputError(
                 f"The arm cannot take this pose: {why}. `Arm.nearest` returns the nearest feasible "
                 "pose."
             )
-        q = builder.q
+        q = plan.q
         nearest_first = sorted(solutions, key=lambda solution: float(np.abs(solution.q - q).max()))
-        builder.first(nearest_first, lambda solution: builder.move_to(solution.q, "plan"))
+        return plan.first(nearest_first, lambda plan, posture: plan.move_to(posture.q, "plan"))
 
-    def _builder(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanBuilder:
+    def _plan(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanState:
         plan_context = PlanContext(self.session, self.T_base_shoulder, seed)
-        return PlanBuilder(
+        return PlanState(
             plan_context, self.standing(self.session.ready if start is None else start)
         )
 
 
-def _timed(builder: PlanBuilder) -> Plan:
-    """Time the paths of ``builder``, one after another."""
-    untimed_paths = [action for _, action in builder.actions if isinstance(action, UntimedPath)]
+def _timed(plan: PlanState) -> Plan:
+    """Time the paths of ``plan``, one after another."""
+    untimed_paths = [action for _, action in plan.actions if isinstance(action, UntimedPath)]
     paths = tuple(path for untimed in untimed_paths for path in untimed.paths)
     return replace(untimed_paths[0], paths=paths).timed().plan
 

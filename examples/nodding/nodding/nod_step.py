@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from katana450.sdk import PlanBuilder, Step, commands, kinds
+from katana450.sdk import PlanState, Step, commands, kinds
 from nodding.nodder import JOINT
 
 
@@ -19,8 +19,7 @@ class NodStep(Step, word="nod"):
 
     by: Annotated[float, kinds.angle(-45.0, 45.0)]
 
-    def build(self, builder: PlanBuilder) -> None:
-        """Plan both motions. Raises InputError if no path is found."""
-        start = builder.q
-        builder.move_to(commands.Nudge(JOINT, self.by).targets(start), "nod")
-        builder.move_to(start, "nod back")
+    def build(self, plan: PlanState) -> PlanState:
+        """Return ``plan`` with both motions. Raises InputError if no path is found."""
+        nod = commands.Nudge(JOINT, self.by).targets(plan.q)
+        return plan.move_to(nod, "nod").move_to(plan.q, "nod back")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.planning.curves import Curve, arc_between, line_between
 from katana450.maths.kinematics.tool import ToolTarget
@@ -16,13 +16,13 @@ APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
 """[m] Distances of approach and retreat of the open fingers, tried from the farthest."""
 
 
-def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
-    """Move the tool to ``to``: vertically, then about axis 1, then radially.
+def carry(plan: PlanState, to: ToolTarget, name: str) -> PlanState:
+    """Return ``plan`` with the way of the tool to ``to``: vertically, about axis 1, then radially.
 
     The tool keeps its present orientation up to the last part. An object that is held upright stays
     upright unless ``to`` has another orientation.
     """
-    at, hand = builder.target, builder.hand
+    at, hand = plan.target, plan.hand
     here = math.atan2(at.position[1], at.position[0])
     there = math.atan2(to.position[1], to.position[0])
     radius = math.hypot(at.position[0], at.position[1])
@@ -38,5 +38,4 @@ def carry(builder: PlanBuilder, to: ToolTarget, name: str) -> None:
         curves.append(arc_between(np.zeros(3), UP, turn, 0.0, raised, over))
     if max(over.apart(to)) > JOIN_TOLERANCE:
         curves.append(line_between(over, to))
-    if curves:
-        builder.lead(curves, name)
+    return plan.lead(curves, name) if curves else plan

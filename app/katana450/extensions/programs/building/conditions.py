@@ -14,7 +14,7 @@ from katana450.arm.control.pouring import BASIN, CUP, is_vessel
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared, Group, Kind, record
 from katana450.extensions.programs.language.kinds import (
     FINGER_PLACE,
@@ -65,8 +65,8 @@ class Condition(Declared):
         """Words for what is awaited, as in "wait for cup in the hand"."""
 
     @abstractmethod
-    def checked(self, builder: PlanBuilder) -> Self:
-        """Return the condition for the arm of ``builder``.
+    def checked(self, plan: PlanState) -> Self:
+        """Return the condition for the arm of ``plan``.
 
         Raises InputError if it can never hold for that arm.
         """
@@ -89,9 +89,9 @@ class Held(Condition):
         """Words for what is awaited."""
         return f"{self.name} in the hand"
 
-    def checked(self, builder: PlanBuilder) -> Self:
+    def checked(self, plan: PlanState) -> Self:
         """Return itself. Raises InputError without such an object."""
-        builder.scene_object(self.name)
+        plan.scene_object(self.name)
         return self
 
     def holds(self, state: State) -> bool:
@@ -123,12 +123,12 @@ class Placed(Condition):
         """Words for what is awaited."""
         return f"{self.name} at its place"
 
-    def checked(self, builder: PlanBuilder) -> Self:
+    def checked(self, plan: PlanState) -> Self:
         """Return the condition in the base frame. Raises InputError without such an object."""
-        builder.scene_object(self.name)
+        plan.scene_object(self.name)
         if self.in_base:
             return self
-        T = builder.plan_context.T_base_shoulder
+        T = plan.plan_context.T_base_shoulder
         return replace(self, at=frozen(T[:3, :3] @ self.at + T[:3, 3]), in_base=True)
 
     def holds(self, state: State) -> bool:
@@ -154,11 +154,11 @@ class Volume(Bounded, Condition):
         """Words for what is awaited."""
         return f"the water in the {self.of}"
 
-    def checked(self, builder: PlanBuilder) -> Self:
+    def checked(self, plan: PlanState) -> Self:
         """Return itself. Raises InputError without water, and for another object."""
-        if self.of not in (CUP, BASIN) and not is_vessel(builder.scene_object(self.of)):
+        if self.of not in (CUP, BASIN) and not is_vessel(plan.scene_object(self.of)):
             raise InputError(f"{self.of} holds no water: only cup, basin and vessels do.")
-        if builder.state.poured is None:
+        if plan.state.poured is None:
             raise InputError(
                 "There is no water: there is no cup in the scene, or nothing is filled."
             )
@@ -194,9 +194,9 @@ class JointAngle(Bounded, Condition):
         """Words for what is awaited."""
         return f"axis {self.axis + 1}"
 
-    def checked(self, builder: PlanBuilder) -> Self:
+    def checked(self, plan: PlanState) -> Self:
         """Return itself. Raises InputError if the arm or the limits of the joint exclude it."""
-        chain = builder.plan_context.arm.chain
+        chain = plan.plan_context.arm.chain
         if self.axis >= chain.n:
             raise InputError(f"There is no axis {self.axis + 1}: the robot has {chain.n} axes.")
         lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
@@ -230,9 +230,9 @@ class FingerPlace(Bounded, Condition):
         """Words for what is awaited."""
         return "the gripper"
 
-    def checked(self, builder: PlanBuilder) -> Self:
+    def checked(self, plan: PlanState) -> Self:
         """Return the condition in rad or m. Raises InputError for an arm without fingers."""
-        fingers = builder.plan_context.arm.gripper
+        fingers = plan.plan_context.arm.gripper
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         scale = 1e-3 if fingers.slides else math.radians(1.0)
@@ -288,9 +288,9 @@ class ToolPlace(Condition):
         """Words for what is awaited."""
         return f"{' and '.join(self.bounds)} of the tool"
 
-    def checked(self, builder: PlanBuilder) -> Self:
-        """Return the condition for the arm of ``builder``."""
-        context = builder.plan_context
+    def checked(self, plan: PlanState) -> Self:
+        """Return the condition for the arm of ``plan``."""
+        context = plan.plan_context
         return replace(self, arm=context.arm, T_base_shoulder=context.T_base_shoulder)
 
     def holds(self, state: State) -> bool:

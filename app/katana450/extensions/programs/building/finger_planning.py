@@ -9,36 +9,36 @@ from katana450.arm.control.messages import part
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
-from katana450.extensions.programs.building.plan_builder import TICK, PlanBuilder
+from katana450.extensions.programs.building.plan_state import TICK, PlanState
 
 
-def with_fingers(builder: PlanBuilder, position: float) -> State:
+def with_fingers(plan: PlanState, position: float) -> State:
     """Return the state at rest after the fingers were moved to ``position`` [rad or m].
 
     They may end before it on an object that they close on. Raises InputError if something else
     stops them.
     """
-    state = builder.after(Gripper(position), round(ACTION_TIMEOUT / TICK))
+    state = plan.after(Gripper(position), round(ACTION_TIMEOUT / TICK))
     if state.gripper_setpoint == state.gripper_goal:
         return state
-    unit, scale = finger_unit(builder)
+    unit, scale = finger_unit(plan)
     goal, end = (f"{value / scale:.1f}" for value in (position, state.gripper_setpoint))
     raise InputError(
         f"The fingers would stop at {end} {unit} on their way to {goal} {unit}: "
-        f"{_obstacle(builder, state)}"
+        f"{_obstacle(plan, state)}"
     )
 
 
-def finger_unit(builder: PlanBuilder) -> tuple[str, float]:
+def finger_unit(plan: PlanState) -> tuple[str, float]:
     """Return the unit of finger positions for people, and its size [m or rad]."""
-    return ("mm", 1e-3) if builder.plan_context.arm.gripper.slides else ("deg", math.radians(1.0))
+    return ("mm", 1e-3) if plan.plan_context.arm.gripper.slides else ("deg", math.radians(1.0))
 
 
-def _obstacle(builder: PlanBuilder, state: State) -> str:
+def _obstacle(plan: PlanState, state: State) -> str:
     """Return what stops the fingers in ``state``, and a remedy."""
     contacts = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
     parts = contacts[0] if contacts else None
-    world = builder.plan_context.session.world_at(state)
+    world = plan.plan_context.session.world_at(state)
     # Objects that can be held are touched without a finding.
     nearest = None if world is None else world.nearest(state.x_setpoint)
     if parts is None and nearest is not None:

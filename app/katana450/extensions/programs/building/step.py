@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any
 
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared
 
 STEPS: dict[str, type[Step]] = {}
@@ -24,5 +24,5 @@ class Step(Declared):
                 cls.noun = f"an {word}" if word[0] in "aeiou" else f"a {word}"
 
     @abstractmethod
-    def build(self, builder: PlanBuilder) -> None:
-        """Append the step's actions, with their plans. Raises InputError if it is not possible."""
+    def build(self, plan: PlanState) -> PlanState:
+        """Return ``plan`` with the actions of the step. Raises InputError if it is not possible."""

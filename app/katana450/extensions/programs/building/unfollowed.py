@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.extensions.programs.planning.out_of_reach import farthest, near_points
 from katana450.extensions.programs.planning.pose_path import LostPathError
@@ -38,7 +38,7 @@ LEFT = 1e-4
 
 
 def unfollowed(
-    builder: PlanBuilder,
+    plan: PlanState,
     refused: InputError,
     curve: Curve,
     branch: AnyBranch,
@@ -49,26 +49,26 @@ def unfollowed(
     A refusal for a contact, or for another reason than the path, is returned unchanged.
 
     Args:
-        builder: the arm at the start of the path.
+        plan: the arm at the start of the path.
         refused: why it cannot follow the path.
         curve: the path of the tool.
         branch: the branch of the joints on the path.
         remedies: texts to copy, each of which makes the path possible.
     """
-    frame = builder.frame
+    frame = plan.frame
     if frame is None or isinstance(refused, BlockedError) or not isinstance(refused, PathError):
         return refused
-    if builder.given_up:
+    if plan.given_up:
         # With another grasp. Only the refusal with the first one is shown.
         return refused
-    text = refused.text + farthest(builder.planning, builder.q, curve, branch, frame)
+    text = refused.text + farthest(plan.planning, plan.q, curve, branch, frame)
     if works := list(remedies):
         text += f" It can be followed {' or '.join(works)}."
     return PathError(text, refused.point, parts=refused.parts)
 
 
 def line_remedies(
-    builder: PlanBuilder, start: ToolTarget, end: ToolTarget, refused: InputError
+    plan: PlanState, start: ToolTarget, end: ToolTarget, refused: InputError
 ) -> Iterator[str]:
     """Yield texts to copy, with each of which the line from ``start`` to ``end`` is possible.
 
@@ -76,12 +76,12 @@ def line_remedies(
     """
 
     def possible(tried: ToolTarget) -> bool:
-        return _possible(builder, lambda: builder.lead([line_between(start, tried)], "line"))
+        return _possible(lambda: plan.lead([line_between(start, tried)], "line"))
 
     for pitch in _other_pitch(end, possible):
         yield f"with `pitch: {pitch:g}` at its end"
     length = math.dist(start.position, end.position)
-    if length <= MIN_LENGTH or builder.frame is None:
+    if length <= MIN_LENGTH or plan.frame is None:
         return
     if isinstance(refused, LostPathError):
         reached = refused.sigma
@@ -89,32 +89,30 @@ def line_remedies(
         reached = _farthest(lambda fraction: possible(end.moved(_between(start, end, fraction))))
     if reached * length > MIN_LENGTH + LEFT:
         last = _between(start, end, reached - LEFT / length)
-        for text, p in near_points(builder.frame, last):
+        for text, p in near_points(plan.frame, last):
             if possible(end.moved(frozen(p))):
                 yield f"as far as `to: {text}`"
                 return
 
 
 def arc_remedies(
-    builder: PlanBuilder,
     end: ToolTarget,
-    build: Callable[[ToolTarget, float], None],
+    build: Callable[[ToolTarget, float], PlanState],
     size: tuple[str, float],
     refused: InputError,
 ) -> Iterator[str]:
     """Yield texts to copy, with each of which an arc is possible.
 
     Args:
-        builder: the arm at the start.
         end: the target at the end of the arc, whose orientation counts.
-        build: appends the arc to another orientation, and with a fraction of its size, to
-            ``builder``. Raises InputError.
+        build: returns the plan with the arc to another orientation, and with a fraction of its
+            size. Raises InputError.
         size: name and value of the field that gives its size, in the unit of a script.
         refused: why the whole arc is not possible.
     """
 
     def possible(target: ToolTarget, fraction: float) -> bool:
-        return _possible(builder, lambda: build(target, fraction))
+        return _possible(lambda: build(target, fraction))
 
     for other in _other_pitch(end, lambda target: possible(target, 1.0)):
         yield f"with `pitch: {other:g}`"
@@ -157,14 +155,11 @@ def _other_pitch(end: ToolTarget, possible: Callable[[ToolTarget], bool]) -> Ite
             return
 
 
-def _possible(builder: PlanBuilder, build: Callable[[], None]) -> bool:
-    """Return whether ``build`` succeeds; undo it."""
+def _possible(build: Callable[[], PlanState]) -> bool:
+    """Return whether ``build`` succeeds."""
     checkpoint()
-    state, actions = builder.state, list(builder.actions)
     try:
         build()
     except InputError:
         return False
-    finally:
-        builder.state, builder.actions = state, actions
     return True

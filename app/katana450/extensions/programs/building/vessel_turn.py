@@ -18,7 +18,7 @@ from numpy.polynomial.polynomial import polyfit, polyval
 from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.planning.curves import Curve, PoseTurn, ToolLine, ToolTurn
 from katana450.maths.geometry import so3
@@ -144,7 +144,7 @@ class Rolling(VesselTurn):
 
 
 def turns_over(
-    builder: PlanBuilder,
+    plan: PlanState,
     held: SceneObject,
     below: SceneObject,
     tilt: float | None,
@@ -154,7 +154,7 @@ def turns_over(
     """Yield the ways to turn the vessel in the hand over ``below``, the best first.
 
     Args:
-        builder: the arm, which holds it.
+        plan: the arm, which holds it.
         held: the vessel.
         below: what receives its water.
         tilt: its tilt at the end of the pour [rad]; None to empty it.
@@ -162,33 +162,33 @@ def turns_over(
 
     Raises InputError for a tilt that the arm cannot give it, and out of reach.
     """
-    level = builder.target
+    level = plan.target
     if not level.is_pitched:
         if tilt is not None and tilt > EMPTY_TILT and not is_rated:
             raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
-        yield from _about_the_lip(builder, held, below, tilt)
+        yield from _about_the_lip(plan, held, below, tilt)
         return
     roll = POUR_TURN if tilt is None else float(_roll_of(tilt, level.pitch))
     if tilt is not None and roll >= POUR_TURN:
         raise InputError("The wrist cannot tilt it that far; pour all of it, or less.")
     over = _over_vessel if is_vessel(below) else _over_basin
-    for sign, limit in ((1.0, builder.chain.upper[4]), (-1.0, -builder.chain.lower[4])):
+    for sign, limit in ((1.0, plan.chain.upper[4]), (-1.0, -plan.chain.lower[4])):
         # The turn is limited to the range of the wrist.
         turn = sign * min(roll, 0.995 * float(limit) - abs(level.roll))
-        yield over(builder, held, below, level, turn, is_emptied=tilt is None)
+        yield over(plan, held, below, level, turn, is_emptied=tilt is None)
 
 
 def _about_the_lip(
-    builder: PlanBuilder, held: SceneObject, below: SceneObject, tilt: float | None
+    plan: PlanState, held: SceneObject, below: SceneObject, tilt: float | None
 ) -> Iterator[Tilting]:
     """Yield the ways to tilt an upright cup about its lip, by a hand that takes poses."""
-    T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
-    cup = builder.point(T[:3, 3] + held.height * T[:3, 2], in_base=True)
-    over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height), in_base=True)
-    level, hand, aim = builder.target, builder.hand, AIM if is_vessel(below) else 0.0
+    T = plan.plan_context.session.environment.pose(held, plan.state.x_setpoint)
+    cup = plan.point(T[:3, 3] + held.height * T[:3, 2], in_base=True)
+    over = plan.point(below.T[:3, 3] + (0.0, 0.0, below.height), in_base=True)
+    level, hand, aim = plan.target, plan.hand, AIM if is_vessel(below) else 0.0
     for height in UNDERSIDES:
         point = over + (held.height + height) * UP
-        for turn, toward, in_pose in hand.tilt_directions(builder.q, cup, point):
+        for turn, toward, in_pose in hand.tilt_directions(plan.q, cup, point):
             lip = point - aim * toward
             axis, axis_in_pose = (frozen(np.cross(UP, d)) for d in (toward, in_pose))
             # The cup turns with the arm on the way to the basin.
@@ -199,7 +199,7 @@ def _about_the_lip(
 
 
 def _over_basin(
-    builder: PlanBuilder,
+    plan: PlanState,
     held: SceneObject,
     below: SceneObject,
     level: ToolTarget,
@@ -208,19 +208,19 @@ def _over_basin(
     is_emptied: bool,
 ) -> Rolling:
     """Return the roll with the lip over the middle of the object ``below`` when it pours."""
-    over = builder.point(below.T[:3, 3] + (0.0, 0.0, below.height + ABOVE_RIM), in_base=True)
+    over = plan.point(below.T[:3, 3] + (0.0, 0.0, below.height + ABOVE_RIM), in_base=True)
     position = over
     for _ in range(3):
         # When the cup lies on its side, or is tilted as far as it will be.
         at = replace(level, position=position)
         tilted = 0.5 * turn if is_emptied else turn
-        side = builder.joints_of(replace(at, roll=level.roll + tilted))
-        position = position + (over - _lip(builder, held, side)[0]) * (1.0, 1.0, 0.0)
+        side = plan.joints_of(replace(at, roll=level.roll + tilted))
+        position = position + (over - _lip(plan, held, side)[0]) * (1.0, 1.0, 0.0)
     return Rolling(replace(level, position=position), turn)
 
 
 def _over_vessel(
-    builder: PlanBuilder,
+    plan: PlanState,
     held: SceneObject,
     below: SceneObject,
     level: ToolTarget,
@@ -230,31 +230,31 @@ def _over_vessel(
 ) -> Rolling:
     """Return the roll with the lip in one place over the vessel ``below``."""
     height = below.height + held.height + UNDERSIDES[0]
-    over = builder.point(below.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+    over = plan.point(below.T[:3, 3] + (0.0, 0.0, height), in_base=True)
     positions, position = [], over
     for roll in (0.5 * turn * np.maximum(1.0 + NODES, FIRST_ROLL)).tolist():
         for _ in range(ROUNDS):
             tool = replace(level, position=position, roll=level.roll + roll)
-            lip, toward = _lip(builder, held, builder.joints_of(tool))
+            lip, toward = _lip(plan, held, plan.joints_of(tool))
             position = position + over - AIM * toward - lip
         positions.append(position)
     at = replace(level, position=frozen(positions[0]))
     return Rolling(at, turn, _through(np.array(positions) - positions[0]))
 
 
-def _lip(builder: PlanBuilder, held: SceneObject, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _lip(plan: PlanState, held: SceneObject, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the lowest point (3,) [m] of the rim in {S}, and the level direction (3,) out of it.
 
     q: the joints (5,) [rad] with which the vessel is tilted.
     """
-    environment = builder.plan_context.session.environment
-    T = environment.pose(held, np.append(q, builder.state.gripper_setpoint))
+    environment = plan.plan_context.session.environment
+    T = environment.pose(held, np.append(q, plan.state.gripper_setpoint))
     up = T[:3, 2]
     downhill = -(np.array((0.0, 0.0, 1.0)) - up[2] * up)
     downhill /= np.linalg.norm(downhill)
-    rim = builder.point(T[:3, 3] + held.height * up + held.extent[0] * downhill, in_base=True)
+    rim = plan.point(T[:3, 3] + held.height * up + held.extent[0] * downhill, in_base=True)
     toward = np.array((up[0], up[1], 0.0)) / np.hypot(up[0], up[1])
-    return rim, builder.direction(toward, in_base=True)
+    return rim, plan.direction(toward, in_base=True)
 
 
 def _through(values: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot, find_arm
 from katana450.errors import KatanaError
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.run.simulation import Simulation

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.messages import part
-from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, Task
 from katana450.extensions.programs.building.conditions import Condition, Held, ProgramTime
@@ -24,15 +23,13 @@ from katana450.extensions.programs.building.located_step import (
     count,
     numbered,
 )
-from katana450.extensions.programs.building.plan_builder import (
+from katana450.extensions.programs.building.plan_state import (
     EXACT,
-    GraspInfo,
-    PlanBuilder,
+    PlanState,
     UntimedPath,
 )
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.source import Problem, ScriptError
-from katana450.extensions.programs.planning.approach import Approach
 from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.run.task_list import PlannedChoice, PlannedStep, task_list
 from katana450.extensions.programs.script.script import Script
@@ -84,29 +81,11 @@ Report = Callable[[PlanningStage], None]
 """A function that is called with each stage as it begins."""
 
 
-class CompiledStep(NamedTuple):
-    """The actions of a step before its paths are timed, and the state at its end."""
-
-    actions: list[tuple[str, Action | UntimedPath]]
-    state: State
-    taken: GraspInfo | None
-
-
-class _Place(NamedTuple):
-    """The place of the planning: everything that a later attempt starts from."""
-
-    state: State
-    taken: GraspInfo | None
-    given_up: tuple[Approach, ...]
-    # The number of situations for which the next steps are planned.
-    copies: int
-
-
 class _Line(NamedTuple):
-    """Steps that are planned one after another, and the different places where they end."""
+    """Steps that are planned one after another, and the different plans with which they end."""
 
     steps: list[PlannedStep | PlannedChoice]
-    ends: tuple[_Place, ...]
+    ends: tuple[PlanState, ...]
 
 
 class Compiler:
@@ -118,21 +97,18 @@ class Compiler:
     after the ``if`` that are planned for this alternative alone.
     """
 
-    def __init__(
-        self, script: Script, builder: PlanBuilder, report: Report = lambda _: None
-    ) -> None:
-        """Prepare to compile. ``report`` is called with every stage.
+    def __init__(self, script: Script, begin: PlanState, report: Report = lambda _: None) -> None:
+        """Prepare to compile from ``begin``. ``report`` is called with every stage.
 
         An error that ``report`` raises ends the planning.
         """
         self._script = script
-        self._builder = builder
+        self._begin = begin
         self._report = report
         self._steps = count(script.steps)
         # A step repeated in the same situation is planned only once.
-        self._known: dict[tuple[object, ...], CompiledStep] = {}
+        self._known: dict[tuple[object, ...], PlanState] = {}
         self._plans: dict[int, FollowPlan] = {}
-        self._copies = 1
 
     def tasks(self, first: int = 0) -> tuple[Task, ...]:
         """Return the tasks from the step with the index ``first``.
@@ -142,13 +118,13 @@ class Compiler:
         the line of a step that is not possible.
         """
         steps = [
-            each
-            for each in numbered(self._script.steps, 0)
-            if each.number >= first or isinstance(each.located.step, Tool | Speed)
+            step
+            for step in numbered(self._script.steps, 0)
+            if step.number >= first or isinstance(step.located.step, Tool | Speed)
         ]
-        if first and first not in (each.number for each in steps):
+        if first and first not in (step.number for step in steps):
             raise InputError(self._no_beginning(first))
-        line = self._line(steps, len(steps))
+        line = self._line(self._begin, steps, len(steps), 1)
         # Paths are timed last, so that no time is spent on a script that is refused.
         return task_list(line.steps, self._timed)
 
@@ -156,133 +132,114 @@ class Compiler:
         """Return why the program cannot begin at the step with the index ``first``."""
         if first >= self._steps:
             return f"There is no step {first + 1}: {self._script.name} has {self._steps} steps."
-        outer = max(each.number for each in numbered(self._script.steps, 0) if each.number < first)
+        outer = max(step.number for step in numbered(self._script.steps, 0) if step.number < first)
         return f"Step {first + 1} is inside an `if`. Begin at step {outer + 1}, the `if`."
 
-    def _line(self, steps: Sequence[NumberedStep], end: int) -> _Line:
-        """Plan ``steps[:end]`` one after another, from the present place. Raises ScriptError."""
-        builder = self._builder
-        found: list[PlannedStep | PlannedChoice] = []
-        # The index of the step that grasped the held object, and the place before that step.
-        grasp: tuple[int, _Place] | None = None
+    def _line(self, plan: PlanState, steps: Sequence[NumberedStep], end: int, copies: int) -> _Line:
+        """Plan ``steps[:end]`` one after another. Raises ScriptError.
+
+        ``copies``: the number of situations for which they are planned.
+        """
+        line: list[PlannedStep | PlannedChoice] = []
+        # The index of the step that grasped the held object, and the plan before that step.
+        grasp: tuple[int, PlanState] | None = None
         refused: Problem | None = None
         reasons: set[Problem] = set()
-        while (index := sum(each.used for each in found)) < end:
-            before = self._place
+        while (index := sum(planned.used for planned in line)) < end:
             try:
-                planned, ends = self._one(steps, index, end)
+                planned, ends = self._one(plan, steps, index, end, copies)
             except ScriptError as error:
-                self._return_to(before)
                 refused = refused or error.problems[0]
                 reasons.add(error.problems[0])
-                if grasp is None or builder.taken is None or builder.taken.chosen is None:
-                    raise self._error(refused, reasons) from error
-                given_up = (*builder.given_up, builder.taken.chosen)
-                number, place = grasp
-                self._return_to(place._replace(given_up=given_up))
-                grasp = None
-                del found[number:]
+                if grasp is None or plan.taken is None or plan.taken.chosen is None:
+                    raise _refusal(plan, refused, reasons) from error
+                given_up = (*plan.given_up, plan.taken.chosen)
+                number, before_grasp = grasp
+                plan, grasp = replace(before_grasp, given_up=given_up), None
+                del line[number:]
                 continue
-            found.append(planned)
+            line.append(planned)
             if len(ends) > 1:
                 # The alternatives of an `if` have all steps that follow.
-                return _Line(found, ends)
-            if builder.taken is None:
-                grasp, refused, builder.given_up = None, None, ()
+                return _Line(line, ends)
+            before, plan = plan, ends[0]
+            if plan.taken is None:
+                grasp, refused, plan = None, None, replace(plan, given_up=())
                 reasons.clear()
-            elif builder.taken is not before.taken:
-                tried_again = builder.taken.chosen is not None and isinstance(planned, PlannedStep)
-                grasp = (len(found) - 1, before) if tried_again else None
-        return _Line(found, (self._place,))
+            elif plan.taken is not before.taken:
+                tried_again = plan.taken.chosen is not None and isinstance(planned, PlannedStep)
+                grasp = (len(line) - 1, before) if tried_again else None
+        return _Line(line, (plan,))
 
     def _one(
-        self, steps: Sequence[NumberedStep], index: int, end: int
-    ) -> tuple[PlannedStep | PlannedChoice, tuple[_Place, ...]]:
+        self, plan: PlanState, steps: Sequence[NumberedStep], index: int, end: int, copies: int
+    ) -> tuple[PlannedStep | PlannedChoice, tuple[PlanState, ...]]:
         """Plan the step ``index`` of ``steps``; an ``if`` with those up to ``end`` that it needs.
 
-        The second value has the places where it ends. Raises ScriptError.
+        The second value has the plans with which it ends. Raises ScriptError.
         """
         number, located = steps[index]
         self._report(PlanningStage(FINDING, number + 1, self._steps))
         if isinstance(located.step, Conditional):
-            return self._choice(number, located, located.step, steps[index + 1 : end])
-        self._builder.ahead = [each.located.step for each in steps[index + 1 :]]
-        compiled_step = self._step(located, located.step)
-        _, self._builder.state, self._builder.taken = compiled_step
-        return PlannedStep(number, located, compiled_step.actions), (self._place,)
+            rest = steps[index + 1 : end]
+            return self._choice(plan, number, located, located.step, rest, copies)
+        ahead = [step.located.step for step in steps[index + 1 :]]
+        after = self._step(replace(plan, ahead=ahead, actions=()), located, located.step)
+        return PlannedStep(number, located, after.actions), (after,)
 
     def _choice(
         self,
+        plan: PlanState,
         number: int,
         located: LocatedStep,
         step: Conditional,
         rest: Sequence[NumberedStep],
-    ) -> tuple[PlannedChoice, tuple[_Place, ...]]:
+        copies: int,
+    ) -> tuple[PlannedChoice, tuple[PlanState, ...]]:
         """Plan both alternatives of an ``if``, and steps of ``rest`` in each until they agree."""
         condition: Condition | ProgramTime = step.condition
         predicted = None
         if not isinstance(condition, ProgramTime):
             try:
-                condition = condition.checked(self._builder)
+                condition = condition.checked(plan)
             except InputError as error:
                 raise _at(located, error) from error
-            predicted = condition.holds(self._builder.state)
+            predicted = condition.holds(plan.state)
         alternatives = (
             list(numbered(step.then, number + 1)),
             list(numbered(step.otherwise, number + 1 + count(step.then))),
         )
-        before = self._place
-        starts = [before, before]
-        if isinstance(condition, Held) and predicted:
-            # Otherwise `else` could not even grasp the object again.
-            self._builder.assume_missed()
-            starts[1] = self._place
+        # Otherwise `else` could not even grasp the object again.
+        is_missed = isinstance(condition, Held) and predicted
+        starts = (plan, plan.with_missed_grasp() if is_missed else plan)
         used = 0
         for used in sorted({min(most, len(rest)) for most in (*JOIN_AFTER, len(rest))}):
-            copies = before.copies * (2 if used else 1)
-            if copies > MAX_COPIES:
+            inner_copies = copies * (2 if used else 1)
+            if inner_copies > MAX_COPIES:
                 raise _at(located, InputError(TOO_MANY_COPIES))
             lines = [
-                self._line_from(start._replace(copies=copies), [*inner, *rest], len(inner) + used)
+                self._line(start, [*inner, *rest], len(inner) + used, inner_copies)
                 for start, inner in zip(starts, alternatives, strict=True)
             ]
             ends = _different(end for line in lines for end in line.ends)
             if len(ends) == 1:
                 break
-        self._return_to(ends[0]._replace(copies=before.copies))
         then, otherwise = (line.steps for line in lines)
         choice = PlannedChoice(number, located, condition, predicted, then, otherwise, 1 + used)
         return choice, ends
 
-    def _line_from(self, place: _Place, steps: Sequence[NumberedStep], end: int) -> _Line:
-        """Plan ``steps[:end]`` from ``place``. Raises ScriptError."""
-        self._return_to(place)
-        return self._line(steps, end)
-
-    @property
-    def _place(self) -> _Place:
-        builder = self._builder
-        return _Place(builder.state, builder.taken, builder.given_up, self._copies)
-
-    def _return_to(self, place: _Place) -> None:
-        builder = self._builder
-        builder.state, builder.taken, builder.given_up, self._copies = place
-
-    def _step(self, located: LocatedStep, step: Step) -> CompiledStep:
-        """Plan one step from the present place. Raises ScriptError."""
-        builder = self._builder
-        key = id(step), *_situation(builder)
+    def _step(self, plan: PlanState, located: LocatedStep, step: Step) -> PlanState:
+        """Return ``plan``, which has no actions, with one step. Raises ScriptError."""
+        key = id(step), *_situation(plan)
         if key in self._known:
             return self._known[key]
-        builder.actions = []
         try:
-            step.build(builder)
+            after = step.build(plan)
         except InputError as error:
             raise _at(located, self._for_people(error)) from error
-        compiled_step = CompiledStep(builder.actions, builder.state, builder.taken)
-        if any(isinstance(action, UntimedPath) for _, action in compiled_step.actions):
-            self._known[key] = compiled_step
-        return compiled_step
+        if any(isinstance(action, UntimedPath) for _, action in after.actions):
+            self._known[key] = after
+        return after
 
     def _for_people(self, error: InputError) -> InputError:
         """Return ``error`` with its point in the frame of the script, and names for people."""
@@ -290,7 +247,7 @@ class Compiler:
             return error
         point, frame = error.point, "{S}"
         if self._script.in_base and point:
-            T = self._builder.plan_context.T_base_shoulder
+            T = self._begin.plan_context.T_base_shoulder
             point, frame = (T[:3, :3] @ point + T[:3, 3]).tolist(), "the base frame"
         return PathError(error.text, point, frame, tuple(map(part, error.parts)))
 
@@ -308,43 +265,44 @@ class Compiler:
                     raise _at(step.located, error) from error
             yield name, self._plans[id(action)]
 
-    def _error(self, refused: Problem, reasons: Set[Problem]) -> ScriptError:
-        """Return the first refusal, with the other pitches of the grasp that have failed too.
 
-        ``reasons``: the refusals with all pitches. A reason that is the same with each of them has
-        nothing to do with the pitch.
-        """
-        text = refused.text
-        pitches_tried = dict.fromkeys(each.pitch for each in self._builder.given_up)
-        tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
-        at_step = [each for each in reasons if each.line == refused.line]
-        if len(tried) > 1 and len(at_step) > 1:
-            pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
-            text += f" No other pitch of the grasp helps: tried {pitches} deg."
-        return ScriptError((replace(refused, text=text),))
+def _refusal(plan: PlanState, refused: Problem, reasons: Set[Problem]) -> ScriptError:
+    """Return the first refusal, with the other pitches of the grasp that have failed too.
+
+    ``reasons``: the refusals with all pitches. A reason that is the same with each of them has
+    nothing to do with the pitch.
+    """
+    text = refused.text
+    pitches_tried = dict.fromkeys(approach.pitch for approach in plan.given_up)
+    tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
+    at_step = [reason for reason in reasons if reason.line == refused.line]
+    if len(tried) > 1 and len(at_step) > 1:
+        pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
+        text += f" No other pitch of the grasp helps: tried {pitches} deg."
+    return ScriptError((replace(refused, text=text),))
 
 
 def _at(located: LocatedStep, error: InputError) -> ScriptError:
     return ScriptError((Problem(located.line, located.column, str(error), located.file),))
 
 
-def _situation(builder: PlanBuilder) -> tuple[object, ...]:
+def _situation(plan: PlanState) -> tuple[object, ...]:
     """Return a hashable key of everything on which the plans of a step depend."""
-    taken = None if builder.taken is None else builder.taken.at.position.tobytes()
-    return Situation.of(builder.state).key, taken, builder.given_up
+    taken = None if plan.taken is None else plan.taken.at.position.tobytes()
+    return Situation.of(plan.state).key, taken, plan.given_up
 
 
-def _different(ends: Iterable[_Place]) -> tuple[_Place, ...]:
+def _different(ends: Iterable[PlanState]) -> tuple[PlanState, ...]:
     """Return ``ends`` without those that are the same as one before."""
-    found: list[_Place] = []
+    different: list[PlanState] = []
     for end in ends:
-        if not any(_same(end, other) for other in found):
-            found.append(end)
-    return tuple(found)
+        if not any(_same(end, other) for other in different):
+            different.append(end)
+    return tuple(different)
 
 
-def _same(one: _Place, other: _Place) -> bool:
-    """Return whether a plan that begins in one place can also begin in the other."""
+def _same(one: PlanState, other: PlanState) -> bool:
+    """Return whether the same step can follow both plans."""
     if Situation.of(one.state).changed_to(Situation.of(other.state)):
         return False
     if one.taken is None or other.taken is None:

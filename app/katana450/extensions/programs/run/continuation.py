@@ -11,9 +11,9 @@ from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.state import State
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan, MoveFingers, Task, UseTool
-from katana450.extensions.programs.building.plan_builder import (
-    PlanBuilder,
+from katana450.extensions.programs.building.plan_state import (
     PlanContext,
+    PlanState,
     UntimedPath,
 )
 from katana450.extensions.programs.run.program import Program
@@ -161,19 +161,18 @@ def _way(plan_context: PlanContext, state: State, q: FloatArray) -> FollowPlan:
     With an object in the hand it is straight in the joints, so that the tilt of the object stays
     between those of both ends. Raises BlockedError.
     """
-    builder = PlanBuilder(plan_context, state)
-    builder.state = builder.standing(state.setpoint)
+    plan = PlanState(plan_context, state).standing(state.setpoint)
     if state.grip is None:
-        builder.move_to(q, RETURN)
+        plan = plan.move_to(q, RETURN)
     else:
         chain = plan_context.arm.chain_to(state.tool)
         try:
-            builder.follow([JointPath(chain, np.array((state.setpoint, q)))], RETURN)
+            plan = plan.follow([JointPath(chain, np.array((state.setpoint, q)))], RETURN)
         except BlockedError as error:
             raise BlockedError(
                 "The arm holds an object and cannot go straight back to its path. Move it nearer "
                 f"to where it was stopped. {error}"
             ) from error
-    ((_, action),) = builder.actions
+    ((_, action),) = plan.actions
     assert isinstance(action, UntimedPath)
     return action.timed()

@@ -17,7 +17,7 @@ from katana450.extensions.programs.building.located_step import (
     count,
     numbered,
 )
-from katana450.extensions.programs.building.plan_builder import PlanBuilder, PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.run.compiler import Compiler, Report
 from katana450.extensions.programs.run.task_list import ConditionalJump
@@ -211,9 +211,8 @@ def compiled(
             "started with the gripper."
         )
     frame = ScriptFrame.of(plan_context.T_base_shoulder, in_base=script.in_base)
-    builder = PlanBuilder(plan_context, state, frame)
-    builder.state = builder.standing(state.setpoint)
-    tasks = Compiler(script, builder, report).tasks(first_step)
+    plan = PlanState(plan_context, state, frame).standing(state.setpoint)
+    tasks = Compiler(script, plan, report).tasks(first_step)
     total_speed = script.speed * speed
     steps, alternatives = count(script.steps), tuple(_alternatives(script.steps, 0))
     return Program(script.name, total_speed, state.setpoint, tasks, steps, alternatives)

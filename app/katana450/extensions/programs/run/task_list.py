@@ -10,7 +10,7 @@ from katana450.arm.control.state import State
 from katana450.extensions.programs.building.actions import Action, SetSpeed, Task
 from katana450.extensions.programs.building.conditions import Condition, ProgramTime
 from katana450.extensions.programs.building.located_step import LocatedStep
-from katana450.extensions.programs.building.plan_builder import UntimedPath
+from katana450.extensions.programs.building.plan_state import UntimedPath
 
 
 @dataclass(frozen=True, eq=False)

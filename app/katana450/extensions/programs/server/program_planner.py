@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from katana450.arm.control import commands as cmd
 from katana450.errors import InputError, LeaseError
-from katana450.extensions.programs.building.plan_builder import PlanContext
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import MAX_BYTES
 from katana450.extensions.programs.run.continuation import Interruption, continued
 from katana450.extensions.programs.run.program import Program, compiled

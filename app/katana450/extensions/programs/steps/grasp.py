@@ -19,7 +19,7 @@ from katana450.extensions.programs.building.carry import APPROACHES
 from katana450.extensions.programs.building.conditions import Held
 from katana450.extensions.programs.building.finger_planning import with_fingers
 from katana450.extensions.programs.building.located_step import Conditional
-from katana450.extensions.programs.building.plan_builder import GraspInfo, PlanBuilder
+from katana450.extensions.programs.building.plan_state import GraspInfo, PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
 from katana450.extensions.programs.planning.approach import ABOVE, DOWN, FRONT, LOW, Approach
@@ -96,10 +96,10 @@ class Grasp(Step, word="grasp"):
         millimetres(1.0, 500.0, "Height above the underside, mm; found unless given"),
     ] = None
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the grasp. Raises InputError if the object cannot be taken."""
-        scene_object = builder.scene_object(self.name)
-        if builder.state.grip is not None:
+        scene_object = plan.scene_object(self.name)
+        if plan.state.grip is not None:
             raise InputError("The hand already holds an object. Set it down first.")
         if not scene_object.can_be_held:
             raise InputError(
@@ -112,75 +112,75 @@ class Grasp(Step, word="grasp"):
                 f"{1e3 * MIN_HEIGHT:.0f} mm: the fingertips stay {1e3 * MARGIN:.0f} mm over what "
                 "an object stands on."
             )
-        hand = builder.hand
-        if hand.tool and builder.state.tool != hand.tool:
-            builder.plan_context.arm.chain_to(hand.tool)
-            builder.note(
+        hand = plan.hand
+        if hand.tool and plan.state.tool != hand.tool:
+            plan.plan_context.arm.chain_to(hand.tool)
+            plan = plan.with_action(
                 f"grasp {self.name}: tool {hand.tool}",
                 UseTool(hand.tool),
-                replace(builder.state, tool=hand.tool),
+                replace(plan.state, tool=hand.tool),
             )
-        opened = builder.plan_context.arm.gripper.opened
-        after = with_fingers(builder, opened)
-        builder.note(f"grasp {self.name}: open", MoveFingers(opened), after)
-        branch_of, ready = builder.plan_context.arm.kinematics.branch_of, builder.plan_context.ready
+        opened = plan.plan_context.arm.gripper.opened
+        after = with_fingers(plan, opened)
+        plan = plan.with_action(f"grasp {self.name}: open", MoveFingers(opened), after)
+        branch_of, ready = plan.plan_context.arm.kinematics.branch_of, plan.plan_context.ready
         # Pitches of a grasp are those of the posture at Home; an arm that reaches over its shoulder
         # would take the object with the hand upside down.
-        via_home = (False,) if branch_of(builder.q) == branch_of(ready) else (False, True)
+        via_home = (False,) if branch_of(plan.q) == branch_of(ready) else (False, True)
 
-        def take(via: bool) -> None:
+        def take(plan: PlanState, via: bool) -> PlanState:
             if via:
-                builder.move_to(ready, f"grasp {self.name}: home")
-            self._approach(builder, scene_object)
+                plan = plan.move_to(ready, f"grasp {self.name}: home")
+            return self._approach(plan, scene_object)
 
         try:
-            builder.first(via_home, take)
+            return plan.first(via_home, take)
         except InputError as error:
             raise error.after(f"{self.name} cannot be grasped at its place") from error
 
-    def _approach(self, builder: PlanBuilder, scene_object: SceneObject) -> None:
+    def _approach(self, plan: PlanState, scene_object: SceneObject) -> PlanState:
         """Plan the grasp with the first approach that works. Raises InputError without one."""
-        chosen, room = self._approaches(builder, scene_object), _Room(JOINT_ROOM)
+        chosen, room = self._approaches(plan, scene_object), _Room(JOINT_ROOM)
+
+        def take(plan: PlanState, approach: Approach) -> PlanState:
+            return self._plan(plan, scene_object, approach, room)
+
         try:
-            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
+            return plan.first(chosen, take)
         except InputError:
             if not room.is_missed:
                 raise
             room = _Room(0.0)
-            builder.first(chosen, lambda it: self._plan(builder, scene_object, it, room))
+            return plan.first(chosen, take)
 
-    def _approaches(self, builder: PlanBuilder, scene_object: SceneObject) -> Sequence[Approach]:
+    def _approaches(self, plan: PlanState, scene_object: SceneObject) -> Sequence[Approach]:
         """Return the approaches to try, in their order, without those that were given up."""
-        at = _point(builder, scene_object, 0.0)
-        turned = builder.direction(scene_object.T[:3, 0], in_base=True)
+        at = _point(plan, scene_object, 0.0)
+        turned = plan.direction(scene_object.T[:3, 0], in_base=True)
         if self.pitch is not None:
-            return builder.hand.with_pitch(self.pitch, scene_object, at, turned)
-        found = builder.hand.approaches(scene_object, at, turned)
+            return plan.hand.with_pitch(self.pitch, scene_object, at, turned)
+        found = plan.hand.approaches(scene_object, at, turned)
         sides = [self.side] if self.side else list(found)
         chosen = [each for side in sides for each in found.get(side, ())]
         if not chosen:
             raise InputError(_no_approach(scene_object, self.side))
-        remaining = [each for each in chosen if each not in builder.given_up]
+        remaining = [each for each in chosen if each not in plan.given_up]
         # Without one in reach, the first gives the reason.
-        in_reach = [each for each in remaining if self._is_in_reach(builder, scene_object, each)]
+        in_reach = [each for each in remaining if self._is_in_reach(plan, scene_object, each)]
         return in_reach or remaining[:1]
 
-    def _is_in_reach(
-        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
-    ) -> bool:
+    def _is_in_reach(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> bool:
         """Return whether the tool can be at one of the heights of a grasp."""
-        hand = builder.hand
+        hand = plan.hand
         return any(
             hand.branches_to(
-                builder.q,
-                hand.before(_point(builder, scene_object, each.height), approach, each.distance),
+                plan.q,
+                hand.before(_point(plan, scene_object, each.height), approach, each.distance),
             )
-            for each in self._grips(builder, scene_object, approach)
+            for each in self._grips(plan, scene_object, approach)
         )
 
-    def _grips(
-        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach
-    ) -> list[Grip]:
+    def _grips(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> list[Grip]:
         """Return the places of the grasp on the object, the best first."""
         if self.height is not None:
             return [Grip(self.height)]
@@ -188,77 +188,74 @@ class Grasp(Step, word="grasp"):
         found = [Grip(fraction * scene_object.height) for fraction in fractions]
         if scene_object.height < LOW:
             middle = 0.5 * scene_object.height
-            found += [Grip(middle, each) for each in builder.hand.tip_distances]
+            found += [Grip(middle, each) for each in plan.hand.tip_distances]
         return found
 
     def _plan(
-        self, builder: PlanBuilder, scene_object: SceneObject, approach: Approach, room: _Room
-    ) -> None:
+        self, plan: PlanState, scene_object: SceneObject, approach: Approach, room: _Room
+    ) -> PlanState:
         """Plan approach and closing. Raises InputError if it is not possible."""
 
-        def plan_at(grip: Grip) -> None:
-            point = _point(builder, scene_object, grip.height)
-            target = builder.hand.before(point, approach, grip.distance)
-            builder.first(
-                builder.hand.branches_to(builder.q, target) or (None,),
-                lambda branch: self._plan_at(builder, scene_object, approach, grip, branch, room),
+        def plan_at(plan: PlanState, grip: Grip) -> PlanState:
+            point = _point(plan, scene_object, grip.height)
+            target = plan.hand.before(point, approach, grip.distance)
+            return plan.first(
+                plan.hand.branches_to(plan.q, target) or (None,),
+                lambda plan, branch: self._plan_at(
+                    plan, scene_object, approach, grip, branch, room
+                ),
             )
 
-        builder.first(self._grips(builder, scene_object, approach), plan_at)
+        return plan.first(self._grips(plan, scene_object, approach), plan_at)
 
     def _plan_at(
         self,
-        builder: PlanBuilder,
+        plan: PlanState,
         scene_object: SceneObject,
         approach: Approach,
         grip: Grip,
         branch: AnyBranch | None,
         room: _Room,
-    ) -> None:
+    ) -> PlanState:
         """Plan the grasp at ``grip`` on ``branch``. Raises InputError if it is not possible."""
-        hand, point = builder.hand, _point(builder, scene_object, grip.height)
-        distance, q = _smallest_distance(builder, point, approach, grip.distance, branch)
+        hand, point = plan.hand, _point(plan, scene_object, grip.height)
+        distance, q = _smallest_distance(plan, point, approach, grip.distance, branch)
         # Before the path there, whose planning takes longer.
-        self._closed(builder, q)
+        self._closed(plan, q)
 
-        def start_at(away: float) -> FloatArray:
+        def start_at(plan: PlanState, away: float) -> FloatArray:
             before = hand.before(point, approach, distance + away)
-            start = builder.joints_of(before, hand.branch_at(q))
-            left = min(_joint_room(builder, start), _joint_room(builder, q))
+            start = plan.joints_of(before, hand.branch_at(q))
+            left = min(_joint_room(plan, start), _joint_room(plan, q))
             if left < room.minimum:
                 room.is_missed = True
                 raise InputError(f"a joint would come within {math.degrees(left):.1f} deg.")
             return start
 
-        start = builder.first(APPROACHES, start_at)
-        builder.move_to(start, f"grasp {self.name}: approach")
+        start = plan.choose(APPROACHES, start_at)
+        plan = plan.move_to(start, f"grasp {self.name}: approach")
         goal = hand.before(point, approach, distance)
-        builder.lead([line_between(builder.target, goal)], f"grasp {self.name}")
+        plan = plan.lead([line_between(plan.target, goal)], f"grasp {self.name}")
         # With more than six axes, the pose alone is given.
-        if not hand.is_redundant and float(np.abs(builder.q - q).max()) > JOIN_TOLERANCE:
+        if not hand.is_redundant and float(np.abs(plan.q - q).max()) > JOIN_TOLERANCE:
             raise InputError("the straight path to it ends in another posture than planned.")
-        closed, held = builder.plan_context.arm.gripper.closed, self._closed(builder, builder.q)
-        holding = "" if self._checked_later(builder.ahead) else self.name
-        builder.note(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
+        closed, held = plan.plan_context.arm.gripper.closed, self._closed(plan, plan.q)
+        holding = "" if self._checked_later(plan.ahead) else self.name
+        plan = plan.with_action(f"grasp {self.name}: close", MoveFingers(closed, holding), held)
         chosen = approach if self.pitch is None else None
-        builder.taken = GraspInfo(builder.target, chosen, scene_object)
+        return replace(plan, taken=GraspInfo(plan.target, chosen, scene_object))
 
-    def _closed(self, builder: PlanBuilder, q: FloatArray) -> State:
+    def _closed(self, plan: PlanState, q: FloatArray) -> State:
         """Return the state at ``q`` (n,) [rad] in which the closed fingers hold the object.
 
         Raises InputError if they do not, or are so near to something that they could not leave.
         """
-        now = builder.state
-        builder.state = builder.standing(q)
-        try:
-            held = with_fingers(builder, builder.plan_context.arm.gripper.closed)
-        finally:
-            builder.state = now
+        held = with_fingers(plan.standing(q), plan.plan_context.arm.gripper.closed)
         if held.held is None or held.held.name != self.name:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
         others = tuple(each for each in held.objects if each.name != self.name)
-        world = builder.plan_context.session.world_at(replace(held, objects=others))
-        nearest = None if world is None else _nearer(builder, world, held.x_setpoint, MARGIN)
+        world = plan.plan_context.session.world_at(replace(held, objects=others))
+        nearest = None if world is None else _nearer(plan, world, held.x_setpoint, MARGIN)
         if nearest is not None:
             raise InputError(_too_near(nearest, MARGIN))
         return held
@@ -273,14 +270,14 @@ class Grasp(Step, word="grasp"):
         return False
 
 
-def _point(builder: PlanBuilder, scene_object: SceneObject, height: float) -> FloatArray:
+def _point(plan: PlanState, scene_object: SceneObject, height: float) -> FloatArray:
     """Return the point (3,) [m] in {S} at ``height`` [m] over the underside of the object."""
-    return builder.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
+    return plan.point(scene_object.T[:3, 3] + (0.0, 0.0, height), in_base=True)
 
 
-def _joint_room(builder: PlanBuilder, q: FloatArray) -> float:
+def _joint_room(plan: PlanState, q: FloatArray) -> float:
     """Return the smallest distance [rad] of the joints ``q`` (5,) [rad] to their limits."""
-    chain = builder.chain
+    chain = plan.chain
     return float(np.minimum(q - chain.lower, chain.upper - q).min())
 
 
@@ -311,13 +308,13 @@ def _no_approach(scene_object: SceneObject, side: str) -> str:
 
 
 def _nearer(
-    builder: PlanBuilder, world: CollisionWorld, x: FloatArray, minimum: float
+    plan: PlanState, world: CollisionWorld, x: FloatArray, minimum: float
 ) -> Contact | None:
     """Return the nearest contact at `x` (k,) of a pair that is nearer than ``minimum`` [m].
 
     Pairs that are nearer at Home may be as near as there. None if all are far enough.
     """
-    home = np.append(builder.plan_context.ready, x[-1])
+    home = np.append(plan.plan_context.ready, x[-1])
     placed, kept = world.at(x), SweptClearance.about(world, minimum, home).minimum
     pairs = placed.nearer_than(kept)[0].tolist()
     found = {pair: placed.distance(pair) for pair in pairs}
@@ -326,7 +323,7 @@ def _nearer(
 
 
 def _smallest_distance(
-    builder: PlanBuilder,
+    plan: PlanState,
     point: FloatArray,
     approach: Approach,
     least: float,
@@ -337,14 +334,14 @@ def _smallest_distance(
     It is at least ``least`` [m]. The second value is the joints (n,) [rad] at that distance.
     """
 
-    def joints_with_room(distance: float) -> tuple[float, FloatArray]:
-        q = builder.joints_of(hand.before(point, approach, distance), branch)
+    def joints_with_room(plan: PlanState, distance: float) -> tuple[float, FloatArray]:
+        q = plan.joints_of(hand.before(point, approach, distance), branch)
         x = np.append(q, fingers)
-        nearest = None if world is None else _nearer(builder, world, x, PALM_CLEARANCE)
+        nearest = None if world is None else _nearer(plan, world, x, PALM_CLEARANCE)
         if nearest is not None:
             raise InputError(_too_near(nearest, PALM_CLEARANCE))
         return distance, q
 
-    hand, world, fingers = builder.hand, builder.world, builder.state.gripper_setpoint
+    hand, world, fingers = plan.hand, plan.world, plan.state.gripper_setpoint
     distances = (least + np.arange(0.0, MAX_DISTANCE + DISTANCE_STEP, DISTANCE_STEP)).tolist()
-    return builder.first(distances, joints_with_room)
+    return plan.choose(distances, joints_with_room)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from katana450.arm.control import commands as cmd
@@ -11,7 +11,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
 from katana450.extensions.programs.building.finger_planning import with_fingers
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.kinds import ObjectName, number
 from katana450.extensions.touch.touch_model import TouchModel
@@ -91,19 +91,19 @@ class GripUntil(Step, word="grip"):
     ]
     holding: ObjectName = ""
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the motion of the fingers.
 
         Raises InputError without an object between the fingers, and for a force that they cannot
         have on it.
         """
-        fingers = builder.plan_context.arm.gripper
-        hand = builder.plan_context.session.environment.hand
+        fingers = plan.plan_context.arm.gripper
+        hand = plan.plan_context.session.environment.hand
         model = None if hand is None else hand.grip_model
         if not isinstance(model, TouchModel):
             raise InputError("The pads of this gripper are not known, so its force is not either.")
-        before = builder.state
-        closed = before if before.grip is not None else with_fingers(builder, fingers.closed)
+        before = plan.state
+        closed = before if before.grip is not None else with_fingers(plan, fingers.closed)
         if closed.held is None or closed.grip is None:
             raise InputError(
                 "The fingers would close without an object between them. Move the open gripper "
@@ -116,5 +116,5 @@ class GripUntil(Step, word="grip"):
             )
         angle = _angle_for(self.force, model, closed, fingers)
         action = CloseUntil(angle, closed.held.name, force=self.force, model=model, gripper=fingers)
-        builder.state = closed
-        builder.note(f"grip until {self.force:g} N", action, with_fingers(builder, angle))
+        plan = replace(plan, state=closed)
+        return plan.with_action(f"grip until {self.force:g} N", action, with_fingers(plan, angle))

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from katana450.arm.control import commands as cmd
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language import kinds
 from katana450.extensions.programs.language.declaration import Declared, Kind
@@ -39,11 +39,11 @@ class RelativeMove(Declared):
     branch: Branch = None
     in_base: bool = False
 
-    def joints(self, builder: PlanBuilder) -> FloatArray:
+    def joints(self, plan: PlanState) -> FloatArray:
         """Return the joints (n,) [rad] at its end. Raises InputError if it cannot be reached."""
-        by = builder.direction(self.by, in_base=self.in_base)
-        there = builder.target_at(StepTarget(angles=self.angles, in_base=self.in_base))
-        return builder.joints_of(there.moved(frozen(there.position + by)), self.branch)
+        by = plan.direction(self.by, in_base=self.in_base)
+        there = plan.target_at(StepTarget(angles=self.angles, in_base=self.in_base))
+        return plan.joints_of(there.moved(frozen(there.position + by)), self.branch)
 
 
 def _destination(value: YamlValue, context: ScriptContext) -> StepTarget | RelativeMove:
@@ -63,11 +63,11 @@ class Move(Step, word="move"):
         Kind(_destination, {"anyOf": [PLACE.schema, RelativeMove.schema()]}),
     ]
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motion. Raises InputError if the place cannot be reached."""
         to = self.to
-        q = builder.joints_at(to) if isinstance(to, StepTarget) else to.joints(builder)
-        builder.move_to(q, "move")
+        q = plan.joints_at(to) if isinstance(to, StepTarget) else to.joints(plan)
+        return plan.move_to(q, "move")
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,9 @@ class Joints(Step, word="joints"):
     q: kinds.Joints
     """(n,) [rad]."""
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motion. Raises InputError if the angles are outside the limits."""
-        builder.move_to(builder.joints_at(StepTarget(joints=self.q)), "joints")
+        return plan.move_to(plan.joints_at(StepTarget(joints=self.q)), "joints")
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ class Nudge(Step, word="nudge"):
     axis: Axis
     by: Annotated[float, kinds.angle(-720.0, 720.0)]
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motion. Raises InputError if the angle is outside the limits."""
-        q = cmd.Nudge(self.axis + 1, self.by).targets(builder.q)
-        builder.move_to(builder.joints_at(StepTarget(joints=q)), "nudge")
+        q = cmd.Nudge(self.axis + 1, self.by).targets(plan.q)
+        return plan.move_to(plan.joints_at(StepTarget(joints=q)), "nudge")
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,9 @@ class Home(Step, word="home"):
 
     noun = "`home`"
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motion."""
-        builder.move_to(builder.plan_context.ready, "home")
+        return plan.move_to(plan.plan_context.ready, "home")
 
 
 @dataclass(frozen=True)
@@ -120,17 +120,14 @@ class Via(Step, word="via"):
     through: Places
     blend: Blend = 0.5
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motion. Raises InputError if a place cannot be reached."""
-        vias = [builder.q]
-        at = builder.state
-        for each in self.through:
-            vias.append(builder.joints_at(each))
-            builder.state = builder.standing(vias[-1])
-        builder.state = at
+        vias, last = [plan.q], plan
+        for place in self.through:
+            vias.append(last.joints_at(place))
+            last = last.standing(vias[-1])
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
-            builder.follow([JointPath(builder.chain, np.array(vias), blend)], "via")
-        else:
-            legs = [np.array(leg) for leg in pairwise(vias)]
-            builder.follow([JointPath(builder.chain, leg, np.zeros(0)) for leg in legs], "via")
+            return plan.follow([JointPath(plan.chain, np.array(vias), blend)], "via")
+        legs = [np.array(leg) for leg in pairwise(vias)]
+        return plan.follow([JointPath(plan.chain, leg, np.zeros(0)) for leg in legs], "via")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
 from katana450.extensions.programs.building.carry import APPROACHES, carry
 from katana450.extensions.programs.building.finger_planning import with_fingers
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Declared
 from katana450.extensions.programs.language.kinds import NAME, Object, ObjectName
@@ -68,38 +69,38 @@ class PlaceHeld(Step, word="place"):
         if at is not None and "on" in given and not math.isnan(at.z):
             yield "", "Give either `on` or the height z, which follows from `on`."
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the way and the release. Raises InputError if it is not possible."""
-        held = held_object(builder, "place")
-        spot = self._spot(builder, held)
+        held = held_object(plan, "place")
+        spot = self._spot(plan, held)
         try:
-            builder.first(
-                _over(builder, held, spot, None if self.at is None else self.at.yaw),
-                lambda low: _bring(builder, held, low),
+            return plan.first(
+                _over(plan, held, spot, None if self.at is None else self.at.yaw),
+                lambda plan, low: _bring(plan, held, low),
             )
         except InputError as error:
             raise error.after(f"{held.name} cannot be placed there") from error
 
-    def _spot(self, builder: PlanBuilder, held: SceneObject) -> FloatArray:
+    def _spot(self, plan: PlanState, held: SceneObject) -> FloatArray:
         """Return the place (3,) [m] of the underside in the base frame. Raises InputError."""
         at = np.zeros(3)
         if self.on:
-            at = builder.scene_object(self.on).T[:3, 3]
+            at = plan.scene_object(self.on).T[:3, 3]
         if self.at is not None:
-            T = np.eye(4) if self.in_base else builder.plan_context.T_base_shoulder
+            T = np.eye(4) if self.in_base else plan.plan_context.T_base_shoulder
             at = T[:3, :3] @ np.nan_to_num((self.at.x, self.at.y, self.at.z)) + T[:3, 3]
         if self.at is None or math.isnan(self.at.z):
             high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
-            at = np.array((at[0], at[1], surface_below(_objects_around(builder), high)))
+            at = np.array((at[0], at[1], surface_below(_objects_around(plan), high)))
         standing = _standing(held, at)
         if self.on:
-            below = builder.scene_object(self.on)
+            below = plan.scene_object(self.on)
             if abs(surface_below([below], standing) - at[2]) > RELEASE_HEIGHT or at[2] <= 0.0:
                 raise InputError(
                     f"{self.on} cannot carry {held.name} there: its top must be level, and the "
                     f"middle of {held.name} over it."
                 )
-        _check_support(builder, standing)
+        _check_support(plan, standing)
         return at
 
 
@@ -109,17 +110,16 @@ class SetDown(Step, word="set_down"):
 
     noun = "`set_down`"
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the motions. Raises InputError if nothing is held, or there is no room."""
-        taken = builder.taken
-        if builder.state.grip is None or taken is None:
+        taken = plan.taken
+        if plan.state.grip is None or taken is None:
             raise InputError("The hand holds no object that this program grasped.")
         at = taken.at
-        above = at.moved(at.position * (1, 1, 0) + builder.target.position * UP)
-        carry(builder, above, "back")
+        above = at.moved(at.position * (1, 1, 0) + plan.target.position * UP)
+        plan = carry(plan, above, "back")
         low = at.moved(at.position + RELEASE_HEIGHT * UP)
-        builder.lead([line_between(above, low)], "set down")
-        let_go(builder)
+        return let_go(plan.lead([line_between(above, low)], "set down"))
 
 
 @dataclass(frozen=True)
@@ -131,26 +131,26 @@ class Release(Step, word="release"):
 
     noun = "`release`"
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the release. Raises InputError if the object would fall, or there is no room."""
-        check_fall(builder, held_object(builder, "release"))
-        let_go(builder)
+        check_fall(plan, held_object(plan, "release"))
+        return let_go(plan)
 
 
-def held_object(builder: PlanBuilder, step: str) -> SceneObject:
+def held_object(plan: PlanState, step: str) -> SceneObject:
     """Return the object between the fingers. Raises InputError with the remedy if there is none."""
-    for each in builder.state.objects:
+    for each in plan.state.objects:
         if each.held:
             return each
     raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
 
 
-def check_fall(builder: PlanBuilder, held: SceneObject) -> None:
+def check_fall(plan: PlanState, held: SceneObject) -> None:
     """Raise InputError if the held object would fall, or nothing carries it, if it is released."""
-    T = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
+    T = plan.plan_context.session.environment.pose(held, plan.state.x_setpoint)
     lifted = replace(held, T=T, held=False)
-    below = surface_below(_objects_around(builder), lifted)
-    _check_support(builder, _standing(held, np.append(T[:2, 3], below)))
+    below = surface_below(_objects_around(plan), lifted)
+    _check_support(plan, _standing(held, np.append(T[:2, 3], below)))
     fall = float(T[2, 3]) - below
     if fall > MAX_FALL:
         raise InputError(
@@ -159,38 +159,37 @@ def check_fall(builder: PlanBuilder, held: SceneObject) -> None:
         )
 
 
-def _check_support(builder: PlanBuilder, standing: SceneObject) -> None:
+def _check_support(plan: PlanState, standing: SceneObject) -> None:
     """Raise InputError if nothing carries the object ``standing``, or an open vessel would."""
-    objects = _objects_around(builder)
+    objects = _objects_around(plan)
     for each in objects:
         if (is_vessel(each) or each.name == BASIN) and is_over(standing, each):
             raise InputError(
                 f"{each.name} is open at its top and cannot carry {standing.name}. Choose a place "
                 "beside it."
             )
-    check_carried(builder.plan_context.session.environment.table, objects, standing)
+    check_carried(plan.plan_context.session.environment.table, objects, standing)
 
 
-def _objects_around(builder: PlanBuilder) -> list[SceneObject]:
+def _objects_around(plan: PlanState) -> list[SceneObject]:
     """Return the objects that the hand does not carry."""
-    return [each for each in builder.state.objects if not each.carried]
+    return [each for each in plan.state.objects if not each.carried]
 
 
-def let_go(builder: PlanBuilder) -> None:
-    """Append the opening of the fingers and the retreat. Raises InputError without room."""
-    at, q, hand = builder.target, builder.q, builder.hand
-    opened = builder.plan_context.arm.gripper.opened
-    builder.note("let go", MoveFingers(opened), with_fingers(builder, opened))
+def let_go(plan: PlanState) -> PlanState:
+    """Return ``plan`` with the fingers opened and the retreat. Raises InputError without room."""
+    at, q, hand = plan.target, plan.q, plan.hand
+    opened = plan.plan_context.arm.gripper.opened
+    plan = plan.with_action("let go", MoveFingers(opened), with_fingers(plan, opened))
 
-    def draw_back(away: float) -> None:
+    def draw_back(plan: PlanState, away: float) -> PlanState:
         end = hand.retreat(q, away)
-        builder.lead([line_between(at, end)], "draw back")
+        return plan.lead([line_between(at, end)], "draw back")
 
     try:
-        builder.first(APPROACHES, draw_back)
+        return replace(plan.first(APPROACHES, draw_back), taken=None)
     except InputError as error:
         raise error.after("There is no room to draw back") from error
-    builder.taken = None
 
 
 def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
@@ -198,52 +197,51 @@ def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
     return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
 
 
-def _bring(builder: PlanBuilder, held: SceneObject, low: ToolTarget) -> None:
+def _bring(plan: PlanState, held: SceneObject, low: ToolTarget) -> PlanState:
     """Plan the way to ``low``, from above, and the release there. Raises InputError."""
     name = f"place {held.name}"
 
-    def down_from(height: float, *, straight: bool) -> None:
+    def down_from(plan: PlanState, height: float, *, straight: bool) -> PlanState:
         above = low.moved(low.position + height * UP)
         if straight:
-            carry(builder, above, f"{name}: carry")
+            plan = carry(plan, above, f"{name}: carry")
         else:
-            builder.move_to(builder.joints_of(above), f"{name}: carry")
-        builder.lead([line_between(builder.target, low)], f"{name}: lower")
-        let_go(builder)
+            plan = plan.move_to(plan.joints_of(above), f"{name}: carry")
+        return let_go(plan.lead([line_between(plan.target, low)], f"{name}: lower"))
 
     try:
-        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=True))
+        return plan.first(CARRY_HEIGHTS, partial(down_from, straight=True))
     except InputError:
         # A way round obstacles may tilt the object, and a vessel would spill.
         if is_vessel(held):
             raise
-        builder.first(CARRY_HEIGHTS, lambda height: down_from(height, straight=False))
+        return plan.first(CARRY_HEIGHTS, partial(down_from, straight=False))
 
 
 def _over(
-    builder: PlanBuilder, held: SceneObject, spot: FloatArray, yaw: float | None
+    plan: PlanState, held: SceneObject, spot: FloatArray, yaw: float | None
 ) -> Sequence[ToolTarget]:
     """Return the tools that hold the object over ``spot`` with this ``yaw``; see `HandPlanning`."""
-    T_base_object = builder.plan_context.session.environment.pose(held, builder.state.x_setpoint)
-    goal = builder.point(spot + RELEASE_HEIGHT * UP, in_base=True)
-    return builder.hand.over(held, T_base_object, builder.q, goal, yaw)
+    T_base_object = plan.plan_context.session.environment.pose(held, plan.state.x_setpoint)
+    goal = plan.point(spot + RELEASE_HEIGHT * UP, in_base=True)
+    return plan.hand.over(held, T_base_object, plan.q, goal, yaw)
 
 
 @dataclass(frozen=True)
 class Pick(Grasp, word="pick"):
     """Grasp an object, and lift it."""
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan grasp and lifting. Raises InputError if it is not possible."""
-        super().build(builder)
-        at = builder.target
+        plan = super().build(plan)
+        at = plan.target
 
-        def lift(height: float) -> None:
+        def lift(plan: PlanState, height: float) -> PlanState:
             raised = at.moved(at.position + height * UP)
-            builder.lead([line_between(at, raised)], f"lift {self.name}")
+            return plan.lead([line_between(at, raised)], f"lift {self.name}")
 
         try:
-            builder.first(LIFTS, lift)
+            return plan.first(LIFTS, lift)
         except InputError as error:
             raise error.after(f"{self.name} cannot be lifted") from error
 

@@ -16,7 +16,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import Action, SetSpeed, Wait
 from katana450.extensions.programs.building.carry import carry
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.building.vessel_turn import VesselTurn, turns_over
 from katana450.extensions.programs.language import kinds
@@ -178,22 +178,22 @@ class Pour(Step, word="pour"):
             return SHAKES if self.volume is None else 0
         return self.shake
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the pour, turning either way. Raises InputError if it is not possible."""
-        vessel, below = self._vessel(builder), builder.scene_object(self.into)
+        vessel, below = self._vessel(plan), plan.scene_object(self.into)
         if below.carried:
             raise InputError(f"{self.into} is in the hand: name what stands below it.")
-        poured = builder.state.poured
+        poured = plan.state.poured
         water = None if poured is None else poured.water.vessel(vessel.name)
         if poured is None or water is None:
             raise InputError(f"There is no water in the {vessel.name}: `fill` it first.")
         rest = self._rest(vessel, water)
         volumes = {vessel.name: counted(rest)}
-        pouring = builder.plan_context.session.pouring
+        pouring = plan.plan_context.session.pouring
         other = poured.water.vessel(self.into)
         if pouring is not None and other is not None:
             part = water.kept - counted(rest)
-            inside = pouring.water_environment(builder.state.objects).vessels[self.into].inside
+            inside = pouring.water_environment(plan.state.objects).vessels[self.into].inside
             room = counted(inside.capacity) - other.kept
             if part > room:
                 raise InputError(
@@ -201,26 +201,26 @@ class Pour(Step, word="pour"):
                     f"{part / MILLILITRE:.1f} ml to pour; give a smaller `ml`."
                 )
             volumes[self.into] = other.kept + part
-        level = builder.target
+        level = plan.target
         if level.is_pitched and level.pitch > MAX_POUR_PITCH:
             raise InputError(
                 f"The {vessel.name} is held from above, where the wrist cannot tilt it: pick it "
                 "with `side: front`."
             )
         try:
-            tilt, rated = self._tilt(builder, vessel, rest), self._rated(builder, vessel, rest)
-            builder.first(
-                turns_over(builder, vessel, below, tilt, is_rated=rated is not None),
-                lambda way: self._turned(builder, vessel, way, rated, rest),
+            tilt, rated = self._tilt(plan, vessel, rest), self._rated(plan, vessel, rest)
+            plan = plan.first(
+                turns_over(plan, vessel, below, tilt, is_rated=rated is not None),
+                lambda plan, way: self._turned(plan, vessel, way, rated, rest),
             )
         except InputError as error:
             message = f"The {vessel.name} cannot be emptied into {self.into}"
             raise error.after(message) from error
-        builder.predict_water(volumes)
+        return plan.with_still_water(volumes)
 
-    def _vessel(self, builder: PlanBuilder) -> SceneObject:
+    def _vessel(self, plan: PlanState) -> SceneObject:
         """Return the vessel in the hand. Raises InputError without it."""
-        held = next((each for each in builder.state.objects if each.held), None)
+        held = next((each for each in plan.state.objects if each.held), None)
         name = self.source or (held.name if held is not None and is_vessel(held) else CUP)
         if held is None or held.name != name:
             raise InputError(f"The {name} is not in the hand: `grasp: {name}` first.")
@@ -241,74 +241,72 @@ class Pour(Step, word="pour"):
             )
         return max(held - self.volume, 0.0)
 
-    def _tilt(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> float | None:
+    def _tilt(self, plan: PlanState, vessel: SceneObject, rest: float) -> float | None:
         """Return the tilt [rad] at which the flow is PART_FLOW with ``rest`` [m^3] in the cup.
 
         None if all of it is poured.
         """
-        pouring = builder.plan_context.session.pouring
+        pouring = plan.plan_context.session.pouring
         if self.volume is None or pouring is None:
             return None
-        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
+        inside = pouring.water_environment(plan.state.objects).vessels[vessel.name].inside
         film = film_after(self.volume, rest, PART_TIME, inside)
         return float(tilt_for(PART_FLOW, rest - film, inside))
 
     def _turned(
         self,
-        builder: PlanBuilder,
+        plan: PlanState,
         vessel: SceneObject,
         way: VesselTurn,
         rated: RatedTilt | None,
         rest: float,
-    ) -> None:
-        """Append the motions of ``way`` with their pace, and the draining."""
+    ) -> PlanState:
+        """Return ``plan`` with the motions of ``way`` at their pace, and the draining."""
         fitted = None if rated is None else rated.fitted(way.angles(rated.tilts))
-        carry(builder, way.at, f"over {self.into}")
+        plan = carry(plan, way.at, f"over {self.into}")
         pace, end = POUR_PACE if self.volume is None else PART_PACE, way.end
-        builder.note("slowly", SetSpeed(pace), builder.state)
+        plan = plan.with_action("slowly", SetSpeed(pace))
         if rated is None or fitted is None:
-            builder.lead([way.line(0.0, end)], POURING)
+            plan = plan.lead([way.line(0.0, end)], POURING)
         else:
             first, last = (float(polyval(place, fitted)) for place in (-1, 1))
             curves = way.line(0.0, first), way.by(fitted), way.line(last, end)
-            self._pour_at_rate(builder, rated.duration, *curves)
+            plan = self._pour_at_rate(plan, rated.duration, *curves)
             end = end if self.volume is None else last
         if self.shakes:
             back = way.end - math.copysign(SHAKE_ANGLE, way.end)
-            builder.lead([way.line(end, back), way.line(back, end)] * self.shakes, "shake")
-        self._drain(builder, vessel, rest)
-        builder.lead([way.line(end, 0.0)], "turn back")
+            plan = plan.lead([way.line(end, back), way.line(back, end)] * self.shakes, "shake")
+        return self._drain(plan, vessel, rest).lead([way.line(end, 0.0)], "turn back")
 
-    def _drain(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> None:
-        """Append the wait until the last water, or the part, has run out."""
+    def _drain(self, plan: PlanState, vessel: SceneObject, rest: float) -> PlanState:
+        """Return ``plan`` with the wait until the last water, or the part, has run out."""
+        left = None
         if self.volume is None:
-            builder.note("drain", Wait(DRAIN_TIME), builder.state)
-            builder.note("drain", Drain(vessel.name), builder.state)
+            plan = plan.with_action("drain", Wait(DRAIN_TIME))
         else:
             left = counted(rest + PART_FLOW * REACTION_TIME)
-            builder.note("drain", Drain(vessel.name, left), builder.state)
-        builder.note("full speed", SetSpeed(1.0), builder.state)
+        plan = plan.with_action("drain", Drain(vessel.name, left))
+        return plan.with_action("full speed", SetSpeed(1.0))
 
     def _pour_at_rate(
-        self, builder: PlanBuilder, duration: float, start: Curve, turn: Curve, end: Curve
-    ) -> None:
+        self, plan: PlanState, duration: float, start: Curve, turn: Curve, end: Curve
+    ) -> PlanState:
         """Append ``start``, ``turn`` in ``duration`` [s], and ``end`` if all is poured."""
-        builder.lead([start], POURING)
-        builder.note("at the rate", SetSpeed(1.0), builder.state)
-        builder.pace(turn, duration, "pour at the rate")
-        if self.volume is None:
-            builder.note("slowly", SetSpeed(POUR_PACE), builder.state)
-            builder.lead([end], "pour the last")
+        plan = plan.lead([start], POURING).with_action("at the rate", SetSpeed(1.0))
+        plan = plan.pace(turn, duration, "pour at the rate")
+        if self.volume is not None:
+            return plan
+        return plan.with_action("slowly", SetSpeed(POUR_PACE)).lead([end], "pour the last")
 
-    def _rated(self, builder: PlanBuilder, vessel: SceneObject, rest: float) -> RatedTilt | None:
+    def _rated(self, plan: PlanState, vessel: SceneObject, rest: float) -> RatedTilt | None:
         """Return the tilt over time for the rate; None if none is given."""
         if self.rate is None:
             return None
-        pouring, poured = builder.plan_context.session.pouring, builder.state.poured
+        pouring, poured = plan.plan_context.session.pouring, plan.state.poured
         water = None if poured is None else poured.water.vessel(vessel.name)
         assert pouring is not None
         assert water is not None
-        inside = pouring.water_environment(builder.state.objects).vessels[vessel.name].inside
+        inside = pouring.water_environment(plan.state.objects).vessels[vessel.name].inside
         held = water.kept * FEMTOLITRE
         out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
         return RatePlan.of(out, self.rate).tilts(held, inside)

@@ -18,7 +18,7 @@ from katana450.extensions.programs.building.actions import (
 )
 from katana450.extensions.programs.building.conditions import CONDITION, Condition
 from katana450.extensions.programs.building.finger_planning import finger_unit, with_fingers
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.kinds import (
@@ -68,34 +68,33 @@ class Gripper(Step, word="gripper"):
     to: Annotated[float | str, FINGERS]
     holding: ObjectName = ""
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the finger motion.
 
         Raises InputError outside the range of the fingers, and if they would not hold what they
         must.
         """
-        fingers = builder.plan_context.arm.gripper
+        fingers = plan.plan_context.arm.gripper
         if not fingers.moves:
             raise InputError("This arm has no fingers.")
         ends = {"open": fingers.opened, "closed": fingers.closed}
-        unit, scale = finger_unit(builder)
+        unit, scale = finger_unit(plan)
         angle = ends[self.to] if isinstance(self.to, str) else scale * self.to
         if abs(fingers.clamp(angle) - angle) > tolerances.LIMIT_SLACK:
             low, high = fingers.lower / scale, fingers.upper / scale
             raise InputError(f"The range of the fingers is {low:.1f} to {high:.1f} {unit}.")
         angle = fingers.clamp(angle)
-        held = with_fingers(builder, angle)
+        held = with_fingers(plan, angle)
         if self.holding and (held.held is None or held.held.name != self.holding):
             instead = "nothing" if held.held is None else held.held.name
             raise InputError(
                 f"The fingers would hold {instead} instead of {self.holding}, which has to stand "
                 "where they close."
             )
-        if builder.state.held is not None and held.held is None:
-            check_fall(builder, builder.state.held)
-        builder.note("gripper", MoveFingers(angle, self.holding), held)
-        if held.grip is None:
-            builder.taken = None
+        if plan.state.held is not None and held.held is None:
+            check_fall(plan, plan.state.held)
+        plan = plan.with_action("gripper", MoveFingers(angle, self.holding), held)
+        return plan if held.grip is not None else replace(plan, taken=None)
 
 
 @dataclass(frozen=True)
@@ -106,10 +105,9 @@ class TimedPause(Step, word="wait"):
 
     seconds: Annotated[float, number(0.0, MAX_PAUSE, "s")]
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the wait."""
-        if self.seconds:
-            builder.note("wait", Wait(self.seconds), builder.state)
+        return plan.with_action("wait", Wait(self.seconds)) if self.seconds else plan
 
 
 @dataclass(frozen=True)
@@ -120,11 +118,11 @@ class Tool(Step, word="tool"):
 
     name: Annotated[str, TEXT]
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the change of the tool frame. Raises InputError if it does not exist."""
-        builder.plan_context.arm.chain_to(self.name)
-        builder.note(
-            f"tool {self.name}", UseTool(self.name), replace(builder.state, tool=self.name)
+        plan.plan_context.arm.chain_to(self.name)
+        return plan.with_action(
+            f"tool {self.name}", UseTool(self.name), replace(plan.state, tool=self.name)
         )
 
 
@@ -136,9 +134,9 @@ class Speed(Step, word="speed"):
 
     value: Annotated[float, number(MIN_SPEED, 1.0)]
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the change of the speed."""
-        builder.note(f"speed {self.value:g}", SetSpeed(self.value), builder.state)
+        return plan.with_action(f"speed {self.value:g}", SetSpeed(self.value))
 
 
 TIMEOUT = 60.0
@@ -180,8 +178,8 @@ class WaitFor(Step, word="wait_for"):
     condition: Annotated[Condition | None, CONDITION]
     timeout: Annotated[float, number(0.01, MAX_PAUSE, "s", "s; 60 unless given")] = TIMEOUT
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the wait. Raises InputError if the condition can never hold."""
         assert self.condition is not None
-        action = WaitUntil(self.condition.checked(builder), self.timeout)
-        builder.note(f"wait for {self.condition.awaited}", action, builder.state)
+        action = WaitUntil(self.condition.checked(plan), self.timeout)
+        return plan.with_action(f"wait for {self.condition.awaited}", action)

@@ -14,7 +14,7 @@ from katana450.arm.control.support import check_carried
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
 from katana450.extensions.programs.building.actions import FillCup, PutObject
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.kinds import Length, Object, volume
 from katana450.maths.geometry import se3
@@ -30,12 +30,12 @@ class Fill(Step, word="fill"):
     water: Annotated[float, volume(0.0, 1000.0, "ml")]
     """[m^3]."""
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the filling. Raises InputError if the cup is absent or too small."""
         command = cmd.Fill(self.water / ML)
-        builder.plan_context.session.check(command)
+        plan.plan_context.session.check(command)
         filled = FillCup(self.water)
-        builder.note("fill", filled, builder.after(command, ticks=1))
+        return plan.with_action("fill", filled, plan.after(command, ticks=1))
 
 
 @dataclass(frozen=True)
@@ -54,21 +54,21 @@ class Put(Step, word="put"):
     x: Length
     y: Length
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Append the placement. Raises InputError if the place is occupied."""
-        scene_object = builder.scene_object(self.name)
+        scene_object = plan.scene_object(self.name)
         if scene_object.carried:
             raise InputError(f"{self.name} is in the hand: set it down first.")
         T = se3.from_rotation_translation(scene_object.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(scene_object, T=T)
-        check_carried(builder.plan_context.session.environment.table, builder.state.objects, put)
+        check_carried(plan.plan_context.session.environment.table, plan.state.objects, put)
         # An object that a later `put` moves is checked at its final place.
-        moved = {put.name for put in takewhile(_is_put, builder.ahead) if isinstance(put, Put)}
-        for other in builder.state.objects:
+        moved = {put.name for put in takewhile(_is_put, plan.ahead) if isinstance(put, Put)}
+        for other in plan.state.objects:
             if other.name not in {scene_object.name, *moved} and _overlap(put, other):
                 raise InputError(f"{self.name} would stand in {other.name}.")
-        builder.note(
-            f"put {self.name}", PutObject(put), builder.after(cmd.PlaceObject(put), ticks=1)
+        return plan.with_action(
+            f"put {self.name}", PutObject(put), plan.after(cmd.PlaceObject(put), ticks=1)
         )
 
 

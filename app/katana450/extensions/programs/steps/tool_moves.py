@@ -12,7 +12,7 @@ import numpy as np
 
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
-from katana450.extensions.programs.building.plan_builder import PlanBuilder
+from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.building.unfollowed import (
     ANGLE,
@@ -93,24 +93,24 @@ class Line(Step, word="line"):
     feed: Feed = TOOL_SPEED
     in_base: bool = False
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the line. Raises InputError if the tool cannot follow it."""
-        start = builder.target
+        start = plan.target
         goal = StepTarget(in_base=self.in_base) if self.to is None else self.to
         angles = self.angles.or_else(goal.angles)
-        end = builder.target_at(replace(goal, angles=angles))
+        end = plan.target_at(replace(goal, angles=angles))
         if self.by is not None:
-            offset = builder.direction(self.by, in_base=self.in_base)
+            offset = plan.direction(self.by, in_base=self.in_base)
             end = end.moved(frozen(start.position + offset))
         line = line_between(start, end)
         try:
-            builder.lead([line], "line", self.feed)
+            return plan.lead([line], "line", self.feed)
         except InputError as error:
-            branch, frame = builder.branches(None)[0], builder.frame
+            branch, frame = plan.branches(None)[0], plan.frame
             if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
-                raise InputError(builder.unreached(end, branch)) from error
-            remedies = line_remedies(builder, start, end, error)
-            raise unfollowed(builder, error, line, branch, remedies) from error
+                raise InputError(plan.unreached(end, branch)) from error
+            remedies = line_remedies(plan, start, end, error)
+            raise unfollowed(plan, error, line, branch, remedies) from error
 
 
 @dataclass(frozen=True)
@@ -130,20 +130,20 @@ class Lines(Step, word="lines"):
         if any(place.joints is not None or place.branch is not None for place in places):
             yield "", "`lines` takes points only. Use `via` for joint angles and branches."
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the lines. Raises InputError if the tool cannot follow them."""
-        vias, planning = [builder.target], builder.planning
-        branch = builder.branches(None)[0]
+        vias, planning = [plan.target], plan.planning
+        branch = plan.branches(None)[0]
         for place_number, each in enumerate(self.through, start=1):
-            vias.append(builder.target_at(each, vias[-1]))
-            if planning.joints(builder.q, vias[-1], branch) is None:
-                raise InputError(f"Place {place_number}: {builder.unreached(vias[-1], branch)}")
+            vias.append(plan.target_at(each, vias[-1]))
+            if planning.joints(plan.q, vias[-1], branch) is None:
+                raise InputError(f"Place {place_number}: {plan.unreached(vias[-1], branch)}")
         if self.blend:
             blend = np.full(len(vias) - 2, self.blend)
             curves: list[Curve] = [ToolLines(tuple(vias), blend)]
         else:
             curves = [line_between(a, b) for a, b in pairwise(vias)]
-        builder.lead(curves, "lines", self.feed)
+        return plan.lead(curves, "lines", self.feed)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -172,39 +172,39 @@ class _Turn(Step):
         """True if the pitch is the one farthest from the limits."""
         return self.pitch == ROOMIEST
 
-    def seen(self, builder: PlanBuilder) -> tuple[FloatArray, FloatArray]:
+    def seen(self, plan: PlanState) -> tuple[FloatArray, FloatArray]:
         """Return centre [m] and axis, each (3,), in {S}."""
-        centre = builder.point(self.centre, in_base=self.in_base)
-        return centre, builder.direction(self.axis, in_base=self.in_base)
+        centre = plan.point(self.centre, in_base=self.in_base)
+        return centre, plan.direction(self.axis, in_base=self.in_base)
 
-    def turned(self, builder: PlanBuilder) -> ToolTarget:
+    def turned(self, plan: PlanState) -> ToolTarget:
         """Return the present target with the orientation at the end of the curve."""
         pitch = self.pitch if isinstance(self.pitch, float) else None
         angles = Angles(pitch, self.roll, self.yaw)
-        return builder.target_at(StepTarget(angles=angles, in_base=self.in_base))
+        return plan.target_at(StepTarget(angles=angles, in_base=self.in_base))
 
     def follow(
-        self, builder: PlanBuilder, arc: Curve, name: str, branch: AnyBranch | None = None
-    ) -> None:
+        self, plan: PlanState, arc: Curve, name: str, branch: AnyBranch | None = None
+    ) -> PlanState:
         """Move to the start of ``arc`` if the arm is not there, then along it."""
-        planning = builder.planning
+        planning = plan.planning
 
-        def path(tried: AnyBranch) -> Path:
+        def path(plan: PlanState, tried: AnyBranch) -> Path:
             curve = roomiest(planning.chain, tried, arc) if self.is_roomiest else arc
-            return planning.path(builder.q, curve, tried)
+            return planning.path(plan.q, curve, tried)
 
-        tool_path = builder.first(builder.branches(branch), path)
-        builder.move_to(tool_path.start, f"{name}: to its start")
-        builder.follow([tool_path], name, self.feed)
+        tool_path = plan.choose(plan.branches(branch), path)
+        plan = plan.move_to(tool_path.start, f"{name}: to its start")
+        return plan.follow([tool_path], name, self.feed)
 
     def follow_or_advise(
         self,
-        builder: PlanBuilder,
+        plan: PlanState,
         arc: Callable[[ToolTarget, float], Curve],
         end: ToolTarget,
         size: tuple[str, float],
         branch: AnyBranch | None = None,
-    ) -> None:
+    ) -> PlanState:
         """Follow ``arc`` to the orientation of ``end``. Raises InputError with what works instead.
 
         ``arc`` gives the arc for a target and a fraction of its ``size``; see ``arc_remedies``.
@@ -212,19 +212,19 @@ class _Turn(Step):
         name = "arc" if size[0] == ANGLE else "circle"
 
         try:
-            self.follow(builder, arc(end, 1.0), name, branch)
+            return self.follow(plan, arc(end, 1.0), name, branch)
         except InputError as error:
             if self.is_roomiest:
                 raise
-            first = builder.branches(branch)[0]
+            first = plan.branches(branch)[0]
             # Eight branches would take long.
             tried = branch if end.is_pitched else first
 
-            def build(target: ToolTarget, fraction: float) -> None:
-                self.follow(builder, arc(target, fraction), name, tried)
+            def build(target: ToolTarget, fraction: float) -> PlanState:
+                return self.follow(plan, arc(target, fraction), name, tried)
 
-            remedies = arc_remedies(builder, end, build, size, error)
-            raise unfollowed(builder, error, arc(end, 1.0), first, remedies) from error
+            remedies = arc_remedies(end, build, size, error)
+            raise unfollowed(plan, error, arc(end, 1.0), first, remedies) from error
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -239,16 +239,16 @@ class Arc(_Turn, word="arc"):
     angle: Angle
     climb: Climb = 0.0
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the arc. Raises InputError if the tool cannot follow it."""
-        start, end = builder.target, self.turned(builder)
-        centre, axis = self.seen(builder)
+        start, end = plan.target, self.turned(plan)
+        centre, axis = self.seen(plan)
 
         def arc(end: ToolTarget, fraction: float) -> Curve:
             angle, climb = fraction * self.angle, fraction * self.climb
             return arc_between(centre, axis, angle, climb, start, end)
 
-        self.follow_or_advise(builder, arc, end, (ANGLE, math.degrees(self.angle)))
+        return self.follow_or_advise(plan, arc, end, (ANGLE, math.degrees(self.angle)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -271,14 +271,14 @@ class Circle(_Turn, word="circle"):
         if given.get("turns") == 0.0:
             yield "turns", "`turns` must not be 0."
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the circle. Raises InputError if the tool cannot follow it."""
-        centre, normal = self.seen(builder)
-        up = builder.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
+        centre, normal = self.seen(plan)
+        up = plan.direction(np.array((0.0, 0.0, 1.0)), in_base=True)
         out = up - (up @ normal) * normal
         if math.hypot(*out) < LEVEL_TOLERANCE:
             # A level circle has no highest point: start at the point farthest in front.
-            ahead = builder.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
+            ahead = plan.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = ahead - (ahead @ normal) * normal
         turn = math.tau * self.turns
 
@@ -288,7 +288,7 @@ class Circle(_Turn, word="circle"):
             return arc_between(centre, normal, turn, 0.0, there, there)
 
         size = "radius", 1e3 * self.radius
-        self.follow_or_advise(builder, arc, self.turned(builder), size, self.branch)
+        return self.follow_or_advise(plan, arc, self.turned(plan), size, self.branch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,14 +311,14 @@ class Screw(Step, word="screw"):
     climb: Climb = 0.0
     in_base: bool = False
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the screw. Raises InputError if the tool cannot follow it."""
-        axis = builder.direction(self.axis, in_base=self.in_base)
+        axis = plan.direction(self.axis, in_base=self.in_base)
         omega = self.angle * axis
-        v = np.cross(builder.point(self.point, in_base=self.in_base), omega) + self.climb * axis
-        branch = builder.branches(None)[0]
-        screw = builder.planning.screw(builder.q, np.append(omega, v))
+        v = np.cross(plan.point(self.point, in_base=self.in_base), omega) + self.climb * axis
+        branch = plan.branches(None)[0]
+        screw = plan.planning.screw(plan.q, np.append(omega, v))
         try:
-            builder.lead([screw], "screw")
+            return plan.lead([screw], "screw")
         except InputError as error:
-            raise unfollowed(builder, error, screw, branch, iter(())) from error
+            raise unfollowed(plan, error, screw, branch, iter(())) from error

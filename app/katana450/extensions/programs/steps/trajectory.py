@@ -13,7 +13,7 @@ import numpy as np
 from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_builder import CARRY, PlanBuilder, UntimedPath
+from katana450.extensions.programs.building.plan_state import CARRY, PlanState, UntimedPath
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.attached_files import CSV, attached_file
 from katana450.extensions.programs.language.declaration import Kind
@@ -35,7 +35,8 @@ from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.clearance import Sweep, SweptClearance
-from katana450.maths.planning.plan import apart, plan
+from katana450.maths.planning.plan import apart
+from katana450.maths.planning.plan import plan as timed_plan
 from katana450.maths.planning.scaling import Bounds
 
 CLEARANCE = STOP - 2e-4
@@ -63,7 +64,9 @@ class UntimedTrajectory(UntimedPath):
         gentle = None if self.state.grip is None else CARRY
         bounds = Bounds(self.arm.limits, TOOL_SPEED, gentle)
         fingers = self.state.gripper_setpoint
-        made = plan(self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling)
+        made = timed_plan(
+            self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling
+        )
         (path,) = self.paths
         assert isinstance(path, TrajectoryPath)
         note = path.slowing(made.duration, bounds.joints.speed)
@@ -159,7 +162,7 @@ class FollowTrajectory(Step, word="trajectory"):
         ),
     ] = None
 
-    def build(self, builder: PlanBuilder) -> None:
+    def build(self, plan: PlanState) -> PlanState:
         """Plan the way to the start, and the trajectory.
 
         Raises BlockedError with the time at which two parts would meet, and InputError for a
@@ -168,23 +171,20 @@ class FollowTrajectory(Step, word="trajectory"):
         rows = self.file if self.through is None else self.through
         assert rows is not None
         times, postures = frozen(rows[:, 0]), frozen(rows[:, 1:])
-        joints, given = builder.chain.n, postures.shape[1]
+        joints, given = plan.chain.n, postures.shape[1]
         if given != joints:
             raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
-        path = TrajectoryPath(builder.chain, times, postures)
-        builder.move_to(path.start, f"{TRAJECTORY}: approach")
-        _check_clear(builder, path)
-        arm, world = builder.plan_context.arm, builder.world
-        builder.note(
-            TRAJECTORY,
-            UntimedTrajectory(arm, world, builder.state, (path,)),
-            builder.standing(path.end),
-        )
+        path = TrajectoryPath(plan.chain, times, postures)
+        plan = plan.move_to(path.start, f"{TRAJECTORY}: approach")
+        _check_clear(plan, path)
+        arm, world = plan.plan_context.arm, plan.world
+        untimed = UntimedTrajectory(arm, world, plan.state, (path,))
+        return plan.with_action(TRAJECTORY, untimed, plan.standing(path.end).state)
 
 
-def _check_clear(builder: PlanBuilder, path: TrajectoryPath) -> None:
+def _check_clear(plan: PlanState, path: TrajectoryPath) -> None:
     """Raise BlockedError, with the time, unless all of ``path`` keeps CLEARANCE from everything."""
-    world, fingers = builder.world, builder.state.gripper_setpoint
+    world, fingers = plan.world, plan.state.gripper_setpoint
     if world is None:
         return
     sweep = Sweep(path)

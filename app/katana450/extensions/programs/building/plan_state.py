@@ -1,4 +1,4 @@
-"""The state in which a script is planned: the arm as predicted, and the plans made so far."""
+"""The immutable state of a plan: the arm as predicted, and the actions planned so far."""
 
 from __future__ import annotations
 
@@ -143,29 +143,33 @@ class PacedPath(UntimedPath):
         )
 
 
-class PlanBuilder:
-    """The builder of a program: predicts the arm from step to step and records the actions."""
+@dataclass(frozen=True, eq=False)
+class PlanState:
+    """The plan of a script up to one of its steps: the arm as predicted, and the actions so far.
 
-    def __init__(
-        self, plan_context: PlanContext, state: State, frame: ScriptFrame | None = None
-    ) -> None:
-        """Start from ``state``, in which the arm is at rest.
+    It never changes. A step returns a new one, so an attempt is given up by keeping the older one.
 
-        ``frame``: the frame of the script, which is planned; None without a script.
-        """
-        self.plan_context = plan_context
-        self.state = state
-        self.frame = frame
-        self.actions: list[tuple[str, Action | UntimedPath]] = []
-        self.taken: GraspInfo | None = None
-        """The grasp of the held object; None with an empty hand."""
-        self.given_up: tuple[Approach, ...] = ()
-        """Approaches of the grasp with which a later step failed."""
-        self.ahead: Sequence[object] = ()
-        """The steps after the present one."""
-        self._hands: dict[str, HandPlanning] = {}
-        # Whether a refusal is not shown, so that its details need not be found.
-        self._brief = False
+    Attributes:
+        plan_context: the arm and its environment.
+        state: the state of the arm, which is at rest.
+        frame: the frame of the script that is planned; None without a script.
+        actions: the actions so far, with their names.
+        taken: the grasp of the held object; None with an empty hand.
+        given_up: approaches of the grasp with which a later step failed.
+        ahead: the steps after the present one.
+        is_brief: whether a refusal is not shown, so that its details need not be computed.
+        hands: the hands by their tools, each computed once for this plan and all that follow.
+    """
+
+    plan_context: PlanContext
+    state: State
+    frame: ScriptFrame | None = None
+    actions: tuple[tuple[str, Action | UntimedPath], ...] = ()
+    taken: GraspInfo | None = None
+    given_up: tuple[Approach, ...] = ()
+    ahead: Sequence[object] = ()
+    is_brief: bool = False
+    hands: dict[str, HandPlanning] = field(default_factory=dict, repr=False)
 
     @property
     def world(self) -> CollisionWorld | None:
@@ -191,9 +195,9 @@ class PlanBuilder:
     def hand(self) -> HandPlanning:
         """The hand with the present tool. Raises InputError, with the reason, without one."""
         tool, context = self.state.tool, self.plan_context
-        if tool not in self._hands:
-            self._hands[tool] = hand_of(context.session, context.T_base_shoulder, self.state)
-        return self._hands[tool]
+        if tool not in self.hands:
+            self.hands[tool] = hand_of(context.session, context.T_base_shoulder, self.state)
+        return self.hands[tool]
 
     @property
     def target(self) -> ToolTarget:
@@ -209,27 +213,31 @@ class PlanBuilder:
         """Return the direction ``v`` (3,) in {S}; ``in_base``: it is given in the base frame."""
         return frozen(self.plan_context.T_base_shoulder[:3, :3].T @ v if in_base else v)
 
-    def note(self, name: str, action: Action | UntimedPath, state: State) -> None:
-        """Append ``action``, which leads to ``state``."""
+    def with_action(
+        self, name: str, action: Action | UntimedPath, after: State | None = None
+    ) -> PlanState:
+        """Return the plan with ``action``, which leads to the state ``after``; None: no change."""
+        after = self.state if after is None else after
         if isinstance(action, MoveFingers):
-            turn = abs(state.gripper_setpoint - self.state.gripper_setpoint)
+            turn = abs(after.gripper_setpoint - self.state.gripper_setpoint)
             action = replace(action, seconds=turn / self.plan_context.arm.gripper.speed)
-        self.actions.append((name, action))
-        self.state = state
+        return replace(self, actions=(*self.actions, (name, action)), state=after)
 
-    def move_to(self, q: FloatArray, name: str) -> None:
-        """Append a free motion to ``q`` (n,) [rad] round obstacles; nothing if the arm is there."""
+    def move_to(self, q: FloatArray, name: str) -> PlanState:
+        """Return the plan with a free motion to ``q`` (n,) [rad] round obstacles.
+
+        Without one if the arm is there.
+        """
         if float(np.abs(self.q - q).max()) <= JOIN_TOLERANCE:
-            return
-        self.follow(
-            [path_to(self.plan_context.arm, self.world, self.state, q, self.plan_context.seed)],
-            name,
-        )
+            return self
+        context = self.plan_context
+        return self.follow([path_to(context.arm, self.world, self.state, q, context.seed)], name)
 
-    def lead(self, curves: Sequence[Curve], name: str, tool_speed: float = TOOL_SPEED) -> None:
-        """Append the tool's motion along ``curves``, from its present pose, on the same branch.
+    def lead(self, curves: Sequence[Curve], name: str, tool_speed: float = TOOL_SPEED) -> PlanState:
+        """Return the plan with the tool's motion along ``curves``, on the same branch.
 
-        ``tool_speed``: maximum speed of the tool point [m/s]. Raises as ``follow``.
+        It begins at the present pose. ``tool_speed``: maximum speed of the tool point [m/s]. Raises
+        as ``follow``.
         """
         planning = self.planning
         paths: list[Path] = []
@@ -242,21 +250,21 @@ class PlanBuilder:
                 made[id(curve)] = path
             paths.append(path)
             q = path.end
-        self.follow(paths, name, tool_speed)
+        return self.follow(paths, name, tool_speed)
 
-    def pace(self, curve: Curve, duration: float, name: str) -> None:
-        """Append the tool's motion along ``curve``, evenly in ``duration`` [s].
+    def pace(self, curve: Curve, duration: float, name: str) -> PlanState:
+        """Return the plan with the tool's motion along ``curve``, evenly in ``duration`` [s].
 
         Raises as ``follow``.
         """
-        self.lead([curve], name)
-        _, untimed = self.actions[-1]
+        led = self.lead([curve], name)
+        _, untimed = led.actions[-1]
         assert isinstance(untimed, UntimedPath)
         paced = PacedPath(untimed.arm, untimed.world, untimed.state, untimed.paths, duration)
-        self.actions[-1] = name, paced
+        return replace(led, actions=(*self.actions, (name, paced)))
 
-    def follow(self, paths: Sequence[Path], name: str, tool_speed: float = TOOL_SPEED) -> None:
-        """Append the motion along ``paths``, the first of which begins at the present posture.
+    def follow(self, paths: Sequence[Path], name: str, tool_speed: float = TOOL_SPEED) -> PlanState:
+        """Return the plan with the motion along ``paths``, from the present posture.
 
         ``tool_speed``: maximum speed of the tool point [m/s]. Raises BlockedError, and InputError
         for a path on which nothing moves.
@@ -270,34 +278,32 @@ class PlanBuilder:
                 )
             if world is not None:
                 check_clear(path, world, fingers)
-        self.note(
-            name,
-            UntimedPath(
-                self.plan_context.arm, world, self.state, tuple(paths), tool_speed=tool_speed
-            ),
-            self.standing(paths[-1].end),
-        )
+        arm = self.plan_context.arm
+        untimed = UntimedPath(arm, world, self.state, tuple(paths), tool_speed=tool_speed)
+        return self.with_action(name, untimed, self.standing(paths[-1].end).state)
 
-    def first(self, options: Iterable[W], build: Callable[[W], L]) -> L:
-        """Return ``build(option)`` of the first option that succeeds, and undo all failed attempts.
+    def first(self, options: Iterable[W], build: Callable[[PlanState, W], PlanState]) -> PlanState:
+        """Return the plan that ``build`` makes from this one with the first possible option.
+
+        Raises as ``choose``.
+        """
+        return replace(self.choose(options, build), is_brief=self.is_brief)
+
+    def choose(self, options: Iterable[W], find: Callable[[PlanState, W], L]) -> L:
+        """Return what ``find`` returns for this plan and the first possible option.
 
         Raises InputError with the reason of the first option, which is the one that a person
         expects.
         """
-        refused = InputError("no alternative is left.")
-        state, actions = self.state, tuple(self.actions)
-        for number, option in enumerate(options):
+        plan, refused = self, None
+        for option in options:
             checkpoint()
-            brief, self._brief = self._brief, self._brief or number > 0
             try:
-                return build(option)
+                return find(plan, option)
             except InputError as error:
-                self.state, self.actions = state, list(actions)
-                if number == 0:
-                    refused = error
-            finally:
-                self._brief = brief
-        raise refused
+                refused = refused or error
+                plan = replace(self, is_brief=True)
+        raise refused or InputError("no alternative is left.")
 
     def after(self, command: Command, ticks: int) -> State:
         """Return the state ``ticks`` after ``command``, or at rest, as the session computes it."""
@@ -314,14 +320,14 @@ class PlanBuilder:
 
     def scene_object(self, name: str) -> SceneObject:
         """Return the object ``name``. Raises InputError with the known names."""
-        found = named(self.state.objects, name)
-        if found is None:
-            known = ", ".join(each.name for each in self.state.objects) or "none"
+        scene_object = named(self.state.objects, name)
+        if scene_object is None:
+            known = ", ".join(known.name for known in self.state.objects) or "none"
             raise InputError(f"There is no object {name!r}. Known objects: {known}.")
-        return found
+        return scene_object
 
-    def standing(self, q: FloatArray) -> State:
-        """Return the state of the arm at rest at ``q`` (n,) [rad], free to move.
+    def standing(self, q: FloatArray) -> PlanState:
+        """Return the plan with the arm at rest at ``q`` (n,) [rad], free to move.
 
         A program runs only after a stop was cleared and a pause ended, but may be planned before.
         """
@@ -330,32 +336,35 @@ class PlanBuilder:
             self.state, q=q, goal=q, motion=JointMotion.rest(q), branch=branch, mode=IDLE,
             stopped=None, paused=False, blocked=False,
         )  # fmt: skip
-        return self._with_still_water(standing)
+        return replace(self, state=standing).with_still_water()
 
-    def assume_missed(self) -> None:
-        """Continue as if the last grasp had missed: the fingers are closed, the object stands."""
+    def with_missed_grasp(self) -> PlanState:
+        """Return the plan as if the last grasp had missed.
+
+        The fingers are closed, and the object stands.
+        """
         if self.taken is None:
-            return
+            return self
         before, closed = self.taken.before, self.plan_context.arm.gripper.closed
-        objects = tuple(before if each.name == before.name else each for each in self.state.objects)
+        objects = tuple(
+            before if other.name == before.name else other for other in self.state.objects
+        )
         missed = replace(
             self.state, objects=objects, grip=None, squeeze=0.0,
             gripper=closed, gripper_setpoint=closed, gripper_goal=closed,
         )  # fmt: skip
-        self.state = self._with_still_water(missed)
-        self.taken, self.given_up = None, ()
+        return replace(self, state=missed, taken=None, given_up=()).with_still_water()
 
-    def predict_water(self, volumes: Mapping[str, int]) -> None:
-        """Continue with these volumes of water [fl] in vessels."""
-        self.state = self._with_still_water(self.state, volumes)
+    def with_still_water(self, volumes: Mapping[str, int] | None = None) -> PlanState:
+        """Return the plan with the water at rest in the vessels, where they are now.
 
-    def _with_still_water(self, state: State, volumes: Mapping[str, int] | None = None) -> State:
-        """Return ``state`` with the water at rest in the vessels, where they are now."""
-        pouring = self.plan_context.session.pouring
+        ``volumes``: new volumes of water in vessels [fl].
+        """
+        pouring, state = self.plan_context.session.pouring, self.state
         if pouring is None or state.poured is None:
-            return state
+            return self
         still = pouring.settled(state.poured.water, state.objects, state.x_setpoint, volumes or {})
-        return replace(state, poured=still)
+        return replace(self, state=replace(state, poured=still))
 
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
@@ -381,10 +390,10 @@ class PlanBuilder:
         Raises InputError with the nearest places.
         """
         branch = None if branch is None else self.planning.branch(branch)
-        found = self.planning.joints(self.q, target, branch)
-        if found is None:
-            raise InputError("" if self._brief else self.unreached(target, branch))
-        return found
+        q = self.planning.joints(self.q, target, branch)
+        if q is None:
+            raise InputError("" if self.is_brief else self.unreached(target, branch))
+        return q
 
     def unreached(self, target: ToolTarget, branch: AnyBranch | None) -> str:
         """Return why the tool cannot be at ``target``, on ``branch`` or any, and what it can do."""
