@@ -10,7 +10,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager, suppress
 from pathlib import Path
 from typing import TypeVar
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 import msgspec
 import numpy as np
@@ -303,15 +303,17 @@ class AsyncClient:
         ``unit``: mm, cm, in or m; None to let the server guess it. Raises RefusedError.
         """
         data = await asyncio.to_thread(file.read_bytes)
-        return await asyncio.to_thread(self._site.mesh, data, file.name, unit)
+        query = {"name": file.name} | ({} if unit is None else {"unit": unit})
+        path = f"{ROOT}/mesh?{urlencode(query)}"
+        return await asyncio.to_thread(self._site.answered, path, data, answers.Mesh)
 
     async def save_scene(self) -> bytes:
         """Return the current scene as the contents of a .zip file."""
-        return await asyncio.to_thread(self._site.saved)
+        return await asyncio.to_thread(self._site.fetched, f"{ROOT}/scene")
 
     async def load_scene(self, data: bytes) -> answers.Scene:
         """Replace the scene by the one in the .zip file contents ``data``."""
-        scene = await asyncio.to_thread(self._site.scene, data)
+        scene = await asyncio.to_thread(self._site.answered, f"{ROOT}/scene", data, answers.Scene)
         await self.ask(requests.Load(scene=scene.key))
         return scene
 
@@ -326,7 +328,8 @@ class AsyncClient:
         ``last``: time before the end of the recording [s]; at most ten minutes of motion are kept.
         Raises RefusedError if the server records nothing, or has recorded nothing yet.
         """
-        return await asyncio.to_thread(self._site.recording, last)
+        path = f"{ROOT}/recording?{urlencode({'last': last})}"
+        return await asyncio.to_thread(self._site.fetched, path)
 
     async def people(self) -> tuple[answers.ConnectedPerson, ...]:
         """Return everybody who is connected or kept out. For admins only."""

@@ -23,6 +23,9 @@ REQUEST_TIMEOUT = 60.0
 """[s] Timeout of a transfer."""
 
 
+Answer = TypeVar("Answer")
+
+
 class RefusedError(KatanaError):
     """The server refused the request; the message says why, and what to do."""
 
@@ -39,34 +42,11 @@ class Site:
     token: str = ""
     name: str = "Program"
 
-    def mesh(self, data: bytes, name: str, unit: str | None) -> answers.Mesh:
-        """See ``AsyncClient.upload``."""
-        query = {"name": name} | ({} if unit is None else {"unit": unit})
-        answer = answers.decoded(self._ask(f"{ROOT}/mesh?{urlencode(query)}", data))
-        assert isinstance(answer, answers.Mesh)
+    def answered(self, path: str, data: bytes, kind: type[Answer]) -> Answer:
+        """Return the answer of ``kind`` to ``data``. Raises RefusedError or LostError."""
+        answer = answers.decoded(self.fetched(path, data))
+        assert isinstance(answer, kind)
         return answer
-
-    def scene(self, data: bytes) -> answers.Scene:
-        """See ``AsyncClient.load_scene``."""
-        answer = answers.decoded(self._ask(f"{ROOT}/scene", data))
-        assert isinstance(answer, answers.Scene)
-        return answer
-
-    def saved(self) -> bytes:
-        """See ``AsyncClient.save_scene``."""
-        return self._ask(f"{ROOT}/scene", None)
-
-    def fetched(self, path: str, data: bytes | None = None) -> bytes:
-        """Return the content at ``path``, the answer to ``data`` if that is sent.
-
-        Raises RefusedError or LostError.
-        """
-        name = self.name if self.name.isascii() else "Program"
-        return self._ask(path, data, {"X-Name": name})
-
-    def recording(self, last: float) -> bytes:
-        """See ``AsyncClient.recording``."""
-        return self._ask(f"{ROOT}/recording?{urlencode({'last': last})}", None)
 
     def stop(self, press: str, port: int | None = None) -> str:
         """Send STOP over HTTP; return whether the arm has ``confirmed`` it, or ``requested``.
@@ -85,20 +65,19 @@ class Site:
             host = f"[{parts.hostname}]" if ":" in (parts.hostname or "") else parts.hostname
             site = replace(self, url=f"{parts.scheme}://{host}:{port}")
         path = f"{ROOT}/stop?{urlencode({'press': press})}"
-        # A header has no other characters.
-        name = self.name if self.name.isascii() else "Program"
-        content = site._ask(path, b"", {"X-Name": name}, STOP_TIMEOUT)
+        content = site.fetched(path, b"", STOP_TIMEOUT)
         # The server of STOP alone answers with the stage.
         return str(msgspec.json.decode(content)["stop"]) if content else "requested"
 
-    def _ask(
-        self,
-        path: str,
-        data: bytes | None,
-        headers: dict[str, str] | None = None,
-        timeout: float = REQUEST_TIMEOUT,
+    def fetched(
+        self, path: str, data: bytes | None = None, timeout: float = REQUEST_TIMEOUT
     ) -> bytes:
-        headers = dict(headers or {})
+        """Return the content at ``path``, the answer to ``data`` if that is sent.
+
+        Raises RefusedError or LostError.
+        """
+        # A header has no other characters.
+        headers = {"X-Name": self.name if self.name.isascii() else "Program"}
         if self.token:
             headers["Authorization"] = f"Bearer {self.token}"
         request = urllib.request.Request(self.url.rstrip("/") + path, data=data, headers=headers)
@@ -122,8 +101,6 @@ def _why(content: bytes) -> str:
 
 
 PATH = f"{ROOT}/episodes"
-
-Answer = TypeVar("Answer")
 
 
 class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
