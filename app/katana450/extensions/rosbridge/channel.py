@@ -23,7 +23,7 @@ from katana450.extensions.rosbridge.messages import (
     TwistStamped,
 )
 from katana450.extensions.rosbridge.publications import Publications, Subscriptions
-from katana450.extensions.rosbridge.servoing import ServoCommands, ServoStream, Units
+from katana450.extensions.rosbridge.servoing import ServoStream, Units
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import driver_key
@@ -87,8 +87,7 @@ class RosChannel(Channel):
         )
         self._publications = endpoint.publications
         self._subscriptions = Subscriptions(endpoint.publications.hub.clock)
-        self._stream = ServoStream(hub, self._ask)
-        self._servo = ServoCommands(hub, self._stream, endpoint.units)
+        self._stream = ServoStream(hub, self._ask, endpoint.units)
         self._goals: list[Goal] = []
         self._newest: dict[str, dict[str, Any]] = {}
         self._acting = asyncio.Event()
@@ -211,9 +210,9 @@ class RosChannel(Channel):
         self._check_commanded(op.topic)
         try:
             if names.resolved(op.topic) == names.TWIST:
-                self._servo.twist(ops.read(op.msg, TwistStamped, names.TOPICS[names.TWIST]))
+                self._stream.twist(ops.read(op.msg, TwistStamped, names.TOPICS[names.TWIST]))
             else:
-                self._servo.jog(ops.read(op.msg, JointJog, names.TOPICS[names.JOINT_JOG]))
+                self._stream.jog(ops.read(op.msg, JointJog, names.TOPICS[names.JOINT_JOG]))
         except BusyError:
             raise
         except KatanaError as error:

@@ -185,10 +185,13 @@ class ServoStream:
     STREAM_GAP: the person who steers may not have seen the stop.
     """
 
-    def __init__(self, hub: Hub, ask: Callable[[requests.Request], answers.Answer]) -> None:
+    def __init__(
+        self, hub: Hub, ask: Callable[[requests.Request], answers.Answer], units: Units
+    ) -> None:
         """Create a stream that has not begun. ``ask`` executes a request of the client."""
         self._hub = hub
         self._ask = ask
+        self._units = units
         self._motion = ServoMotion.NOTHING
         self._last = -math.inf
         self._revocations = 0
@@ -201,7 +204,25 @@ class ServoStream:
         """True while a command is being followed."""
         return self._motion is not ServoMotion.NOTHING
 
-    def tool(self, rates: FloatArray) -> None:
+    def twist(self, message: TwistStamped) -> None:
+        """Move the tool. Raises KatanaError if that is refused."""
+        check_fresh(message.header, time.time())
+        arm = self._hub.present()
+        state, mounted = arm.state, arm.arm
+        found = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
+        R = rotation_of(message.header.frame_id, found, arm.robot.links[0].name)
+        pitched = None
+        if mounted.kinematics_to(state.tool).freedoms == 5:
+            pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
+        self._tool(tool_rates(message.twist, R, pitched, self._units))
+
+    def jog(self, message: JointJog) -> None:
+        """Move joints. Raises KatanaError if that is refused."""
+        check_fresh(message.header, time.time())
+        names = axis_names(self._hub.present().robot)
+        self._joints(joint_rates(message, names, self._units))
+
+    def _tool(self, rates: FloatArray) -> None:
         """Move the tool at ``rates``, see ``requests.Jog``. Raises KatanaError if refused."""
         self._received()
         if not rates.any():
@@ -211,7 +232,7 @@ class ServoStream:
         self._rates = rates
         self._send(requests.Jog(rates=rates, revocations=self._revocations))
 
-    def joints(self, rates: FloatArray) -> None:
+    def _joints(self, rates: FloatArray) -> None:
         """Move the joints at ``rates`` (n,) [rad/s]. Raises KatanaError if refused."""
         self._received()
         if not rates.any():
@@ -275,30 +296,3 @@ class ServoStream:
             self._ask(rest)
         else:
             self._ask(requests.Hold(revocations=self._revocations))
-
-
-class ServoCommands:
-    """Turns messages of one client into motion of its stream."""
-
-    def __init__(self, hub: Hub, stream: ServoStream, units: Units) -> None:
-        self._hub = hub
-        self._stream = stream
-        self._units = units
-
-    def twist(self, message: TwistStamped) -> None:
-        """Move the tool. Raises KatanaError if that is refused."""
-        check_fresh(message.header, time.time())
-        arm = self._hub.present()
-        state, mounted = arm.state, arm.arm
-        found = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
-        R = rotation_of(message.header.frame_id, found, arm.robot.links[0].name)
-        pitched = None
-        if mounted.kinematics_to(state.tool).freedoms == 5:
-            pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
-        self._stream.tool(tool_rates(message.twist, R, pitched, self._units))
-
-    def jog(self, message: JointJog) -> None:
-        """Move joints. Raises KatanaError if that is refused."""
-        check_fresh(message.header, time.time())
-        names = axis_names(self._hub.present().robot)
-        self._stream.joints(joint_rates(message, names, self._units))
