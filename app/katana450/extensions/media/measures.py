@@ -148,7 +148,7 @@ def executed(program: Program, trace: Trace) -> tuple[FloatArray, FloatArray]:
     """
     at_ticks: list[float] = []
     between: list[float] = []
-    on = [_path_at(program, trace, tick) for tick in range(len(trace.t))]
+    on = [path_at(program, trace, tick) for tick in range(len(trace.t))]
     for tick, path in enumerate(on):
         if path is not None:
             q, sigma = trace.sent[tick], float(trace.sigma[tick])
@@ -193,7 +193,8 @@ def _turned(path: ToolPath | PosePath, sigma: FloatArray, q: FloatArray) -> Floa
     return np.array([max(abs(math.remainder(angle, math.tau)) for angle in each) for each in off])
 
 
-def _path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:
+def path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:
+    """Return the path of the tool at ``tick``; None while it is on none."""
     action, segment = program.tasks[int(trace.task[tick])].action, int(trace.segment[tick])
     if segment < 0 or not isinstance(action, FollowPlan):
         return None

@@ -11,7 +11,7 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.playback import Playback, chosen
 from katana450.extensions.media.film import check_filmable, write_film
-from katana450.extensions.media.rendering_pool import RenderingPool, Shot
+from katana450.extensions.media.rendering_pool import Shot, rendering_pool
 from katana450.extensions.media.scene import check_traceable
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.progress import progress
@@ -54,6 +54,6 @@ def _film(path: Path, shown: Playback, shot: Shot, options: argparse.Namespace) 
     fps: float = options.fps
     count = int(shown.duration * fps) + 1
     states = (shown.at(number / fps) for number in range(count))
-    with RenderingPool((shot,), options.urdf, shown.bare, count) as pool:
-        pictures = (taken for (taken,) in pool.pictures(states))
+    with rendering_pool((shot,), options.urdf, shown.bare, count) as rendered:
+        pictures = (taken for (taken,) in rendered(states))
         write_film(path, progress(pictures, count, path.name), shot.size, fps)

@@ -7,13 +7,13 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import wait
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -53,47 +53,41 @@ class Shot(NamedTuple):
         return picture(stage.items(state), stage.water(state), camera, theme)
 
 
-class RenderingPool:
-    """Processes that render pictures of states. A context: they end with it."""
+Pictures = Callable[[Iterable[State]], Iterator[tuple[Pixels, ...]]]
+"""A function that yields the pictures of each of some states, in their order."""
 
-    def __init__(self, shots: Sequence[Shot], urdf: Path, bare: bool, count: int) -> None:
-        """Start when the first picture is taken.
 
-        Args:
-            shots: the pictures of each state.
-            urdf: file of the robot.
-            bare: whether it has no gripper.
-            count: number of states.
-        """
-        self._workers = max(min(os.cpu_count() or 1, count), 1)
-        # Pictures are independent, so each is rendered on one core.
-        self._pool = ProcessPoolExecutor(
-            self._workers,
-            multiprocessing.get_context("spawn"),
-            _begin,
-            (tuple(shots), urdf, bare),
-        )
+@contextmanager
+def rendering_pool(shots: Sequence[Shot], urdf: Path, bare: bool, count: int) -> Iterator[Pictures]:
+    """Yield the function that renders ``shots`` of states, in processes that end with the context.
 
-    def __enter__(self) -> Self:
-        return self
+    They start with the first picture.
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._pool.shutdown(wait=True, cancel_futures=True)
+    Args:
+        shots: the pictures of each state.
+        urdf: file of the robot.
+        bare: whether it has no gripper.
+        count: number of states.
+    """
+    workers = max(min(os.cpu_count() or 1, count), 1)
+    # Pictures are independent, so each is rendered on one core.
+    pool = ProcessPoolExecutor(
+        workers, multiprocessing.get_context("spawn"), _begin, (tuple(shots), urdf, bare)
+    )
 
-    def pictures(self, states: Iterable[State]) -> Iterator[tuple[Pixels, ...]]:
-        """Yield the pictures of each of ``states``, in their order."""
+    def pictures(states: Iterable[State]) -> Iterator[tuple[Pixels, ...]]:
         waiting: deque[Future[tuple[Pixels, ...]]] = deque()
         for state in states:
-            waiting.append(self._pool.submit(_take, _reduced(state)))
-            if len(waiting) >= AHEAD * self._workers:
+            waiting.append(pool.submit(_take, _reduced(state)))
+            if len(waiting) >= AHEAD * workers:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+
+    try:
+        yield pictures
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _reduced(state: State) -> State:

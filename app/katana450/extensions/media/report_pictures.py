@@ -17,17 +17,17 @@ from katana450.arm.control.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
+from katana450.extensions.media.measures import path_at
 from katana450.extensions.media.picture import picture
 from katana450.extensions.media.scene import Camera, Item, unit
 from katana450.extensions.media.stage import RenderStage
-from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.server.traces import DESIRED, PATH_SAMPLES, coloured
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.planning.path import CurvePath, point_derivatives
+from katana450.maths.planning.path import point_derivatives
 from katana450.server.viser_bridge.themes import LIGHT
 
 SIDES = 8
@@ -115,8 +115,7 @@ def moments(program: Program, trace: Trace) -> dict[str, int]:
         found["approaching"] = ticks[0]
         found["emptying"] = ticks[int(EMPTYING * (len(ticks) - 1))]
     if not found:
-        on_path = np.flatnonzero(trace.segment >= 0)
-        drawn = [tick for tick in on_path.tolist() if _path(program, trace, tick) is not None]
+        drawn = [tick for tick in range(len(trace.t)) if path_at(program, trace, tick) is not None]
         if drawn:
             found["tracing"] = drawn[int(DONE * (len(drawn) - 1))]
     return found
@@ -174,17 +173,9 @@ def _ticks(trace: Trace, task: int) -> list[int]:
     return [int(tick) for tick in np.flatnonzero(trace.task == task)]
 
 
-def _path(program: Program, trace: Trace, tick: int) -> CurvePath | None:
-    action = program.tasks[int(trace.task[tick])].action
-    if not isinstance(action, FollowPlan):
-        return None
-    path = action.plan.segments[int(trace.segment[tick])].path
-    return path if isinstance(path, CurvePath) else None
-
-
 def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item]:
     """Return tubes of the present path and of its traced part, coloured as on the page."""
-    path = _path(program, trace, tick)
+    path = path_at(program, trace, tick)
     assert path is not None
     T = robot.require_arm().T_base_shoulder
 
@@ -192,7 +183,7 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
         return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
     whole = point_derivatives(path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
-    before = [each for each in range(tick + 1) if _is_on(program, trace, each, path)]
+    before = [each for each in range(tick + 1) if path_at(program, trace, each) is path]
     traced = np.array([forward(path.chain, trace.sent[each])[:3, 3] for each in before])
     desired = point_derivatives(path, trace.sigma[before])[0]
     worst = np.linalg.norm(traced - desired, axis=1).max()
@@ -202,7 +193,3 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
         tube("traced path", seen(traced), TRACED_RADIUS, (red, green, blue)),
     )
     return [item for item in tubes if item is not None]
-
-
-def _is_on(program: Program, trace: Trace, tick: int, path: CurvePath) -> bool:
-    return int(trace.segment[tick]) >= 0 and _path(program, trace, tick) is path

@@ -16,7 +16,7 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.page import FPS, recorded
 from katana450.extensions.media.film import check_filmable, write_film
-from katana450.extensions.media.rendering_pool import RenderingPool, Shot
+from katana450.extensions.media.rendering_pool import Shot, rendering_pool
 from katana450.extensions.media.scene import check_traceable
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.sampling import RecordedStates, frame_times
@@ -55,8 +55,8 @@ class PictureViews:
         self, states: Iterator[State], count: int
     ) -> Iterator[Iterator[tuple[npt.NDArray[np.uint8], ...]]]:
         """Yield the pictures of all views for each of the ``count`` states."""
-        with RenderingPool(self._shots, self._urdf, self._bare, count) as pool:
-            yield pool.pictures(states)
+        with rendering_pool(self._shots, self._urdf, self._bare, count) as rendered:
+            yield rendered(states)
 
 
 def write_page_of(file: RecordingFile, out: Path, times: FloatArray, robot: DescribedRobot) -> int:
