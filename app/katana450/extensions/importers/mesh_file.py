@@ -11,10 +11,8 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.convex_body import ConvexBody
-from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES
 from katana450.extensions.importers.guarded_reading import Beside, read_shape_guarded
 from katana450.extensions.importers.shape_file import (
-    MAX_FILE_BYTES,
     UNITS,
     Format,
     ShapeFile,
@@ -86,8 +84,8 @@ def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) ->
             return None
         return content_of(found, maximum)
 
-    maximum = MAX_ARCHIVE_BYTES if Format.of(path.name) is Format.ZIP else MAX_FILE_BYTES
-    return read_mesh(content_of(path, maximum), path.name, unit, up, beside=beside)
+    content = content_of(path, Format.of(path.name).max_bytes)
+    return read_mesh(content, path.name, unit, up, beside=beside)
 
 
 def content_of(path: Path, maximum: int) -> bytes:

@@ -28,7 +28,7 @@ from katana450.extensions.importers.archive import (
     packed,
 )
 from katana450.extensions.importers.mesh_file import content_of, read_mesh, read_mesh_file
-from katana450.extensions.importers.shape_file import MAX_FILE_BYTES, Format, Up
+from katana450.extensions.importers.shape_file import Format, Up
 from katana450.extensions.objects.scenes import free_name
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
@@ -263,8 +263,7 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
         or not file.path.isprintable()
     ):
         raise InputError(f"{file.path!r} is not a relative path within the scene.")
-    is_archive = Format.of(file.path) is Format.ZIP
-    content = opened(file.path, MAX_ARCHIVE_BYTES if is_archive else MAX_FILE_BYTES)
+    content = opened(file.path, Format.of(file.path).max_bytes)
     sha256 = hashlib.sha256(content).hexdigest()
     if file.sha256 is not None and sha256 != file.sha256:
         raise InputError(

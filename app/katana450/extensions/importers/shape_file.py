@@ -70,6 +70,11 @@ class Format(Enum):
     OFF = "off"
     ZIP = "zip"
 
+    @property
+    def max_bytes(self) -> int:
+        """The maximum size of a file [bytes]."""
+        return MAX_ARCHIVE_BYTES if self is Format.ZIP else MAX_FILE_BYTES
+
     @classmethod
     def of(cls, file: str) -> Format:
         """Return the format of a file by its name. Raises InputError.
@@ -235,11 +240,10 @@ def object_name(name: str) -> str:
 
 def check_file(data: bytes, file: str, unit: float | None, format: Format) -> None:
     """Raise InputError for a file that is too large, or a unit that is not a length."""
-    maximum = MAX_ARCHIVE_BYTES if format is Format.ZIP else MAX_FILE_BYTES
-    if len(data) > maximum:
+    if len(data) > format.max_bytes:
         raise InputError(
-            f"{file} has {len(data) / 1e6:.1f} MB; at most {maximum // 1_000_000} are read. "
-            "Save it coarser, or as a binary file."
+            f"{file} has {len(data) / 1e6:.1f} MB; at most {format.max_bytes // 1_000_000} are "
+            "read. Save it coarser, or as a binary file."
         )
     if unit is not None and not (math.isfinite(unit) and unit > 0.0):
         raise InputError(f"The unit must be a length in metres above 0, not {unit}.")

@@ -20,7 +20,7 @@ from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_zip, scene_zip
-from katana450.extensions.importers.shape_file import LONGEST_NAME, MAX_FILE_BYTES, Format
+from katana450.extensions.importers.shape_file import LONGEST_NAME, Format
 from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
 from katana450.extensions.programs.script.scene_draft import Scene
 from katana450.maths.planning.checkpoint import checked_by
@@ -151,9 +151,7 @@ class Uploads:
                 raise InputError("The name of the file is too long.")
             if not main.isprintable():
                 raise InputError("`main` is not a path in the .zip.")
-            is_archive = Format.of(name) is Format.ZIP
-            maximum = MAX_ARCHIVE_BYTES if is_archive else MAX_FILE_BYTES
-            data = await body_of(request, maximum, UPLOAD_TIMEOUT, MIN_RATE)
+            data = await body_of(request, Format.of(name).max_bytes, UPLOAD_TIMEOUT, MIN_RATE)
             mesh = await self._in_thread(
                 request, lambda: read_mesh(data, name, unit or None, main=main)
             )
