@@ -27,7 +27,7 @@ WAIT = idle_planner.DELAY + 1.0
 @pytest.fixture
 def table(session: Session, monkeypatch: pytest.MonkeyPatch) -> Staged:
     staged = Staged(session)
-    monkeypatch.setattr(idle_planner, "_texts", lambda **_: [SCRIPT, OTHER])
+    monkeypatch.setattr(idle_planner, "_texts", lambda _arm: [SCRIPT, OTHER])
     staged.arm.robot = Mock()
     return staged
 
@@ -115,11 +115,10 @@ def test_a_plan_for_another_scene_is_not_used(table: Staged) -> None:
     assert table.programs.planner.planning is not prepared
 
 
-def test_library_is_planned_with_the_pour_first() -> None:
-    with_gripper = idle_planner._texts(with_gripper=True)
-    assert with_gripper[0] == script_text(LIBRARY / "pour.yaml")
-    assert len(with_gripper) == len(list(LIBRARY.glob("*.yaml"))) - 1
-    assert len(idle_planner._texts(with_gripper=False)) == 1
+def test_library_is_planned_with_the_pour_first(session: Session) -> None:
+    texts = idle_planner._texts(session.require_arm())
+    assert texts[0] == script_text(LIBRARY / "pour.yaml")
+    assert len(texts) == len(list(LIBRARY.glob("*.yaml"))) - 1
 
 
 def test_command_during_the_start_of_a_planning_cancels_it(session: Session) -> None:
@@ -129,7 +128,7 @@ def test_command_during_the_start_of_a_planning_cancels_it(session: Session) -> 
         planner.cancel()
         return planning
 
-    planner = IdlePlanner(plan, with_gripper=True)
+    planner = IdlePlanner(plan, session.require_arm())
     state = session.begin(session.ready, 0.0, 0.0)
     planner.tick(state, 0.0, used=True)
     planner.tick(state, WAIT, used=False)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from katana450.assembly.robot_session import describe_robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
 from katana450.extensions.programs.script.teach import TaughtPose, taught
+from katana450.resources import URDF_PATH
+from katana450.settings import Settings
 from tests.programs.conftest import Stage
 
 TAUGHT = """\
@@ -88,6 +92,18 @@ def test_a_saved_script_is_listed(tmp_path: Path) -> None:
     assert next(iter(scripts.paths)) == "Mine"
     assert scripts.text("Mine") == TAUGHT
     assert len(scripts.paths) == 1 + len(list(LIBRARY.glob("*.yaml")))
+
+
+def test_scripts_of_the_library_are_offered_to_arms_with_their_tools(tmp_path: Path) -> None:
+    """An arm without a tool `flange` is not offered the circle of the Katana, nor its pour."""
+    scripts, katana = Scripts(tmp_path), describe_robot(Settings(), URDF_PATH, None).session
+    tools = {"tool0": katana.require_arm().chain.M}
+    arm = replace(katana.require_arm(), tools=tools, default_tool="tool0")
+    scripts.save("Mine", TAUGHT.replace("steps:", "tool: grasp\nsteps:"))
+    assert scripts.offered(arm) == ("Mine", "Turn")
+    bare = describe_robot(replace(Settings(), bare=True), URDF_PATH, None).session.require_arm()
+    assert scripts.offered(bare) == ("Mine", "Circle", "Turn")
+    assert len(scripts.offered(None)) == len(scripts.paths)
 
 
 @pytest.mark.parametrize("name", ["", "../out", "a/b", ".hidden", "x" * 41, "a\nb", "Mine"])

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs.building.located_step import LocatedStep
 from katana450.extensions.programs.language.attached_files import FILE
@@ -145,6 +146,12 @@ class Script(Declared):
     def bare(self) -> bool:
         """True if it needs an arm without its gripper."""
         return self.gripper == "none"
+
+    def suits(self, arm: ArmModel) -> bool:
+        """Return whether ``arm`` has the gripper and the tool frame of the script."""
+        tool = None if self.tool is None else self.tool.step
+        is_there = not isinstance(tool, Tool) or tool.name in arm.tools
+        return is_there and not (self.bare and arm.gripper.moves)
 
     @property
     def in_base(self) -> bool:

@@ -6,11 +6,13 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from katana450.arm.control.arm import ArmModel
 from katana450.atomic import write_files, writer_of
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions import programs
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES
+from katana450.extensions.programs.script.script import parse
 
 LIBRARY = Path(programs.__file__).parent / "library"
 """Folder of the scripts that come with the package."""
@@ -57,6 +59,17 @@ class Scripts:
             own = sorted(self._folder.glob(f"*{ENDING}"))[:MAX_SCRIPTS]
             found = {**{path.stem: path for path in own}, **found}
         return found
+
+    def offered(self, arm: ArmModel | None) -> tuple[str, ...]:
+        """Return the names of the scripts of the folder, and of those of the library for ``arm``.
+
+        ``arm``: None for an arm that is not known yet, which is offered all.
+        """
+        return tuple(
+            name
+            for name, path in self.paths.items()
+            if arm is None or path.parent != LIBRARY or parse(script_text(path)).suits(arm)
+        )
 
     def text(self, name: str) -> str:
         """Return the text of the script ``name``, with those of all files that it names.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.state import State
 from katana450.errors import KatanaError
 from katana450.extensions.programs.script.script import parse
@@ -27,15 +28,15 @@ FIRST = "pour.yaml"
 class IdlePlanner:
     """The planner of one script of the library after another, each for the present situation."""
 
-    def __init__(self, plan: Callable[[str, float], Planning], *, with_gripper: bool) -> None:
+    def __init__(self, plan: Callable[[str, float], Planning], arm: ArmModel) -> None:
         """Prepare to plan.
 
         Args:
             plan: starts to plan a script with a speed from the present situation.
-            with_gripper: whether the arm has its gripper; scripts for the other arm are left out.
+            arm: the arm; scripts that do not suit it are left out.
         """
         self._plan = plan
-        self._texts = _texts(with_gripper=with_gripper)
+        self._texts = _texts(arm)
         # Replaced and never changed: a command of any thread cancels the planning.
         self._plannings: tuple[Planning, ...] = ()
         self._used: float | None = None
@@ -83,13 +84,13 @@ class IdlePlanner:
         return None
 
 
-def _texts(*, with_gripper: bool) -> list[str]:
-    """Return the scripts of the library for the arm with or without its gripper."""
+def _texts(arm: ArmModel) -> list[str]:
+    """Return the scripts of the library that suit ``arm``."""
     found = []
     for path in sorted(LIBRARY.glob("*.yaml"), key=lambda each: (each.name != FIRST, each.name)):
         try:
             text = script_text(path)
-            if parse(text).bare is not with_gripper:
+            if parse(text).suits(arm):
                 found.append(text)
         except KatanaError:
             # The panel reports it when the script is chosen.

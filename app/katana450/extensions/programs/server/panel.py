@@ -12,6 +12,7 @@ from typing import Any
 import viser
 
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
@@ -151,9 +152,9 @@ class ProgramsPanel:
         self._with_ghosts = False
         self._preview = Preview(server, robot, session)
         gui = server.gui
-        self._listed, self._names = scripts.changed, tuple(scripts.paths)
-        # Some scripts of the library need an arm without its gripper.
-        suitable = (name for name in self._names if _suits(scripts, name, robot))
+        self._arm = robot.require_arm()
+        self._listed, self._names = scripts.changed, scripts.offered(self._arm)
+        suitable = (name for name in self._names if _suits(scripts, name, self._arm))
         self._choice = gui.add_dropdown(
             "Script",
             self._names,
@@ -218,7 +219,7 @@ class ProgramsPanel:
             name = f"{progress.name or 'Script'} of {progress.by}"
             self._sent, self._sent_name, is_new = sent, next(same, name), True
         if self._scripts.changed != self._listed or is_new:
-            self._listed, self._names = self._scripts.changed, tuple(self._scripts.paths)
+            self._listed, self._names = self._scripts.changed, self._scripts.offered(self._arm)
             chosen = self._sent_name if is_new else self._choice.value
             options = dict.fromkeys((*self._names, self._sent_name or chosen))
             self._choice.options = tuple(options)
@@ -306,10 +307,10 @@ def shown_seconds(duration: float) -> float:
     return math.ceil(round(duration / TIME_STEP, 6)) * TIME_STEP
 
 
-def _suits(scripts: Scripts, name: str, robot: Robot) -> bool:
-    """Return whether the script ``name`` can be read, and can run on ``robot`` with its gripper."""
+def _suits(scripts: Scripts, name: str, arm: ArmModel) -> bool:
+    """Return whether the script ``name`` can be read, and suits ``arm``."""
     try:
-        return not (parse(scripts.text(name)).bare and robot.require_arm().gripper.moves)
+        return parse(scripts.text(name)).suits(arm)
     except KatanaError:
         return False
 

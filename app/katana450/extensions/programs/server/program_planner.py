@@ -103,7 +103,7 @@ class ProgramPlanner:
         if self._idle is None:
             if not self._idly or used or arm is None or arm.robot.arm is None:
                 return
-            self._idle = IdlePlanner(self._started, with_gripper=arm.robot.arm.gripper.moves)
+            self._idle = IdlePlanner(self._started, arm.robot.arm)
         if arm is not None:
             self._idle.tick(arm.state, t, used=used)
 

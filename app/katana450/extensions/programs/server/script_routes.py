@@ -50,9 +50,11 @@ class ScriptRoutes:
         ]
 
     async def _list(self, request: Request) -> Response:
-        """Return the names of all scripts, and whether there is a folder to save in."""
+        """Return the names of scripts for this arm, and whether there is a folder to save in."""
         self._context.identity(request)
-        names = await asyncio.to_thread(lambda: list(self._scripts.paths))
+        arm = self._context.hub.arm
+        model = None if arm is None else arm.robot.arm
+        names = await asyncio.to_thread(self._scripts.offered, model)
         return _json({"names": names, "saves": self._scripts.keeps})
 
     async def _schema(self, _request: Request) -> Response:
