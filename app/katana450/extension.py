@@ -84,7 +84,7 @@ class ServerFacts:
         tool: Link to which targets refer; None for that of the file.
         port: Port of the page.
         address: Address of the arm's process.
-        options: Options of the extensions; None if no extension takes part.
+        options: Options of the command, with those of the extensions.
         folder: Private folder for the meshes of scene objects.
     """
 
@@ -93,8 +93,8 @@ class ServerFacts:
     tool: str | None
     port: int
     address: ArmAddress
-    options: Namespace | None = None
-    folder: Path = Path()
+    options: Namespace
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -218,6 +218,13 @@ def provided(part: str) -> Iterator[Any]:
             _report(extension.name, error)
         else:
             yield loaded
+
+
+def results(part: str, *arguments: Any) -> Iterator[Any]:
+    """Yield what the functions of ``part`` return for ``arguments``, one by one, without None."""
+    for make in provided(part):
+        if (result := make(*arguments)) is not None:
+            yield result
 
 
 @cache

@@ -11,6 +11,10 @@ READY_POSTURE_DEG = (0.0, -68.0, 85.0, 8.0, 0.0)
 and stretched. It leaves room to drag and turn the tool in every direction."""
 
 
+FIXED = frozenset({"rate", "frame_rate", "ready"})
+"""Names of the settings that no option of ``serve`` sets."""
+
+
 @dataclass(frozen=True)
 class Settings:
     """Settings of one server.

@@ -54,7 +54,7 @@ class House:
         self.people.links = access
         authenticator = Authenticator(access, 8080, ADDRESS, self.people)
         self.budgets = Budgets(self.hub.clock)
-        self.api = Api(self.hub, authenticator, self.budgets)
+        self.api = Api(self.hub, authenticator, self.budgets, Namespace())
         self.ada = self.join("ada", "Ada", Role.ADMIN)
 
     def join(self, session: str, name: str, role: Role) -> Participant:

@@ -141,7 +141,7 @@ def test_interrupted_episode_is_finished_while_others_are_recorded(
 def test_people_who_only_watch_do_not_learn_where_files_are(tmp_path: Path) -> None:
     (tmp_path / "episode-0001.mcap").write_bytes(b"broken")
     hub = SimpleNamespace(shown={})
-    context = RouteContext(hub, None, None, None)  # type: ignore[arg-type]
+    context = RouteContext(hub, None, None, None, None)  # type: ignore[arg-type]
     routes = EpisodeRoutes(context, tmp_path, None)  # type: ignore[arg-type]
     for paths in (True, False):
         told = json.dumps(routes._listed(paths=paths))

@@ -313,7 +313,7 @@ def test_difference_of_joints_that_slide_is_a_length() -> None:
 @pytest.mark.parametrize("role", [Role.VIEWER, Role.OPERATOR])
 def test_viewers_open_no_files(tmp_path: Path, role: Role) -> None:
     who = Identity("session", "Vera", role)
-    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: who, None, None)  # type: ignore[arg-type]
     (_, *_, timeline) = PlaybackRoutes(context, RecordingStore(tmp_path)).routes()
     request = Request({"type": "http", "path_params": {"name": "0" * 16}, "headers": []})
     with pytest.raises(HTTPException) as caught:

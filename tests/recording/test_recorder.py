@@ -135,7 +135,7 @@ def test_script_leaves_no_file_even_if_nobody_takes_it(
 
     monkeypatch.setattr(RecordingJob, "_result", made)
     who = Identity("session", "Ada", Role.OPERATOR)
-    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: who, None, None)  # type: ignore[arg-type]
     store = RecordingStore(folder)
     request = Request({"type": "http", "query_string": b"", "headers": []})
     answer = asyncio.run(RecordingRoutes(context, store).routes()[1].endpoint(request))

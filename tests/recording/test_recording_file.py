@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 import katana450
+from katana450.arm.runtime.arm_listener import ArmAddress
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError
@@ -368,7 +370,8 @@ def test_scene_of_a_server_is_attached_to_its_recordings(
 ) -> None:
     scene = tmp_path / "scene.yaml"
     scene.write_text("objects: []\n", encoding="utf-8")
-    facts = ServerFacts(Settings(), URDF_PATH, None, 8080, None)  # type: ignore[arg-type]
+    address = ArmAddress(str(tmp_path / "arm"), b"key")
+    facts = ServerFacts(Settings(), URDF_PATH, None, 8080, address, Namespace(), tmp_path)
     config = recorder.RecorderConfig(facts, tmp_path / "ring", tmp_path / "episodes", scene)
     kept, _ = recorder._ring(config, RunningScripts())
     run(20, 1, kept.put, swinging, odd=False)

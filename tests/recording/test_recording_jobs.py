@@ -236,7 +236,7 @@ def test_wrong_requests_are_refused(page: Page) -> None:
 
 def test_viewers_get_no_recording_and_begin_no_job(tmp_path: Path) -> None:
     who = Identity("session", "Vera", Role.VIEWER)
-    context = RouteContext(None, None, lambda _: who, None)  # type: ignore[arg-type]
+    context = RouteContext(None, None, lambda _: who, None, None)  # type: ignore[arg-type]
     request = Request({"type": "http", "query_string": b"do=csv", "headers": [], "path_params": {}})
     for route in RecordingRoutes(context, RecordingStore(tmp_path)).routes():
         with pytest.raises(HTTPException) as caught:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
 from katana450.assembly.log_output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
-from katana450.extension import ServerFacts, provided
+from katana450.extension import ServerFacts, results
 
 if TYPE_CHECKING:
     from katana450.arm.control.state import State
@@ -61,10 +61,9 @@ def run_arm(
         config.settings, described, scene, again=again, last=state, make_driver=make_driver
     )
     roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
-    for tick_sender in () if config.options is None else provided("tick_sender"):
-        if (sender := tick_sender(config.options)) is not None:
-            arm.record(sender)
-            roles[RECORD] = sender.attach
+    for sender in results("tick_sender", config.options):
+        arm.record(sender)
+        roles[RECORD] = sender.attach
     listener = ArmListener(config.address, roles)
     if not again:
         for note in arm.notes:
@@ -92,13 +91,9 @@ def run_arm(
     shutil.rmtree(config.folder, ignore_errors=True)
 
 
-def _driver(
-    options: Namespace | None, robot: Robot, q: FloatArray, gripper: float
-) -> Driver | None:
+def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
     """Return the driver that an extension has for the arm; None if none has."""
-    makers = () if options is None else provided("driver")
-    drivers = (make(options, robot, q, gripper) for make in makers)
-    return next(filter(None, drivers), None)
+    return next(results("driver", options, robot, q, gripper), None)
 
 
 def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScene | None]:
@@ -107,8 +102,6 @@ def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScen
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.robot_session import find_robot
 
-    if config.options is None:
-        return None, None
     found_robots: list[DescribedRobot] = []
 
     def session() -> Session:
@@ -116,9 +109,7 @@ def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScen
             found_robots.append(find_robot(config.settings, config.urdf, config.tool))
         return found_robots[0].session
 
-    scene = None
-    for initial_scene in provided("initial_scene"):
-        scene = scene or initial_scene(config.options, session)
+    scene: InitialScene | None = next(results("initial_scene", config.options, session), None)
     if scene is not None:
         Meshes(config.folder).put(scene.meshes, ())
         for note in scene.notes:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from threading import Event
 
-from katana450.arm.control.environment import Environment
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.arm_listener import FRONT, Greeting, connect, connect_when_ready
@@ -17,7 +16,7 @@ from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
-from katana450.extension import ServerFacts, provided
+from katana450.extension import ServerFacts, provided, results
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.command_gate import guarded
 from katana450.server.service.nodes import Nodes
@@ -49,7 +48,8 @@ class Frontend:
             EOFError: the server ends, or the arm's process has closed the pipe.
         """
         self._gateway, self._config = gateway, config
-        settings, address, added = config.settings, config.address, layers(config.options)
+        settings, address = config.settings, config.address
+        added: tuple[ViewLayer, ...] = tuple(results("view_layer", config.options))
         robot, session, _ = self._found = find_robot(settings, config.urdf, config.tool)
         self.pipe = FrontEnd(
             connect_when_ready(address, Greeting(FRONT), ended),
@@ -62,7 +62,7 @@ class Frontend:
             for layer in added:
                 if layer.what:
                     raise ConfigurationError(f"{layer.what} {robot.why}")
-            make, options = _joint_view(), ViewOptions(meshes=meshes)
+            make, options = next(provided("joint_view")), ViewOptions(meshes=meshes)
         else:
             make, options = View, ViewOptions(added, meshes)
         self.view: ViewUpdater = make(
@@ -85,7 +85,7 @@ class Frontend:
         """
         gateway, hub, pipe = self._gateway, self._gateway.hub, self.pipe
         robot, session, _ = self._found
-        nodes = _nodes(self._config.options, robot, session.environment)
+        nodes: Nodes = next(results("nodes", robot, session.environment))
         planning_worker = None
         if robot.arm is not None:
             planning_worker = PlanningWorker(session, pipe.state_publisher, pipe)
@@ -106,28 +106,10 @@ class Frontend:
             self._detours.stop()
 
 
-def layers(options: Namespace | None) -> tuple[ViewLayer, ...]:
-    """Return the layers that the extensions add to the scene of an arm."""
-    if options is None:
-        return ()
-    added = (make(options) for make in provided("view_layer"))
-    return tuple(layer for layer in added if layer is not None)
-
-
-def _nodes(options: Namespace | None, robot: Robot, environment: Environment) -> Nodes:
-    """Return the nodes of the first extension that provides any, else those of the links alone."""
-    for make in () if options is None else provided("nodes"):
-        nodes: Nodes = make(robot, environment)
-        return nodes
-    return Nodes(robot)
-
-
 def _folders(
-    gateway: Gateway, options: Namespace | None, robot: Robot, front_end: FrontEnd, tabs: PanelTabs
+    gateway: Gateway, options: Namespace, robot: Robot, front_end: FrontEnd, tabs: PanelTabs
 ) -> Iterator[PanelFolder]:
     """Add the controls of the extensions to the panel. Raises KatanaError."""
-    if options is None:
-        return
     context = FolderContext(
         gateway.viser,
         robot,
@@ -138,12 +120,4 @@ def _folders(
         options,
         tabs,
     )
-    for make in provided("folder"):
-        if (folder := make(context)) is not None:
-            yield folder
-
-
-def _joint_view() -> Callable[..., ViewUpdater]:
-    """Return what makes the view of a robot without a tool."""
-    view: Callable[..., ViewUpdater] = next(provided("joint_view"))
-    return view
+    yield from results("folder", context)

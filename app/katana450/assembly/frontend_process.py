@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from katana450.assembly.arm_process import ARM
 from katana450.assembly.supervised import READY, SupervisorPipe
-from katana450.extension import ServerFacts, provided
+from katana450.extension import ServerFacts, results
 from katana450.platform_support import reset_priority
 
 if TYPE_CHECKING:
@@ -82,18 +82,16 @@ def _run(
     gateway = Gateway(config.settings, web, lines, meshes)
     gateway.hub.supervisor_problem = lambda: supervisor.problem
     supervisor.notify = gateway.announce
-    senders: list[Callable[[], None] | None] = []
+    senders: list[Callable[[], None]] = []
     try:
         from katana450.assembly.frontend import Frontend
 
         frontend = Frontend(gateway, config, meshes, supervisor.ended)
         gateway.show()
         # Browsers draw the scene meanwhile.
-        if config.options is not None:
-            for send_records in provided("send_records"):
-                senders.append(send_records(config.options, web.recorder, records))
+        senders = [*results("send_records", config.options, web.recorder, records)]
         # Without a reader, notes would only take memory.
-        web.recorder.enabled = any(senders)
+        web.recorder.enabled = bool(senders)
         gateway.start(config.options)
         supervisor.prove(lambda: gateway.hub.held_up < HANG_SECONDS)
         frontend.start()
@@ -108,6 +106,6 @@ def _run(
         frontend.stop()
     finally:
         web.stop()
-        for close in filter(None, senders):
+        for close in senders:
             close()
         close_server(gateway.viser)

@@ -31,7 +31,7 @@ from katana450.arm.robot.object_meshes import Meshes
 from katana450.assembly.page_routes import signed_in
 from katana450.assembly.web_server import WebServer
 from katana450.errors import LeaseError
-from katana450.extension import provided
+from katana450.extension import provided, results
 from katana450.server.api.fields import MAX_PRESS_LENGTH
 from katana450.server.service import status
 from katana450.server.service.arm_handle import ArmHandle
@@ -102,22 +102,19 @@ class Gateway:
         web = self._web
         self.soon(web.show, Admission(self._app, self.hub, web.authenticator, web.acceptor))
 
-    def start(self, options: Namespace | None) -> None:
+    def start(self, options: Namespace) -> None:
         """Let the server answer every request, also those of the extensions.
 
-        ``options``: options of the extensions; None if no extension takes part.
+        ``options``: options of ``katana450 serve``.
         """
         from katana450.server.web.http_api import Api
         from katana450.server.web.program_socket import LineServer
 
         hub, authenticator = self.hub, self._web.authenticator
-        routes: list[Any] = []
-        if options is not None:
-            hub.use_runner(next(provided("runner"))(hub, options))
-            for handler in provided("handler"):
-                hub.add_handler(handler(hub, options))
-            routes = list(provided("routes"))
-        api = Api(hub, authenticator, self._budgets, options, routes)
+        hub.use_runner(next(results("runner", hub, options)))
+        for handler in results("handler", hub, options):
+            hub.add_handler(handler)
+        api = Api(hub, authenticator, self._budgets, options, list(provided("routes")))
         self._app.router.routes.extend(api.routes())
         lines = LineServer(hub, authenticator, self._budgets).run(self._lines_socket)
         self.soon(self._web.complete, lines, *self._watches())

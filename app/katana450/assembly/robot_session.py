@@ -18,7 +18,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import RobotDescriptionError
-from katana450.extension import RobotWorld, provided
+from katana450.extension import RobotWorld, provided, results
 from katana450.maths.collision.world import CollisionWorld
 from katana450.settings import Settings
 
@@ -44,7 +44,7 @@ def describe_robot(
 
 def find_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     """Return the arm outside the five-axis family that an extension finds; None if none does."""
-    return next((find(urdf, path, tool) for find in provided("find_arm")), None)
+    return next(results("find_arm", urdf, path, tool), None)
 
 
 def find_robot(settings: Settings, urdf: Path, tool: str | None) -> DescribedRobot:

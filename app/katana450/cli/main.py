@@ -17,7 +17,7 @@ CORE_COMMANDS = (
         "serve",
         "start the app and print its address",
         "katana450.cli.serve_options:add_serve_options",
-        "katana450.cli.serve:serve_with",
+        "katana450.cli.serve:serve",
     ),
 )
 

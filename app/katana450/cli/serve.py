@@ -10,7 +10,7 @@ import tempfile
 import threading
 from argparse import Namespace
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -26,7 +26,7 @@ from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError
-from katana450.extension import ExtraProcess, ServerFacts, provided
+from katana450.extension import ExtraProcess, ServerFacts, results
 from katana450.platform_support import (
     claim_file,
     create_file,
@@ -35,10 +35,9 @@ from katana450.platform_support import (
     pipe_address,
     stop_signals,
 )
-from katana450.resources import URDF_PATH
 from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
-from katana450.settings import Settings
+from katana450.settings import FIXED, Settings
 
 FRONT_END, STOP = "katana450 front", "katana450 stop"
 """Names of the processes beside that of the arm."""
@@ -62,43 +61,16 @@ EXTRA_DEADLINE = 10.0
 """[s] Silence after which a process of an extension is ended."""
 
 
-def serve_with(options: Namespace) -> int:
-    """Run the app with the options of ``katana450 serve``; see ``serve``."""
-    settings = Settings(
-        host=options.host,
-        port=options.port,
-        silence=options.silence,
-        sample_delay=options.sample_delay,
-        strict_silence=options.strict_silence,
-        access=options.access,
-        insecure=options.insecure,
-        tls_cert=options.tls_cert,
-        tls_key=options.tls_key,
-        public_url=options.public_url,
-        lines=options.lines,
-        bare=options.bare,
-        stop_port=options.stop_port,
-        clear_by=options.clear_by,
-    )
-    # The options are sent to another process, which does not need the command itself.
-    values = Namespace(**{key: value for key, value in vars(options).items() if key != "command"})
-    return serve(settings, options.urdf, options.tool, values)
+def serve(options: Namespace) -> int:
+    """Run the app with the options of ``katana450 serve`` until SIGINT or SIGTERM.
 
-
-def serve(
-    settings: Settings,
-    urdf: Path = URDF_PATH,
-    tool: str | None = None,
-    options: Namespace | None = None,
-) -> int:
-    """Run the app until SIGINT or SIGTERM; return the exit status.
-
-    Args:
-        settings: settings of the server.
-        urdf: the file of the arm.
-        tool: the link to which targets refer; see ``robot.loader.load``.
-        options: options of the extensions; None if no extension takes part.
+    Returns the exit status.
     """
+    values = vars(options)
+    named = (field.name for field in fields(Settings) if field.name not in FIXED)
+    settings = Settings(**{name: values[name] for name in named})
+    # The options are sent to other processes, which do not need the command itself.
+    options = Namespace(**{key: value for key, value in values.items() if key != "command"})
     start_log()
     raise_descriptor_limit()
     stopping = threading.Event()
@@ -107,17 +79,16 @@ def serve(
     listening = listen(settings.host, settings.port)
     lines = None if settings.lines is None else listen(LOOPBACK, settings.lines)
     stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
-    stop_port = stopping_socket.getsockname()[1]
+    port, stop_port = listening.getsockname()[1], stopping_socket.getsockname()[1]
     settings = replace(settings, stop_port=stop_port)
-    url = settings.public_url or local_url(settings, listening.getsockname()[1])
-    event_log = _server_log(options, listening.getsockname()[1])
+    url = settings.public_url or local_url(settings, port)
+    event_log: ServerLog = next(results("server_log", options, port), ServerLog())
     folder, claimed = _private_folder()
     address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
-    port = listening.getsockname()[1]
-    facts = ServerFacts(settings, urdf, tool, port, address, options, folder)
+    facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
     front_end_work = _FrontendWork(facts, Sockets(listening, lines), event_log)
     stop = partial(run_stop, facts, stopping_socket)
-    extra = _extra_processes(options, facts)
+    extra: list[ExtraProcess] = [*results("process", options, facts)]
     specs = (
         child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
         ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
@@ -143,8 +114,8 @@ def serve(
         if not stopping.is_set():
             say(f"Open {url} in a browser.")
             # With access links each person has an address of their own.
-            if options and not options.no_browser and settings.access is None:
-                show_page(url, listening.getsockname()[1], stop_port)
+            if not options.no_browser and settings.access is None:
+                show_page(url, port, stop_port)
         supervisor.wait_for(STOP, READY)
         supervisor.wait_for(FRONT_END, READY)
         if not stopping.is_set():
@@ -196,19 +167,6 @@ def _set_on_signals(stopping: threading.Event) -> None:
 
     for number in stop_signals():
         signal.signal(number, stop)
-
-
-def _server_log(options: Namespace | None, port: int) -> ServerLog:
-    """Return the event log that an extension provides, or none."""
-    makers = () if options is None else provided("server_log")
-    logs = (make(options, port) for make in makers)
-    return next(filter(None, logs), ServerLog())
-
-
-def _extra_processes(options: Namespace | None, facts: ServerFacts) -> list[ExtraProcess]:
-    """Return the processes that extensions add. Raises KatanaError."""
-    makers = () if options is None else provided("process")
-    return [process for make in makers if (process := make(options, facts))]
 
 
 def _private_folder() -> tuple[Path, int]:

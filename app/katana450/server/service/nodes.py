@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.state import State
 from katana450.arm.robot.robot import Robot
-from katana450.errors import InputError
 from katana450.server.api import answers, requests
 
 
-class Nodes:
-    """Poses of the links. An extension with further nodes overrides the other methods."""
+class Nodes(ABC):
+    """Nodes of a robot and its environment by name, and the poses of its links."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -25,18 +25,14 @@ class Nodes:
     def _values(self, state: State) -> Mapping[str, float]:
         return self._robot.joint_values(state.q, state.gripper)
 
-    def world(self, state: State) -> answers.World:  # noqa: ARG002
+    @abstractmethod
+    def world(self, state: State) -> answers.World:
         """Return all nodes with their present values."""
-        return answers.World(nodes=[])
 
-    def read(self, state: State, fields: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:  # noqa: ARG002
+    @abstractmethod
+    def read(self, state: State, fields: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
         """Return the present values of the fields. Raises InputError for an unknown name."""
-        raise _not_installed()
 
-    def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:  # noqa: ARG002
+    @abstractmethod
+    def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
         """Return the command that sets all fields. Raises InputError if one cannot be set."""
-        raise _not_installed()
-
-
-def _not_installed() -> InputError:
-    return InputError("There are no nodes. Install the extension that provides them.")

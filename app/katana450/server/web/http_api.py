@@ -62,14 +62,14 @@ class RouteContext(NamedTuple):
         authenticator: Identifies clients by their cookies and links.
         identity: Returns the identity of a request's sender, or raises HTTPException.
         budgets: The processor time of each identity.
-        options: Options of the extensions; None if no extension takes part.
+        options: Options of ``katana450 serve``.
     """
 
     hub: Hub
     authenticator: Authenticator
     identity: Callable[[Request], Identity]
     budgets: Budgets
-    options: Namespace | None = None
+    options: Namespace
 
 
 RouteProvider = Callable[[RouteContext], list[BaseRoute]]
@@ -92,7 +92,7 @@ class Api:
         hub: Hub,
         authenticator: Authenticator,
         budgets: Budgets,
-        options: Namespace | None = None,
+        options: Namespace,
         provided: Sequence[RouteProvider] = (),
     ) -> None:
         """Serve ``hub``. ``provided``: functions that return the routes of extensions."""
