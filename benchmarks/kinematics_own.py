@@ -23,9 +23,8 @@ from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.inverse_batch import inverse_batch
-from katana450.maths.kinematics.solver import Solver
+from katana450.maths.kinematics.solver import Solver, inverse
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
 FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")

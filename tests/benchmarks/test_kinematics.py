@@ -16,7 +16,7 @@ from benchmarks.kinematics_own import Floor
 from benchmarks.kinematics_quality import quality
 from benchmarks.kinematics_report import Tables
 from benchmarks.kinematics_task import SOLVED_POSITION
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 
 POSES = 12
 

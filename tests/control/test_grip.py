@@ -23,7 +23,7 @@ from katana450.extensions.programs.planning.curves import ToolLine
 from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.settings import Settings
 

@@ -19,7 +19,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from katana450.resources import URDF_PATH
 from tests.docs.code_blocks import code_block
 from tests.exchange.conftest import GANTRY_POSE

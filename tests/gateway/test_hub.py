@@ -12,12 +12,12 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import ActiveStop, Finding, Reason, State
+from katana450.arm.control.tool_targets import BranchOption
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
 from tests.gateway import octave

@@ -13,8 +13,8 @@ from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.extensions.general_arms.links import exact_chain, links_of, reversed_chain
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
+from katana450.maths.kinematics.solver import inverse
 from tests.general_arms.published_arms import (
     FOUR,
     IIWA_7,

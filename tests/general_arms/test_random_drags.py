@@ -11,8 +11,8 @@ import pytest
 
 from katana450.arm.control.state import State
 from katana450.extensions.general_arms.branch_solver import near_turns
+from katana450.extensions.general_arms.descent import NEAR
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
-from katana450.extensions.general_arms.regularity import NEAR
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray

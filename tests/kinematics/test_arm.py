@@ -12,7 +12,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from tests.kinematics.family import random_member
 
 

@@ -11,8 +11,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import CHUNK, errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.inverse_batch import inverse_batch, validated_poses
+from katana450.maths.kinematics.solver import inverse
 from tests.kinematics.family import random_member
 
 

@@ -11,12 +11,12 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
+from katana450.maths.kinematics.canonical_target import PlaneOrientation
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.inverse_batch import inverse_batch
-from katana450.maths.kinematics.orientation import PlaneOrientation
 from katana450.maths.kinematics.solution import Solution
+from katana450.maths.kinematics.solver import inverse
 
 POSES = 2000
 # [m] and [rad]: double precision over half a metre leaves about 1e-16.

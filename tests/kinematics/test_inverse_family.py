@@ -15,9 +15,8 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.solution import Solution
-from katana450.maths.kinematics.solver import Solver
+from katana450.maths.kinematics.solver import Solver, inverse
 from tests.kinematics.by_subproblems import matched, same, solve
 from tests.kinematics.family import Offsets, member, random_member, random_offsets, random_pose
 

@@ -13,11 +13,11 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
+from katana450.maths.kinematics.canonical_target import PlaneOrientation
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
-from katana450.maths.kinematics.orientation import PlaneOrientation
 from katana450.maths.kinematics.projection import Projection, project
+from katana450.maths.kinematics.solver import inverse
 from tests.kinematics.targets import FRONT_UP, assert_on_branch, pose, targets
 
 REACH = 0.6318

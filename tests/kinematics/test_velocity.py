@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.branch_options import BranchMetrics
+from katana450.arm.control.tool_targets import BranchMetrics
 from katana450.errors import InputError
 from katana450.extensions.ellipsoid.layer import velocity_ellipsoid
 from katana450.maths.geometry import screws, se3, so3
@@ -16,7 +16,7 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.velocity import (
     WELL_CONDITIONED,
     JogFrame,

@@ -14,7 +14,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
+from katana450.maths.kinematics.solver import inverse
 from tests.exchange.conftest import GANTRY
 
 Q = np.array([0.3, -1.0, 1.4, 0.3, 0.2])

@@ -19,8 +19,8 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import pitch_and_roll, pitched_frame
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer

@@ -19,8 +19,8 @@ from katana450.cli.main import main
 from katana450.client.client import connect
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.projection import project
+from katana450.maths.kinematics.solver import inverse
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.branch_options import BranchMetrics, BranchOption
 from katana450.arm.control.messages import (
     AXIS_NAMES,
     PRIORITIES,
@@ -27,6 +26,7 @@ from katana450.arm.control.messages import (
 )
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.arm.control.tool_targets import BranchMetrics, BranchOption
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES

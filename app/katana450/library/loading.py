@@ -10,7 +10,7 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError, RobotDescriptionError
-from katana450.extensions.general_arms.found_arm import solved_arm
+from katana450.extensions.general_arms.driven_tool import solved_arm
 from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.library.arm import NEEDED, Arm
 from katana450.library.pose_frame import PoseFrame

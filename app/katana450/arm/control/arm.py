@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.gripper_model import GripperModel
-from katana450.arm.control.tool_kinematics import ToolKinematics
+from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray

@@ -6,12 +6,12 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.environment import Environment
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.pouring import BASIN, CUP, MAX_VESSELS, Pouring, is_vessel
 from katana450.arm.control.scene_objects import Attachment, SceneObject
 from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.control.tool_targets import branch_named
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 

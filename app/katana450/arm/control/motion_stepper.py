@@ -9,34 +9,92 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.contact_rule import (
-    may_go_on,
-    measured,
-    met_before_rest,
-    with_contact,
-    with_distance,
-)
-from katana450.arm.control.five_axis_tool import ELBOW
 from katana450.arm.control.following import Following
 from katana450.arm.control.goals import with_place
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.modes import Leaving
 from katana450.arm.control.plan_follower import PlanFollower
-from katana450.arm.control.state import State
-from katana450.arm.control.tool_kinematics import ToolKinematics
-from katana450.maths.collision.clearance import STOP, advance
+from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.tool_kinematics import ELBOW, ToolKinematics
+from katana450.maths.collision.clearance import MIN_STOP_TIME, STOP, advance, is_surely_clear
 from katana450.maths.collision.contact import Contact
-from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import JogFrame, coasted, jog
 from katana450.maths.motion.limiter import LIMIT_TOLERANCE, JointMotion, Limiter, Limits
 from katana450.maths.motion.proportional import STILL, in_proportion
 from katana450.maths.motion.pursuit import stream_step
+
+PROBE_LENGTH = 0.02
+"""[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
+arm would only come back to where it was."""
+
+
+def met_before_rest(
+    world: CollisionWorld, limiter: Limiter, x: FloatArray, ahead: JointMotion
+) -> Contact | None:
+    """Return the contact on the path to ``ahead`` and from there to rest; None if it is clear.
+
+    x: (k,) the joints (n,), followed by what stays as it is [rad or m]. The distance in the contact
+    is that at ``x``.
+    """
+    here, others = x[: ahead.q.size], x[ahead.q.size :]
+    if is_surely_clear(world, x, np.append(limiter.stopping_point(ahead), others)):
+        return None
+    still = np.zeros(others.size)
+    path = limiter.stopping_path(
+        ahead, MAX_PATH_LENGTH, lambda change: world.linkage.turned(np.append(change, still))
+    )
+    for a, b in pairwise([here, *path]):
+        step = advance(world, np.append(a, others), np.append(b, others), MIN_STOP_TIME)
+        if step.contact is not None or step.stopped:
+            return world.nearest(x) if step.contact is None else measured(world, step.contact, x)
+    return None
+
+
+def measured(world: CollisionWorld, met: Contact, x: FloatArray) -> Contact:
+    """Return ``met`` with the distance of its parts at ``x`` (k,) [rad or m]."""
+    return replace(met, distance=world.gap(x, *met.parts))
+
+
+def may_go_on(world: CollisionWorld, state: State) -> bool:
+    """Return whether the first part of the straight path of a waiting arm to its goal is clear."""
+    change = state.goal - state.setpoint
+    if not change.any():
+        return True
+    fraction = min(1.0, PROBE_LENGTH / float(np.abs(change).sum()))
+    x = state.x_setpoint
+    towards = np.append(state.setpoint + fraction * change, state.gripper_setpoint)
+    step = advance(world, x, towards, MIN_STOP_TIME)
+    return bool((step.x == towards).all())
+
+
+def with_distance(world: CollisionWorld, state: State) -> State:
+    """Return ``state`` with the present distance in the contact that the arm brakes for."""
+    x = state.x_setpoint
+    findings = tuple(
+        replace(finding, amount=world.gap(x, *finding.parts))
+        if finding.reason is Reason.CONTACT and finding.parts is not None
+        else finding
+        for finding in state.findings
+    )
+    return replace(state, findings=findings)
+
+
+def with_contact(state: State, contact: Contact | None) -> State:
+    """Return ``state`` with ``contact`` as its first finding, in place of any earlier contact."""
+    others = tuple(finding for finding in state.findings if finding.reason is not Reason.CONTACT)
+    if contact is None:
+        return state if others == state.findings else replace(state, findings=others)
+    finding = Finding(Reason.CONTACT, contact.distance, parts=contact.parts)
+    return replace(state, findings=(finding, *others))
+
 
 PLANNED_SPEED_FRACTION = 0.9
 """[1] Fraction of the maximum tool speed that a step is planned with: the same joint speeds may

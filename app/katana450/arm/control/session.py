@@ -12,12 +12,6 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control import tool_targets
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.branch_options import (
-    BranchOption,
-    branch_named,
-    branch_options,
-    current_target,
-)
 from katana450.arm.control.checks import check, check_joints
 from katana450.arm.control.environment import Environment, Hand
 from katana450.arm.control.findings import of_joints
@@ -54,6 +48,12 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import ACCEPTED, ActiveStop, Finding, Outcome, Reason, State
 from katana450.arm.control.stopping import stopped_again, with_presses
 from katana450.arm.control.supervision import held_where_measured, stop_for, with_tracking_time
+from katana450.arm.control.tool_targets import (
+    BranchOption,
+    branch_named,
+    branch_options,
+    current_target,
+)
 from katana450.arm.control.transitions import Effect, effect_of
 from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld

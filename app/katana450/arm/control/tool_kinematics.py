@@ -1,19 +1,28 @@
-"""The kinematics of one tool as a session drives it, whichever method computes them."""
+"""The kinematics of one tool as a session drives it: the interface, and those of five axes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol, cast
 
+import numpy as np
+
+from katana450.arm.control import findings
+from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
-from katana450.arm.control.tool_commands import StepTool, TurnCommand
-from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import AnyBranch
-from katana450.maths.kinematics.kinematics import Kinematics
+from katana450.arm.control.tool_commands import StepTool, Turn, TurnCommand
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics import projection, tracker, velocity
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch, branch_of
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
-from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.tool import ToolTarget, pitched_frame
 from katana450.maths.kinematics.tracker import Tracked
+from katana450.maths.kinematics.turns import in_limits_turns
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
 
@@ -93,3 +102,120 @@ class ToolKinematics(Kinematics, Protocol):
         ``posture`` (5,) [rad] is that of the canonical five-axis arm. ``T_base_shoulder`` (4, 4) is
         {S} in the base frame.
         """
+
+
+ELBOW = 2
+"""Index of axis 3, which bends the elbow."""
+
+READY_ROOM = 0.05
+"""Minimum distance of the ready posture from the limits of a joint, as a fraction of its range."""
+
+
+@dataclass(frozen=True, eq=False)
+class FiveAxisTool(FiveAxisKinematics):
+    """The functions of the five-axis family as `ToolKinematics`."""
+
+    priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = {
+        each: (name, PRIORITY_HINTS[each]) for each, name in PRIORITIES.items()
+    }
+    freedoms: ClassVar[int] = 5
+    turn: ClassVar[type[TurnCommand]] = Turn
+
+    def branch_of(self, q: FloatArray) -> AnyBranch:
+        """Return `branch.branch_of`."""
+        return branch_of(self.chain, q)
+
+    def target_at(self, q: FloatArray) -> ToolTarget:
+        """Return the five freedoms of the tool at `q` (5,) [rad]."""
+        return ToolTarget.at(self.chain, q)
+
+    def turned(self, _state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
+        """Return ``target`` with the pitch and roll of ``command``."""
+        turn = cast(Turn, command)
+        return ToolTarget(target.position, turn.pitch, turn.roll)
+
+    def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
+        """Return ``target`` moved by ``step``: x, y, z [m], then pitch and roll [rad]."""
+        moved = step.by[:3]
+        if step.frame is velocity.JogFrame.TOOL:
+            moved = forward(self.chain, state.goal)[:3, :3] @ moved
+        pitch, roll = target.pitch + float(step.by[3]), target.roll + float(step.by[4])
+        return ToolTarget(frozen(target.position + moved), pitch, roll)
+
+    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:
+        """Return ``target`` for the shoulder of ``branch``: its plane may face the other way."""
+        same = _five(branch).shoulder == _five(state.branch).shoulder
+        return target if same else target.turned_round()
+
+    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> tracker.Tracked:
+        """Return `tracker.track`."""
+        return tracker.track(
+            self.chain,
+            state.goal,
+            target,
+            branch=_five(state.branch),
+            priority=state.priority,
+            since=since,
+        )
+
+    def project(self, state: State, T: FloatArray, branch: AnyBranch) -> projection.Projection:
+        """Return `projection.project`."""
+        where, priority = _five(branch), state.priority
+        return projection.project(self.chain, T, branch=where, q_hint=state.goal, priority=priority)
+
+    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> projection.Projection:
+        """Return `tracker.leap`."""
+        return tracker.leap(self.chain, state.goal, target, _five(branch), state.priority)
+
+    def losses(
+        self, state: State, best: projection.Projection, *, yaw_was_given: bool
+    ) -> tuple[Finding, ...]:
+        """Return `findings.of_projection`."""
+        return findings.of_projection(self.chain, best, state.priority, yaw_was_given=yaw_was_given)
+
+    def tracking_losses(self, state: State, tracked: tracker.Tracked) -> tuple[Finding, ...]:
+        """Return `findings.of_tracked`."""
+        return findings.of_tracked(self.chain, tracked, state.priority)
+
+    def jog_twist(self, q: FloatArray, rates: FloatArray, frame: velocity.JogFrame) -> FloatArray:
+        """Return the twist (6,) of rates (5,): velocity of the tool point, pitch and roll."""
+        in_base, pitched = frame is velocity.JogFrame.BASE, pitched_frame(self.chain, q)
+        v = rates[:3] if in_base else forward(self.chain, q)[:3, :3] @ rates[:3]
+        omega = rates[3] * pitched[:, 1] + rates[4] * pitched[:, 0]
+        return np.concatenate((omega, v))
+
+    def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
+        """Return `velocity.tool_speed`."""
+        return velocity.tool_speed(self.chain, q, qd)
+
+    def tool_speed_bound(self, qd: FloatArray) -> float:
+        """Return `velocity.tool_speed_bound`."""
+        return velocity.tool_speed_bound(self.chain, qd)
+
+    def branch_limits(self, limits: Limits) -> Mapping[AnyBranch, Limits]:
+        """Return ``limits`` with the elbow kept on one side of the stretched arm."""
+        elbows = {elbow: self._bent(limits, elbow) for elbow in ("up", "down")}
+        return {branch: elbows[branch.elbow] for branch in BRANCHES}
+
+    def _bent(self, limits: Limits, elbow: str) -> Limits:
+        canonical = arm_of(self.chain)
+        sign, shift = canonical.signs[ELBOW], canonical.shifts[ELBOW]
+        seam = -sign * shift
+        lower, upper = np.array(limits.lower), np.array(limits.upper)
+        if lower[ELBOW] < seam < upper[ELBOW]:
+            if (elbow == "up") == (sign > 0.0):
+                lower[ELBOW] = seam
+            else:
+                upper[ELBOW] = seam
+        return replace(limits, lower=lower, upper=upper)
+
+    def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
+        """Return the joint angles (5,) [rad] inside limits, nearest to a canonical posture."""
+        chain = self.chain
+        q = in_limits_turns(chain, arm_of(chain).joints(posture))
+        room = READY_ROOM * (chain.upper - chain.lower)
+        return np.clip(q, chain.lower + room, chain.upper - room)
+
+
+def _five(branch: AnyBranch) -> Branch:
+    return cast(Branch, branch)

@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.gripper_model import NO_GRIPPER, GripperModel
-from katana450.arm.control.tool_kinematics import ToolKinematics
+from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.structure import Structure, structure_of

@@ -11,12 +11,11 @@ import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, Grounds
-from katana450.arm.control.branch_options import branch_named
 from katana450.arm.control.goals import START_TOLERANCE
 from katana450.arm.control.plans import plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
-from katana450.arm.control.tool_targets import with_branch
+from katana450.arm.control.tool_targets import branch_named, with_branch
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.errors import KatanaError

@@ -19,8 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.descent import Descent, Look
-from katana450.extensions.general_arms.regularity import Regularity
+from katana450.extensions.general_arms.descent import Descent, Look, Regularity
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget

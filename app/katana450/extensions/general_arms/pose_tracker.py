@@ -17,8 +17,7 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.branch_solver import BranchSolver
-from katana450.extensions.general_arms.descent import Angles, Descent
-from katana450.extensions.general_arms.regularity import NEAR, WALL
+from katana450.extensions.general_arms.descent import NEAR, WALL, Angles, Descent
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward

@@ -16,7 +16,7 @@ import numpy as np
 from katana450.assembly.robot_files import read_robot
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.found_arm import solved_arm
+from katana450.extensions.general_arms.driven_tool import solved_arm
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array

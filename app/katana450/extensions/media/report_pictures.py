@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from katana450.arm.control.five_axis_tool import FiveAxisTool
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
+from katana450.arm.control.tool_kinematics import FiveAxisTool
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh

@@ -34,10 +34,9 @@ from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
-from katana450.extensions.general_arms.descent import Descent
+from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.extensions.general_arms.regularity import Regularity
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

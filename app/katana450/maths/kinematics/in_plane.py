@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from katana450 import tolerances
-from katana450.maths.kinematics.orientation import PlaneOrientation
+from katana450.maths.kinematics.canonical_target import PlaneOrientation
 from katana450.maths.kinematics.planar import Interval, PlanarArm, Posture
 from katana450.maths.kinematics.priority import Priority
 

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, AnyBranch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse import inverse
 from katana450.maths.kinematics.inverse_batch import inverse_batch, validated_poses
 from katana450.maths.kinematics.solution import Solutions
+from katana450.maths.kinematics.solver import inverse
 
 
 class Kinematics(Protocol):

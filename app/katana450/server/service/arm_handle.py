@@ -7,7 +7,6 @@ from concurrent.futures import Future
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.environment import Environment
 from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.margins import Margins, margins
@@ -16,6 +15,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Outcome, State
 from katana450.arm.control.stopping import clear_refusal
+from katana450.arm.control.tool_targets import BranchOption
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of

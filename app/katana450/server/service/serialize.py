@@ -11,7 +11,6 @@ import msgspec
 from katana450.arm.control import state as control
 from katana450.arm.control.act import tag_of
 from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.branch_options import BranchOption
 from katana450.arm.control.grip import touching
 from katana450.arm.control.margins import Margins
 from katana450.arm.control.messages import MAX_CONDITION, finding_text, sentence
@@ -19,6 +18,7 @@ from katana450.arm.control.outcome import reason
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.solid import Colour
 from katana450.arm.control.supervision import tracking_error
+from katana450.arm.control.tool_targets import BranchOption
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot

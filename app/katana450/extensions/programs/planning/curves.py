@@ -254,7 +254,7 @@ class ToolScrew(_OneFormula):
 
     The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to
     that motion that the arm's plane allows; yaw follows from the arm. Sources: Lynch & Park (2017),
-    ch. 3.3; for the nearest orientation maths/kinematics/orientation.py. Raises InputError for a
+    ch. 3.3; for the nearest orientation `PlaneOrientation`. Raises InputError for a
     tool point beside the roll axis: the plane then depends on the turn, and the turn on the plane.
     """
 

@@ -16,8 +16,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450.errors import InputError, PathError
+from katana450.extensions.general_arms.descent import WALL
 from katana450.extensions.general_arms.pose_equations import PoseEquations, RegularPosture
-from katana450.extensions.general_arms.regularity import WALL
 from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.tool_path import at_place, limit_refusal
 from katana450.maths.geometry import so3
