@@ -113,8 +113,6 @@ def pair(windows: int, move: Callable[[Client, float], None]) -> tuple[Costs, Co
     They take turns: while the arm of one moves, that of the other is at rest, so that both see
     the same machine.
     """
-    # Otherwise alike: the planning of a server at rest would count as a cost of recording.
-    command = (*RECORDING_APP, "--no-idle-planning")
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "ring"
         kinds: list[tuple[tuple[str, ...], Path | None]] = [
@@ -123,7 +121,7 @@ def pair(windows: int, move: Callable[[Client, float], None]) -> tuple[Costs, Co
         ]
         both = []
         for kind, recorded in kinds:
-            server = stack.enter_context(AppServer((*command, *kind)))
+            server = stack.enter_context(AppServer((*RECORDING_APP, *kind)))
             arm = stack.enter_context(connect(server.url, "Driver"))
             move(arm, WARM_UP)
             both.append(Measured(server, arm, recorded))

@@ -33,7 +33,7 @@ def openapi() -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
-    with AppServer((*RECORDING_APP, "--no-idle-planning", "--lines", "0")) as server:
+    with AppServer((*RECORDING_APP, "--lines", "0")) as server:
         yield server
 
 

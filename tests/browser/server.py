@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 # SIMULATION_APP pauses after silence; the others stop, as with a real arm.
 # RECORDING_APP is the app as people start it. The others save the time of recording and planning.
 RECORDING_APP = (sys.executable, "-m", "katana450", "serve", "--no-browser", "--port", "{port}")
-SIMULATION_APP = (*RECORDING_APP, "--no-record", "--no-idle-planning")
+SIMULATION_APP = (*RECORDING_APP, "--no-record")
 ATTENTIVE_APP = (*SIMULATION_APP, "--strict-silence")
 APP = (*ATTENTIVE_APP, "--silence", "2.0", "--owner-silence", "6.0")
 BARE_APP = (sys.executable, str(ROOT / "benchmarks" / "bare_viser_app.py"), "--port", "{port}")

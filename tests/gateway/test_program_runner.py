@@ -39,7 +39,7 @@ SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 def made(hub: Hub) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False, no_idle_planning=False)
+    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False)
     return ProgramRunner(hub, options)
 
 
@@ -314,7 +314,7 @@ def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
 
 def test_server_option_forbids_unattended_programs(session: Session) -> None:
     def made(hub: Hub) -> ProgramRunner:
-        options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=True, no_idle_planning=True)
+        options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=True)
         return ProgramRunner(hub, options)
 
     table = Staged(session)

@@ -13,7 +13,7 @@ import pytest
 from katana450.arm.control.lease import Role
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.extensions.programs.language.source import MAX_BYTES
-from katana450.extensions.programs.script.script_schema import script_schema
+from katana450.extensions.programs.script.script import script_schema
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile

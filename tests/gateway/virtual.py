@@ -271,7 +271,7 @@ class Rows(JsonProgram):
 def _options(words: tuple[str, ...]) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     add_serve_options(parser)
-    return parser.parse_args(["--no-record", "--no-idle-planning", *words])
+    return parser.parse_args(["--no-record", *words])
 
 
 class VirtualServer:

@@ -45,7 +45,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def command(folder: Path) -> tuple[str, ...]:
-    return (*RECORDING_APP, "--silence", "2.0", "--no-idle-planning", "--record", str(folder))
+    return (*RECORDING_APP, "--silence", "2.0", "--record", str(folder))
 
 
 @contextmanager

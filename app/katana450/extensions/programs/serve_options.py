@@ -27,11 +27,6 @@ def add_serve_options(parser: ArgumentParser) -> None:
         help="refuse programs that are to run without heartbeats of their owner",
     )
     parser.add_argument(
-        "--no-idle-planning",
-        action="store_true",
-        help="do not plan the scripts of the library while nobody uses the server",
-    )
-    parser.add_argument(
         "--programs",
         type=Path,
         metavar="DIR",

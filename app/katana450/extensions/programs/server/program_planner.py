@@ -1,22 +1,177 @@
-"""The planning of the present script, and the order that waits for its end."""
+"""Planning of the present script in a thread, and the order that waits for its end."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import logging
+import threading
+from collections.abc import Callable, Iterable
+from enum import Enum
 
 from katana450.arm.control import commands as cmd
-from katana450.errors import InputError, LeaseError
+from katana450.arm.control.state import State
+from katana450.errors import CancelledError, InputError, KatanaError, LeaseError
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import MAX_BYTES
+from katana450.extensions.programs.run.compiler import PlanningStage
 from katana450.extensions.programs.run.continuation import Interruption, continued
 from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.runner import Run
+from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.server.idle_planner import IdlePlanner
-from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
-from katana450.extensions.programs.server.program_planning import Planning
+from katana450.extensions.programs.server.program_participant import ProgramOwner, check_may_drive
+from katana450.maths.planning.checkpoint import checked_by
+from katana450.server.api import answers
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
+
+log = logging.getLogger(__name__)
+
+MAX_PLANNING_TIME = 120.0
+"""[s] Maximum duration of the planning."""
+
+
+class PlanningPhase(Enum):
+    """The phase of a program that has not begun."""
+
+    PLANNING = "planning"
+    REFUSED = "refused"
+    CANCELLED = "cancelled"
+    READY = "ready"
+
+
+class Planning:
+    """The planning of one script with one speed, from one situation of the arm.
+
+    Attributes:
+        text: the script.
+        speed: fraction of the script's own speed.
+        situation: the situation that it is planned for.
+        first_step: index of the step with which the program begins.
+        continues: the run that it continues; None for a new one.
+        name: name of the script; empty until it is parsed.
+        stage: present stage of the planning; None before the first step.
+        refused: reason why the program cannot run, else None.
+        cancelled: reason why the planning was cancelled, else None.
+        note: note for people: why it was planned again, or not run.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        speed: float,
+        state: State,
+        job: Callable[[Planning], Program],
+        clock: Callable[[], float],
+        note: str = "",
+        *,
+        first_step: int = 0,
+        continues: Run | None = None,
+    ) -> None:
+        """Start the thread, in which ``job`` plans from ``state``. ``clock`` returns the time [s].
+
+        ``job`` reports its progress to the planning, and sets its name.
+        """
+        self.text = text
+        self.speed = speed
+        self.situation = Situation.of(state)
+        self.first_step = first_step
+        self.continues = continues
+        self.name = ""
+        self.stage: PlanningStage | None = None
+        self.refused: str | None = None
+        self.cancelled: str | None = None
+        self.note = note
+        self._clock = clock
+        self._began = clock()
+        self._program: Program | None = None
+        self.thread = threading.Thread(target=self._plan, args=(job,), name="planner", daemon=True)
+        self.thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """True while the planning is in progress."""
+        return self._program is None and self.refused is None and self.cancelled is None
+
+    @property
+    def program(self) -> Program | None:
+        """The planned program; None before the end of the planning, or without success."""
+        return None if self.cancelled is not None else self._program
+
+    @property
+    def whole(self) -> bool:
+        """True if the program begins at the first step of the script."""
+        return not self.first_step and self.continues is None
+
+    def cancel(self, why: str) -> None:
+        """Cancel the planning. The thread ends at its next checkpoint, some milliseconds later."""
+        if self.busy:
+            self.cancelled = why
+        else:
+            self.note = f"Not run: {why}"
+
+    def fits(self, text: str, speed: float, state: State) -> bool:
+        """Return whether planning ``text`` at ``speed`` from ``state`` would give this program."""
+        same = self.program is not None and (self.text, self.speed) == (text, speed) and self.whole
+        return same and not self.changed_to(state)
+
+    def changed_to(self, state: State) -> str:
+        """Return a clause that names what has changed since the planning, else "" for nothing."""
+        return self.situation.changed_to(Situation.of(state))
+
+    def progress(self, by: str) -> answers.Progress:
+        """Return the progress of a program that has not begun. ``by`` is its owner's name."""
+        program, now = self.program, self.stage
+        if self.cancelled is not None or self.refused is not None:
+            stage = PlanningPhase.REFUSED if self.cancelled is None else PlanningPhase.CANCELLED
+            why = self.cancelled or self.refused or ""
+            return answers.Progress(name=self.name, by=by, status=stage.value, why=why)
+        if program is None:
+            return answers.Progress(
+                name=self.name,
+                by=by,
+                status=PlanningPhase.PLANNING.value,
+                step=0 if now is None else now.step,
+                steps=0 if now is None else now.steps,
+                task="" if now is None else now.phase,
+                fraction=0.0 if now is None else now.fraction,
+                why=self.note,
+            )
+        return answers.Progress(
+            name=program.name,
+            by=by,
+            status=PlanningPhase.READY.value,
+            steps=program.steps,
+            seconds=program.duration,
+            why=self.note or " ".join(program.notes),
+        )
+
+    def report(self, stage: PlanningStage) -> None:
+        """Show ``stage``, which begins."""
+        self.stage = stage
+
+    def _plan(self, job: Callable[[Planning], Program]) -> None:
+        try:
+            with checked_by(self._check):
+                self._program = job(self)
+        except CancelledError as error:
+            if self.cancelled is None:
+                self.refused = str(error)
+        except KatanaError as error:
+            self.refused = str(error)
+        except Exception:
+            log.exception("Planning failed with an internal error.")
+            self.refused = "Planning failed with an internal error. See the server's log."
+
+    def _check(self) -> None:
+        if self.cancelled is not None:
+            raise CancelledError(self.cancelled)
+        if self._clock() - self._began > MAX_PLANNING_TIME:
+            at = "" if self.stage is None else f" (at step {self.stage.step})"
+            raise CancelledError(
+                f"Planning takes longer than {MAX_PLANNING_TIME:g} s{at}. Make the script shorter."
+            )
+
 
 PLANNED_ORDERS = (ProgramOrder.RUN, ProgramOrder.STEP, ProgramOrder.CONTINUE)
 """The orders that need a planned program."""
@@ -30,19 +185,14 @@ class ProgramPlanner:
         then: the order that is carried out as soon as the planning has succeeded; None for none.
     """
 
-    def __init__(self, hub: Hub, owner: ProgramOwner, *, idly: bool) -> None:
-        """Prepare to plan for the arm of ``hub``.
-
-        ``idly``: whether to plan the library while nobody uses the server.
-        """
+    def __init__(self, hub: Hub, owner: ProgramOwner) -> None:
+        """Prepare to plan for the arm of ``hub``."""
         self.planning: Planning | None = None
         self.then: ProgramOrder | None = None
         self._hub = hub
         self._owner = owner
         # The parts of the incomplete script of each sender.
         self._parts: dict[str, str] = {}
-        self._idly = idly
-        self._idle: IdlePlanner | None = None
         # Name of the script that the breakpoints belong to, and the indices of their steps.
         self._breakpoints: tuple[str, frozenset[int]] = "", frozenset()
 
@@ -81,36 +231,11 @@ class ProgramPlanner:
             before.refused, before.note = None, ""
             self._own(participant)
             return True
-        prepared = None if self._idle is None else self._idle.take(script, speed, arm.state)
-        if prepared is not None:
-            self.planning = prepared
-            self._own(participant)
-            return True
         changed = ""
         if before is not None and (before.text, before.speed) == (script, speed) and before.program:
             changed = before.changed_to(arm.state)
         self.plan(participant, script, speed, changed)
         return True
-
-    def plan_idly(self, t: float, *, used: bool) -> None:
-        """Plan the scripts of the library if nobody uses the server; see ``IdlePlanner.tick``."""
-        arm = self._hub.arm
-        used = (
-            used
-            or not self._hub.pictures.watching
-            or (self.planning is not None and self.planning.busy)
-        )
-        if self._idle is None:
-            if not self._idly or used or arm is None or arm.robot.arm is None:
-                return
-            self._idle = IdlePlanner(self._started, arm.robot.arm)
-        if arm is not None:
-            self._idle.tick(arm.state, t, used=used)
-
-    def stop_idle_planning(self) -> None:
-        """Leave the processor to a command that the arm was given."""
-        if self._idle is not None:
-            self._idle.cancel()
 
     def may_continue(self, interruption: Interruption | None) -> bool:
         """Return whether a run was interrupted, and nothing is planned or has changed since."""
@@ -179,11 +304,6 @@ class ProgramPlanner:
         earlier plan is void.
         """
         note = f"Planned again: {changed}." if changed else ""
-        self.planning = self._started(text, speed, note, first_step)
-        self._own(participant)
-
-    def _started(self, text: str, speed: float, note: str = "", first_step: int = 0) -> Planning:
-        """Return the planning of ``text`` from the present state, which has begun."""
         context, state = self._context(), self._hub.present().state
 
         def job(planning: Planning) -> Program:
@@ -193,7 +313,10 @@ class ProgramPlanner:
                 script.scene.check_present(context.session, state)
             return compiled(script, context, state, speed, planning.report, first_step=first_step)
 
-        return Planning(text, speed, state, job, self._hub.clock, note, first_step=first_step)
+        self.planning = Planning(
+            text, speed, state, job, self._hub.clock, note, first_step=first_step
+        )
+        self._own(participant)
 
     def plan_rest(
         self, participant: Participant, interruption: Interruption, before: Planning

@@ -25,14 +25,18 @@ from katana450.extensions.programs.run.continuation import Interruption
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.server import state_line
-from katana450.extensions.programs.server.program_owner import ProgramOwner, check_may_drive
 from katana450.extensions.programs.server.program_participant import (
     FollowRun,
     LeftTool,
+    ProgramOwner,
     ProgramParticipant,
+    check_may_drive,
 )
-from katana450.extensions.programs.server.program_planner import PLANNED_ORDERS, ProgramPlanner
-from katana450.extensions.programs.server.program_planning import Planning
+from katana450.extensions.programs.server.program_planner import (
+    PLANNED_ORDERS,
+    Planning,
+    ProgramPlanner,
+)
 from katana450.extensions.programs.server.state_line import RunNews
 from katana450.server.api import answers
 from katana450.server.api import program_requests as requests
@@ -57,7 +61,7 @@ class ProgramRunner(Runner):
         self.hub = hub
         allowed = not options.no_unattended
         self._owner = ProgramOwner(hub, options.owner_silence, may_be_unattended=allowed)
-        self.planner = ProgramPlanner(hub, self._owner, idly=not options.no_idle_planning)
+        self.planner = ProgramPlanner(hub, self._owner)
         self._interruption: Interruption | None = None
         self._left_tool: LeftTool | None = None
         self._is_news = False  # Whether no other command followed the end of a run or planning.
@@ -193,7 +197,6 @@ class ProgramRunner(Runner):
     def redirected(self) -> None:
         """Cancel a run that waits for its planning, after another command to the arm."""
         self._is_news = False
-        self.planner.stop_idle_planning()
         self.planner.forget_run("the arm was given another command during planning")
 
     def leave(self, participant: Participant) -> None:
@@ -218,7 +221,6 @@ class ProgramRunner(Runner):
     def tick(self) -> None:
         """Advance the running program by one step, or end it if owner, lease or stop demand it."""
         hub, t = self.hub, self.hub.clock()
-        self.planner.plan_idly(t, used=self.running)
         if self.waits and self._owner.is_silent(t):
             self.planner.forget_run("its owner sends no heartbeats")
         if self._left_tool is not None:

@@ -16,9 +16,8 @@ from starlette.routing import BaseRoute, Route
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import MAX_BYTES, ScriptError
-from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script import parse, script_schema
 from katana450.extensions.programs.script.script_files import Scripts
-from katana450.extensions.programs.script.script_schema import script_schema
 from katana450.extensions.programs.script.teach import taught
 from katana450.server.api.fields import ROOT
 from katana450.server.service.participants import actor_of

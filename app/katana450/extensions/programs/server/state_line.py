@@ -8,7 +8,7 @@ from typing import NamedTuple
 from katana450.arm.control.lease import Person
 from katana450.arm.control.state import State
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.server.program_planning import PlanningPhase
+from katana450.extensions.programs.server.program_planner import PlanningPhase
 from katana450.server.api.answers import Progress
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service.known_pages import addressed
