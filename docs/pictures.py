@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from katana450.client import Client, connect
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset

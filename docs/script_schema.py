@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from katana450.extensions.programs.script.script_schema import script_schema
+from katana450.extensions.programs.script.script import script_schema
 
 FILE = Path(__file__).resolve().parents[1] / "examples" / "programs" / "script.schema.json"
 

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from katana450.cli.main import main
-from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.demos import CircleDemo
 from katana450.extensions.programs.script.script import parse
 
 ROOT = Path(__file__).resolve().parents[2]

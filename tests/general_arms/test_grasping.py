@@ -14,7 +14,7 @@ import viser
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
-from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
+from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.preview import Preview
 from katana450.maths.collision.clearance import STOP

@@ -21,9 +21,8 @@ from katana450.extensions.programs.building.plan_state import TICK, PlanContext
 from katana450.extensions.programs.building.vessel_turn import UNDERSIDES
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.curves import PoseTurn
-from katana450.extensions.programs.run.clocked_run import Planned, run_by_clock
 from katana450.extensions.programs.run.program import compiled
-from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.run.simulation import Planned, Simulation, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.extensions.recording.codec import Codec

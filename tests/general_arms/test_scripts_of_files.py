@@ -13,10 +13,9 @@ import viser
 from jsonschema import Draft202012Validator
 
 from katana450.errors import KatanaError
-from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
-from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+from katana450.extensions.programs.script.script import parse, script_schema
 from katana450.extensions.programs.script.script_files import script_text
-from katana450.extensions.programs.script.script_schema import script_schema
 from katana450.extensions.programs.server.preview import Preview
 from katana450.extensions.programs.server.traces import Traces, coloured
 from katana450.maths.kinematics.chain import Chain

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.extensions.programs.building.located_step import count
+from katana450.extensions.programs.building.step import count
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import script_text
 from katana450.extensions.programs.steps.steps import STEPS

@@ -18,8 +18,8 @@ from katana450.extensions.media import figures
 from katana450.extensions.media.figures import DRAWN, magnification
 from katana450.extensions.media.measures import COLUMNS, PourRecord
 from katana450.extensions.media.report import Report
-from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.run.measured_run import MeasuredRun
+from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray

@@ -8,7 +8,7 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase
-from katana450.extensions.programs.script.circle import CircleDemo
+from katana450.extensions.programs.script.demos import CircleDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import Stage

@@ -13,7 +13,7 @@ from katana450.extensions.programs.building.plan_state import PlanState, Untimed
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.compiler import FINDING, TIMING, Compiler, PlanningStage
 from katana450.extensions.programs.run.program import compiled
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.run.measured_run import MeasuredRun, nearest_points, path_of
-from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.run.simulation import (
+    Planned,
+    Simulation,
+    plan_script,
+    run_by_clock,
+)
 from katana450.extensions.programs.script.measures import MEASURES, OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.plant.driver import PlantDriver

@@ -13,8 +13,7 @@ import pytest
 import yaml
 
 from katana450.extensions.programs.language.source import Problem, ScriptError
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import script_text
 from tests.conftest import LONG

@@ -13,8 +13,8 @@ from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.script.demos import PourDemo, Spot
 from katana450.extensions.programs.script.measures import score
-from katana450.extensions.programs.script.pour import PourDemo, Spot
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.water.flow import Water

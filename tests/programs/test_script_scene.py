@@ -12,7 +12,7 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.run.clocked_run import plan_script
+from katana450.extensions.programs.run.simulation import plan_script
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_scene import ScriptScene
 from katana450.maths.water.units import MILLILITRE

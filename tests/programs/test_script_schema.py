@@ -14,15 +14,14 @@ from docs.script_schema import FILE, content
 from katana450.extensions.programs.language.declaration import Schema
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.script.blocks import BLOCKS
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
-from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import script_text
-from katana450.extensions.programs.script.script_schema import (
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
+from katana450.extensions.programs.script.script import (
     STEP_VALUES,
     WITHOUT_VALUE,
+    parse,
     script_schema,
 )
+from katana450.extensions.programs.script.script_files import script_text
 from katana450.extensions.programs.steps.steps import STEPS
 from tests.programs.yaml_core import loaded
 

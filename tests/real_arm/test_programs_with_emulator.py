@@ -11,9 +11,8 @@ import katana450.extensions.programs
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.state import State
-from katana450.extensions.programs.run.clocked_run import plan_script
 from katana450.extensions.programs.run.measured_run import MeasuredRun
-from katana450.extensions.programs.run.simulation import simulated
+from katana450.extensions.programs.run.simulation import plan_script, simulated
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
 from katana450.extensions.real_arm.codec.requests import ArmRequest

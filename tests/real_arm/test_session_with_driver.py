@@ -18,10 +18,9 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import describe_robot
-from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.run.runner import Phase
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm

@@ -40,7 +40,7 @@ record(Path(sys.argv[1]), int(sys.argv[2]))
 RECORD_PROGRAM = """
 import sys
 from pathlib import Path
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import PourDemo
 from tests.recording.sessions import program, record_session
 record_session(Path(sys.argv[1]), int(sys.argv[2]), program(PourDemo().text))
 """

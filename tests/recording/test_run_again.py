@@ -21,7 +21,7 @@ from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline
-from katana450.extensions.programs.run.clocked_run import Planned, plan_script, run_by_clock
+from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recorded_states import recorded_states

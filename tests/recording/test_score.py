@@ -19,8 +19,8 @@ from katana450.arm.control.stop_cause import pressed
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
-from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes.episode import (

@@ -6,8 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.real_arm.plant.profile import PROFILES
 from katana450.resources import URDF_PATH
 

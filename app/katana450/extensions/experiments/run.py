@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
 from functools import partial
+from pathlib import Path
 
 from katana450.errors import InputError
-from katana450.extensions.experiments.problems import print_problems
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.script.circle import CircleDemo
-from katana450.extensions.programs.script.pour import PourDemo
+from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import script_text
+
+
+def print_problems(error: ScriptError, source: str) -> None:
+    """Print each problem with its file, line and column; ``source`` names the script."""
+    for problem in error.problems:
+        file = str(Path(source).parent / problem.file) if problem.file else source
+        print(f"{file}:{problem.line}:{problem.column}: {problem.text}", file=sys.stderr)
 
 
 def run(options: Namespace) -> int:
@@ -56,7 +63,7 @@ def _run(text: str, source: str, options: Namespace) -> int:
             simulated = simulate(script, options)
             if simulated.status or options.headless or options.dry_run:
                 return simulated.status
-            from katana450.extensions.experiments.measured import report_measured
+            from katana450.extensions.experiments.simulate import report_measured
 
             report = partial(report_measured, simulated, options)
         from katana450.extensions.experiments.live import run_live

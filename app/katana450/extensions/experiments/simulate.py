@@ -1,8 +1,9 @@
-"""Simulation of a script on a simulated clock, without server and browser, and its report."""
+"""Simulation of a script without server and browser, its report, and that of a measured arm."""
 
 from __future__ import annotations
 
 import sys
+import tempfile
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -16,20 +17,31 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
+from katana450.client import Client, RefusedError
+from katana450.client.files import LostError
 from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.run.clocked_run import plan_script, ready, run_by_clock
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.simulation import Simulation
+from katana450.extensions.programs.run.simulation import (
+    Simulation,
+    plan_script,
+    ready,
+    run_by_clock,
+)
 from katana450.extensions.programs.run.task_list import ConditionalJump
 from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun
 from katana450.extensions.real_arm.plant.driver import PlantDriver
 from katana450.extensions.real_arm.plant.profile import profile_named
+from katana450.extensions.recording.files.checking import session_for
+from katana450.extensions.recording.files.recorded_states import recorded_states
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.live.run_fetcher import fetch_run
 from katana450.extras import MissingExtraError
+from katana450.server.api import answers
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
@@ -186,3 +198,37 @@ def _labels(program: Program) -> dict[int, list[str]]:
                     labels.setdefault(number, []).append(f"{alternative} of line {task.line}")
     joined = {number: ["after the alternatives"] for number, count in before.items() if count > 1}
     return labels | joined
+
+
+def report_measured(
+    simulated: Simulated, options: Namespace, arm: Client, before: answers.State
+) -> int:
+    """Write the report of ``simulated`` again, with the arm as the server has measured it.
+
+    ``before``: the state before the run. Returns the exit status: 1 if a bound is not met. Raises
+    KatanaError.
+    """
+    report = simulated.report
+    assert report is not None
+    if before.arm is not None:
+        try:
+            report = report.with_measured(
+                _measured_run(arm, before.sent, options.urdf), f"at {options.url}"
+            )
+        except (LostError, RefusedError) as error:
+            print(f"katana450: the report lacks the measured arm: {error}", file=sys.stderr)
+        else:
+            print("\n".join(f"  {line}" for line in report.lines))
+            simulated._replace(report=report).write(options.report)
+    return exit_status(report)
+
+
+def _measured_run(arm: Client, began: float, urdf: Path) -> MeasuredRun | None:
+    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
+        path = Path(folder) / "run.mcap"
+        fetch_run(arm, began, path)
+        with RecordingFile.open(path) as file:
+            session = session_for(file, urdf).session
+            return MeasuredRun.of(
+                session.require_arm(), list(recorded_states(file, session, began))
+            )

@@ -210,9 +210,8 @@ def of_script(name: str, urdf: Path) -> Playback:
     """
     # Imported here, because poses and tables do not need the extension ``programs``.
     from katana450.extensions.programs.language.source import ScriptError
-    from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
-    from katana450.extensions.programs.script.circle import CircleDemo
-    from katana450.extensions.programs.script.pour import PourDemo
+    from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
+    from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
     from katana450.extensions.programs.script.script import parse
     from katana450.extensions.programs.script.script_files import script_text
 

@@ -1,10 +1,13 @@
-"""The base class of program steps, and the table of all steps by their names."""
+"""Program steps, their places in a script, and the choice between steps."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
+from katana450.extensions.programs.building.conditions import Condition, ProgramTime
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared
 
@@ -26,3 +29,75 @@ class Step(Declared):
     @abstractmethod
     def build(self, plan: PlanState) -> PlanState:
         """Return ``plan`` with the actions of the step. Raises InputError if it is not possible."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """The step ``if``: a choice between steps, by a condition that is measured when it is reached.
+
+    Attributes:
+        condition: the condition.
+        then: the steps if it holds.
+        otherwise: the steps if it does not; may be empty.
+    """
+
+    condition: Condition | ProgramTime
+    then: tuple[LocatedStep, ...]
+    otherwise: tuple[LocatedStep, ...]
+
+
+class LocatedStep(NamedTuple):
+    """A step and its place in the text, from 1.
+
+    Attributes:
+        step: the step.
+        line, column: its place in its file.
+        file: name of the file that defines it; "" for the script itself.
+        called: line of the script from which a step of another file is called; 0 for its own steps.
+    """
+
+    step: Step | Conditional
+    line: int
+    column: int
+    file: str = ""
+    called: int = 0
+
+    @property
+    def script_line(self) -> int:
+        """The line of the script itself."""
+        return self.called or self.line
+
+    def called_at(self, line: int, file: str) -> LocatedStep:
+        """Return the step as called from ``line`` of ``file``, if another file defines it."""
+        step = self.step
+        if isinstance(step, Conditional):
+            then, otherwise = (
+                tuple(each.called_at(line, file) for each in steps)
+                for steps in (step.then, step.otherwise)
+            )
+            step = Conditional(step.condition, then, otherwise)
+        return self._replace(step=step, called=self.called if self.file == file else line)
+
+
+def count(steps: Iterable[LocatedStep]) -> int:
+    """Return the number of ``steps``, with those of all alternatives."""
+    return sum(
+        1 + count(each.step.then) + count(each.step.otherwise)
+        if isinstance(each.step, Conditional)
+        else 1
+        for each in steps
+    )
+
+
+class NumberedStep(NamedTuple):
+    """A step, and its index in the script, from 0; the steps of all alternatives are counted."""
+
+    number: int
+    located: LocatedStep
+
+
+def numbered(steps: Iterable[LocatedStep], first: int) -> Iterator[NumberedStep]:
+    """Yield ``steps`` with their numbers, which begin with ``first``."""
+    for located in steps:
+        yield NumberedStep(first, located)
+        first += count((located,))

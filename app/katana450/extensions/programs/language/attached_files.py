@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from katana450.errors import InputError
-from katana450.extensions.programs.language.declaration import Kind
-from katana450.extensions.programs.language.fields import Fields
+from katana450.extensions.programs.language.declaration import Fields, Kind
 from katana450.extensions.programs.language.kinds import TEXT, any_of
 from katana450.extensions.programs.language.source import (
     MAX_BYTES,

@@ -10,9 +10,8 @@ import numpy as np
 
 from katana450.extensions.general_arms.branch_words import BRANCH_NAMES
 from katana450.extensions.programs.language import expression
-from katana450.extensions.programs.language.declaration import Group, Kind, Schema
+from katana450.extensions.programs.language.declaration import Fields, Group, Kind, Schema
 from katana450.extensions.programs.language.expression import PLAIN, with_article
-from katana450.extensions.programs.language.fields import Fields
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue
 from katana450.extensions.programs.language.step_target import Angles

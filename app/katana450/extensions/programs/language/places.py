@@ -8,8 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from katana450.extensions.programs.language.declaration import Declared, Kind
-from katana450.extensions.programs.language.fields import Fields
+from katana450.extensions.programs.language.declaration import Declared, Fields, Kind
 from katana450.extensions.programs.language.kinds import (
     ANGLE,
     ANGLES,

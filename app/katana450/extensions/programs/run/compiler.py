@@ -16,19 +16,19 @@ from katana450.arm.control.messages import part
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, Task
 from katana450.extensions.programs.building.conditions import Condition, Held, ProgramTime
-from katana450.extensions.programs.building.located_step import (
-    Conditional,
-    LocatedStep,
-    NumberedStep,
-    count,
-    numbered,
-)
 from katana450.extensions.programs.building.plan_state import (
     EXACT,
     PlanState,
     UntimedPath,
 )
-from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.building.step import (
+    Conditional,
+    LocatedStep,
+    NumberedStep,
+    Step,
+    count,
+    numbered,
+)
 from katana450.extensions.programs.language.source import Problem, ScriptError
 from katana450.extensions.programs.run.situation import Situation
 from katana450.extensions.programs.run.task_list import PlannedChoice, PlannedStep, task_list

@@ -11,13 +11,13 @@ from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, SetSpeed, Task, expected_time
 from katana450.extensions.programs.building.conditions import ProgramTime
-from katana450.extensions.programs.building.located_step import (
+from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
+from katana450.extensions.programs.building.step import (
     Conditional,
     LocatedStep,
     count,
     numbered,
 )
-from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.run.compiler import Compiler, Report
 from katana450.extensions.programs.run.task_list import ConditionalJump

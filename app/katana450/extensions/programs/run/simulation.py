@@ -1,24 +1,33 @@
-"""Simulation of a program on the real session with a simulated clock, and the trace of the run."""
+"""Planning and simulation of a script on a simulated clock, and the trace of the run."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.drivers.driver import Driver
+from katana450.arm.drivers.simulated import SimulatedDriver
+from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.tick import driven
-from katana450.errors import InputError
+from katana450.assembly.robot_session import describe_robot, find_arm
+from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.building.actions import FollowPlan
+from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
-from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import Script
+from katana450.extensions.progress import progress
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.water.motion import MotionWithWater
+from katana450.settings import Settings
 
 MAX_DURATION = 24 * 3600.0
 """[s] Maximum duration of a program."""
@@ -86,47 +95,29 @@ def follow_exactly(state: State) -> State:
     return Session.observe(state, state.setpoint, state.gripper_setpoint)
 
 
+@dataclass(frozen=True, eq=False)
 class Simulation:
-    """A run of a program, tick by tick."""
+    """A complete run of a program.
 
-    def __init__(
-        self, program: Program, session: Session, driver: Driver, rate: float, start: State
-    ) -> None:
-        """Prepare a run at ``rate`` [Hz] from ``start``, where the arm of ``driver`` stands."""
-        self._program = program
-        self._session = session
-        self._driver = driver
-        self._period = 1.0 / rate
-        self._records: list[tuple[State, int]] = []
-        self._start = start
-        self.run = Run(0.0)
+    Attributes:
+        program: the program.
+        session: the rules of the arm.
+        run: the run at its end.
+        states: (N,) the states of all ticks, the first before anything moves.
+        tasks: (N,) index of the current task at each.
+    """
 
-    def ticks(self) -> Iterator[float]:
-        """Run the program; yield the completed fraction after each tick, from 0 to 1."""
-        start = self._start
-        self._driver.start(start.t)
-        self._records = [(start, 0)]
-        count = len(self._program.tasks)
-        ticks = simulated(self._program, self._session, start, self._period, self._driven)
-        for state, self.run in ticks:
-            self._records.append((state, self.run.number))
-            fraction = runner.task_fraction(self._program, self.run, state)
-            yield min((self.run.number + fraction) / count, 1.0)
-
-    def _driven(self, state: State) -> State:
-        return driven(self._session, state, state.t, self._driver.send)
-
-    @property
-    def states(self) -> tuple[State, ...]:
-        """The states of all ticks so far."""
-        return tuple(state for state, _ in self._records)
+    program: Program
+    session: Session
+    run: Run
+    states: tuple[State, ...]
+    tasks: tuple[int, ...]
 
     @property
     def trace(self) -> Trace:
-        """The trace of the run so far."""
+        """The trace of the run."""
         states = self.states
-        tasks = [number for _, number in self._records]
-        places = [self._place(state, number) for state, number in self._records]
+        places = [self._place(*tick) for tick in zip(states, self.tasks, strict=True)]
         q = np.array([state.q for state in states])
         setpoints = np.array([state.setpoint for state in states])
         measured = q if states[-1].report is not None else None
@@ -137,7 +128,7 @@ class Simulation:
             sent=q if measured is None else setpoints,
             measured=measured,
             fingers=np.array([state.gripper for state in states]),
-            task=np.array(tasks, dtype=np.int64),
+            task=np.array(self.tasks, dtype=np.int64),
             segment=np.array([segment for segment, _ in places], dtype=np.int64),
             sigma=np.array([sigma for _, sigma in places]),
             tools=tuple(state.tool for state in states),
@@ -146,13 +137,13 @@ class Simulation:
         )
 
     def _margin(self, state: State) -> float:
-        pouring = self._session.pouring
+        pouring = self.session.pouring
         if pouring is None or state.poured is None:
             return math.inf
         return pouring.margin_to_rim(state.poured, state.objects)
 
     def _place(self, state: State, number: int) -> tuple[int, float]:
-        following, action = state.following, self._program.tasks[number].action
+        following, action = state.following, self.program.tasks[number].action
         if (
             following is None
             or not isinstance(action, FollowPlan)
@@ -160,3 +151,78 @@ class Simulation:
         ):
             return -1, 0.0
         return following.number, following.segment.scaling.pace(following.local).sigma
+
+
+class Planned(NamedTuple):
+    """A compiled script, the arm that it is for, and the state in which it begins."""
+
+    script: Script
+    program: Program
+    robot: Robot
+    session: Session
+    start: State
+
+
+def ready(session: Session) -> State:
+    """Return the state of an arm in its ready posture, with the fingers closed."""
+    return session.begin(session.ready, session.require_arm().gripper.clamp(0.0), 0.0)
+
+
+def plan_script(
+    script: Script,
+    urdf: Path,
+    seed: int = 0,
+    speed: float = 1.0,
+    begin: Callable[[Session], State] | None = None,
+) -> Planned:
+    """Return ``script`` planned for the arm of ``urdf``.
+
+    Args:
+        script: the script.
+        urdf: description of the arm.
+        seed: seed of the planner's random search for paths round obstacles.
+        speed: fraction of the script's own speed, up to 1.
+        begin: returns the state in which the script begins; None for an arm in its ready posture,
+            in the scene of the script if it has one.
+
+    Raises ScriptError, and InputError if the arm cannot begin so.
+    """
+    settings = replace(Settings(), bare=script.bare)
+    robot, session, _ = describe_robot(settings, urdf, None, find_arm)
+    plan_context = PlanContext(session, robot.require_arm().T_base_shoulder, seed)
+    if begin is None:
+        begin = ready if script.scene is None else script.scene.begin
+    start = begin(session)
+    program = compiled(script, plan_context, start, speed)
+    return Planned(script, program, robot, session, start)
+
+
+def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
+    """Run ``plan`` to its end with a progress bar. Conditions count as true.
+
+    ``driver``: the arm, at the start of the plan; None for one that follows exactly. Raises
+    KatanaError if it ends early.
+    """
+    if driver is None:
+        driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
+    driver.start(plan.start.t)
+    program, session, period = plan.program.rehearsed, plan.session, 1.0 / Settings().rate
+
+    def drive(state: State) -> State:
+        return driven(session, state, state.t, driver.send)
+
+    run, states, tasks = Run(0.0), [plan.start], [0]
+    done, total = 0, 1000
+    ticks = progress(range(total), total, plan.script.name)
+    for state, run in simulated(program, session, plan.start, period, drive):
+        states.append(state)
+        tasks.append(run.number)
+        fraction = (run.number + runner.task_fraction(program, run, state)) / len(program.tasks)
+        while done < int(min(fraction, 1.0) * total):
+            done += 1
+            next(ticks, None)
+    for _ in ticks:
+        pass
+    if run.phase is not Phase.DONE:
+        raise KatanaError(run.why)
+    return Simulation(program, session, run, tuple(states), tuple(tasks))

@@ -9,8 +9,8 @@ from typing import NamedTuple
 from katana450.arm.control.state import State
 from katana450.extensions.programs.building.actions import Action, SetSpeed, Task
 from katana450.extensions.programs.building.conditions import Condition, ProgramTime
-from katana450.extensions.programs.building.located_step import LocatedStep
 from katana450.extensions.programs.building.plan_state import UntimedPath
+from katana450.extensions.programs.building.step import LocatedStep
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,15 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from katana450.extensions.programs.building.conditions import CHOICE, Choice
-from katana450.extensions.programs.building.located_step import Conditional, LocatedStep, count
-from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.language.declaration import Declared, Kind, Schema, record
-from katana450.extensions.programs.language.fields import Fields, or_known
+from katana450.extensions.programs.building.step import Conditional, LocatedStep, Step, count
+from katana450.extensions.programs.language.declaration import (
+    Declared,
+    Fields,
+    Kind,
+    Schema,
+    or_known,
+    record,
+)
 from katana450.extensions.programs.language.kinds import (
     RAW,
     TEXT,

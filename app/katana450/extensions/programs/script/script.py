@@ -1,35 +1,164 @@
-"""A script: its name, description, poses and steps, each with its line."""
+"""A script: its names, poses and steps, each with its line, and the JSON Schema of scripts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Annotated
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import MIN_SPEED
-from katana450.extensions.programs.building.located_step import LocatedStep
-from katana450.extensions.programs.language.attached_files import FILE
-from katana450.extensions.programs.language.declaration import Declared, Kind, record
-from katana450.extensions.programs.language.fields import Fields
+from katana450.extensions.programs.building.step import LocatedStep
+from katana450.extensions.programs.language.attached_files import (
+    FILE,
+    MAX_FILES,
+    AttachedFile,
+    attached_file,
+)
+from katana450.extensions.programs.language.declaration import (
+    Declared,
+    Fields,
+    Kind,
+    Schema,
+    record,
+)
 from katana450.extensions.programs.language.kinds import (
+    DEFINITIONS,
     RAW,
     TEXT,
     any_of,
     choice,
+    listed,
     mapping,
     number,
 )
 from katana450.extensions.programs.language.places import PLACE
 from katana450.extensions.programs.language.scope import ScriptContext
-from katana450.extensions.programs.language.source import ScriptError, YamlValue
-from katana450.extensions.programs.language.source import read as read_text
-from katana450.extensions.programs.script.blocks import DEFINED, INNER_STEPS
+from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue, read
+from katana450.extensions.programs.script.blocks import (
+    BLOCKS,
+    DEFINED,
+    INNER_STEPS,
+    STEP_LIST,
+    with_definitions,
+)
 from katana450.extensions.programs.script.measures import MEASURES
 from katana450.extensions.programs.script.script_scene import SCENE, ScriptScene
-from katana450.extensions.programs.script.vocabulary import FILES, FRAME, context_of
+from katana450.extensions.programs.steps.place import Stack
 from katana450.extensions.programs.steps.settings_steps import Tool
+from katana450.extensions.programs.steps.steps import STEPS
+
+FRAME = choice("shoulder", "base")
+"""The frame of points."""
+
+FILES = listed(FILE, 1, MAX_FILES)
+
+
+def context_of(fields: Fields) -> ScriptContext:
+    """Return the names of a script with these fields, which collect all problems."""
+    context = ScriptContext(fields.take("frame", FRAME, "shoulder") == "base")
+    context = fields.take("include", lambda value: _with_files(value, context), context)
+    return _with_names(fields, context)
+
+
+def _with_names(fields: Fields, context: ScriptContext) -> ScriptContext:
+    """Return ``context`` with `let`, `poses` and `define` of ``fields``."""
+    for name, extend in (
+        ("let", _with_values),
+        ("poses", _with_poses),
+        ("define", with_definitions),
+    ):
+        context = fields.take(name, partial(extend, context=context), context)
+    return context
+
+
+def _with_files(value: YamlValue, context: ScriptContext) -> ScriptContext:
+    """Return ``context`` with the names of a file, or of a list of files. Raises ScriptError."""
+    items = value.items if value.kind == "list" else (value,)
+    files = FILES(replace(value, held=items, kind="list"))
+    texts = {name: text for file in files for name, text in file.texts.items()}
+    if len(texts) > MAX_FILES:
+        raise value.wrong(f"A script names at most {MAX_FILES} files.")
+    done: list[str] = []
+    problems: list[Problem] = []
+    for file in files:
+        try:
+            context = _with_file(file._replace(texts=texts), context, done, ())
+        except ScriptError as error:
+            problems += error.problems
+    if problems:
+        raise ScriptError(tuple(problems))
+    return context
+
+
+def _with_file(
+    file: AttachedFile, context: ScriptContext, done: list[str], under: tuple[str, ...]
+) -> ScriptContext:
+    """Return ``context`` with the names of ``file``, and append its name to ``done``.
+
+    ``under``: the files that include it, each included by the one before.
+    """
+    if file.name in under:
+        circle = " includes ".join((*under[under.index(file.name) :], file.name))
+        raise file.at.wrong(f"Files must not include each other in a circle: {circle}.")
+    if file.name in done:
+        return context
+    fields = Fields(read(file.text, "file", file.name), "an included file")
+    for name in ("name", "about"):
+        fields.take(name, TEXT, "")
+
+    def check_frame(value: YamlValue) -> None:
+        frame, own = FRAME(value), "base" if context.in_base else "shoulder"
+        if frame != own:
+            raise value.wrong(
+                f"The points of this file are in the frame {frame}, those of the script in {own}. "
+                "Use one frame for both."
+            )
+
+    def including(value: YamlValue) -> ScriptContext:
+        included = context
+        for item in value.items if value.kind == "list" else (value,):
+            inner = attached_file(item)._replace(texts=file.texts)
+            included = _with_file(inner, included, done, (*under, file.name))
+        return included
+
+    fields.take("frame", check_frame, None)
+    extended = _with_names(fields, fields.take("include", including, context))
+    fields.done()
+    done.append(file.name)
+    return extended
+
+
+def _with_values(value: YamlValue, context: ScriptContext) -> ScriptContext:
+    """Return ``context`` with named values; each may use those before it."""
+    scope = context.scope
+    problems: list[Problem] = list(Fields(value, "the values").problems)
+    for name, inner in value.fields:
+        try:
+            scope = scope.having(name, inner)
+        except ScriptError as error:
+            problems += error.problems
+    if problems:
+        raise ScriptError(tuple(problems))
+    return replace(context, scope=scope)
+
+
+def _with_poses(value: YamlValue, context: ScriptContext) -> ScriptContext:
+    """Return ``context`` with named places; each may refer to those before it."""
+    fields = Fields(context.scope.bound(value), "the poses")
+    for name in [str(key.held) for key, _ in value.fields]:
+        place = fields.take(name, PLACE.within(context), None)
+        if place is not None:
+            context = replace(context, poses={**context.poses, name: place})
+    fields.done()
+    return context
+
+
+EXTENSIONS = {"let": _with_values, "poses": _with_poses, "define": with_definitions}
+"""How each field of a script with names extends those before it."""
+
 
 MAX_NAME_LENGTH = 40
 """Maximum number of characters of a name."""
@@ -166,7 +295,7 @@ class Script(Declared):
 
 def parse(text: str) -> Script:
     """Return ``text`` as a script. Raises ScriptError with all problems, line by line."""
-    value = read_text(text)
+    value = read(text)
     names = Fields(value, Script.noun)
     context = context_of(names)
     try:
@@ -182,7 +311,45 @@ def parse(text: str) -> Script:
 def is_script(text: str) -> bool:
     """Return whether ``text`` is meant as a script, because it has steps."""
     try:
-        value = read_text(text)
+        value = read(text)
     except ScriptError:
         return False
     return value.kind == "mapping" and any(name.held == "steps" for name, _ in value.fields)
+
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+STEP_VALUES: dict[str, Schema] = {
+    **{name: STEPS[name].schema() for name in sorted(STEPS)},
+    "stack": Stack.schema(),
+    **{name: block.schema() for name, block in BLOCKS.items()},
+}
+"""Schemas of the values of all steps, by the names of the steps."""
+
+WITHOUT_VALUE = tuple(name for name, value in STEP_VALUES.items() if value.get("type") == "null")
+"""Steps that take no value."""
+
+
+def script_schema() -> Schema:
+    """Return the JSON Schema of a script.
+
+    It accepts every valid script. What it cannot express, such as limits of the arm or the value of
+    a computed number, only the reader of scripts refuses.
+    """
+    step = any_of(
+        "A step",
+        {"enum": list(WITHOUT_VALUE)},
+        {
+            "type": "object",
+            "properties": STEP_VALUES,
+            "additionalProperties": False,
+            "minProperties": 1,
+            "maxProperties": 1,
+        },
+    )
+    return {
+        "$schema": DIALECT,
+        "title": "Script of katana450",
+        **Script.schema(),
+        "$defs": {**DEFINITIONS, "steps": STEP_LIST, "step": step},
+    }

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.extensions.programs.building.located_step import LocatedStep
+from katana450.extensions.programs.building.step import LocatedStep
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.steps.moves import Joints, Via
 from katana450.extensions.programs.steps.settings_steps import Gripper, Speed, TimedPause

@@ -18,9 +18,8 @@ from katana450.extensions.programs.building.actions import MoveFingers, UseTool
 from katana450.extensions.programs.building.carry import APPROACHES
 from katana450.extensions.programs.building.conditions import Held
 from katana450.extensions.programs.building.finger_planning import with_fingers
-from katana450.extensions.programs.building.located_step import Conditional
 from katana450.extensions.programs.building.plan_state import GraspInfo, PlanState
-from katana450.extensions.programs.building.step import Step
+from katana450.extensions.programs.building.step import Conditional, Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres
 from katana450.extensions.programs.planning.approach import ABOVE, DOWN, FRONT, LOW, Approach
 from katana450.extensions.programs.planning.curves import line_between

@@ -18,8 +18,8 @@ from katana450.client.files import LostError
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath
-from katana450.extensions.programs.run.clocked_run import plan_script, run_by_clock
 from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.episodes.episode_file import shown_part
 from katana450.extensions.recording.files.checking import session_for
