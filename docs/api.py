@@ -40,7 +40,7 @@ number or a text of your own; its answer has the same `id`. Without an `id` only
 | **HTTP** `GET /api/v{version}/state`, `arm`, `event_log`, `branches`, `loop`, `objects`, `world`, `links` | The answers of `query`. |
 | **HTTP** `POST /api/v{version}/mesh?name=FILE&unit=UNIT` | Upload of a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or .3mf file. `place` uses it by the key in the answer. |
 | **HTTP** `GET`, `POST /api/v{version}/scene` | Download and upload of the scene as a .zip ([scenes](scenes.md)). An uploaded scene waits for a `load`. |
-| **HTTP** `GET /api/v{version}/scripts`, `scripts/NAME` | The names of the scripts of the library and of the folder of `--programs`; the text of one, such as `Pour`, for `program`. |
+| **HTTP** `GET /api/v{version}/scripts`, `scripts/NAME` | The names of the scripts of the folder of `--programs`, and of those of the library that the arm can do; the text of one, such as `Pour`, for `program`. |
 | **HTTP** `GET /api/v{version}/script.schema.json` | The [JSON Schema](programs.md#in-an-editor) of scripts. |
 | **HTTP** `POST /api/v{version}/scripts`, `scripts/NAME` | The problems of the text in the body, line by line, and its poses if it has only [these](programs.md#teaching); saves a valid text in the folder. |
 | **HTTP** `POST /api/v{version}/stop?press=NAME` | `stop`, on the main port and on the [port of STOP](access.md#the-port-of-stop), which answers with the stage. `press` makes copies on both count once. |

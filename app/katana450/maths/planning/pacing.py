@@ -170,20 +170,26 @@ class SampledPath:
         )
 
     def fitted(
-        self, a: float, j: float, start: FloatArray, rounds: int, at_most: float = np.inf
+        self,
+        a: float,
+        j: float,
+        start: FloatArray,
+        rounds: int,
+        at_most: float = np.inf,
+        floor: FloatArray | None = None,
     ) -> _Fitted:
         """Return the least slowness found for the bounds `a` and `j` of tau(t).
 
         The search begins with `start` (K + 3,), and ends early if it gains nothing more, or is not
-        near the time `at_most` after its first rounds.
+        near the time `at_most` after its first rounds. No coefficient is below ``floor`` (K + 3,).
         """
-        c = start * self.excess(start, a, j).max()
+        c = start if floor is not None else start * self.excess(start, a, j).max()
         best, minimum = c, np.inf
         reference, gained = np.inf, 0
         for number in range(rounds):
             checkpoint()
             excess = self.excess(c, a, j)
-            maximum = float(excess.max())
+            maximum = max(float(excess.max()), 0.0 if floor is None else 1.0)
             # tau at the end, if the whole path is slowed until nothing is too fast.
             time = rest_to_rest(maximum * self._span(c), a, j)
             if time < minimum:
@@ -191,10 +197,12 @@ class SampledPath:
             if minimum < (1.0 - LEAST_GAIN) * reference:
                 reference, gained = minimum, number
             hopeless = number + 1 == FIRST_ROUNDS and minimum > at_most
+            hopeless |= c is floor and maximum == 1.0
             if hopeless or number - gained >= PATIENCE:
                 break
             near = self.near(excess)
             c = c * np.where(near > 1.0, near**SLOWING_POWER, near**SPEEDING_POWER)
+            c = c if floor is None else np.maximum(c, floor)
         return _Fitted(best, a, j, minimum)
 
     def smoothed(self, best: _Fitted) -> _Fitted:

@@ -6,7 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.caching import cached_property
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.posture import JointJets, ThreeJets
@@ -45,7 +46,7 @@ class Path(Protocol):
 
 
 class CurvePath:
-    """A joint path that keeps the tool on a curve; the base of `ToolPath`.
+    """A joint path that keeps the tool on a curve; the base of `ToolPath` and `PosePath`.
 
     Attributes:
         chain: the arm, with the tool.
@@ -60,6 +61,20 @@ class CurvePath:
         """The joins of the curve."""
         found: tuple[float, ...] = self.curve.joins
         return found
+
+    def joints(self, sigma: Jet) -> JointJets:
+        """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
+        raise NotImplementedError
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """The joint angles (n,) [rad] at the start."""
+        return frozen([angle.c0 for angle in self.joints(Jet.variable(0.0))])
+
+    @cached_property
+    def end(self) -> FloatArray:
+        """The joint angles (n,) [rad] at the end."""
+        return frozen([angle.c0 for angle in self.joints(Jet.variable(1.0))])
 
     def point(self, sigma: Jet) -> ThreeJets:
         """Return the tool point in {S} [m]."""

@@ -35,9 +35,12 @@ its ends equal to that of the legs.
 class PiecewisePolynomial:
     """Coordinates as polynomials, each on a piece of sigma from 0 to 1."""
 
-    _starts: list[float]
-    _terms: FloatArray
-    _total: float
+    def __init__(self, starts: list[float], terms: FloatArray, total: float) -> None:
+        """Take the starts (K,) of the pieces, up to ``total``, and their terms (K, k, n).
+
+        The terms of a piece are those of the powers of its own part, the lowest first.
+        """
+        self._starts, self._terms, self._total = starts, terms, total
 
     @property
     def joins(self) -> tuple[float, ...]:

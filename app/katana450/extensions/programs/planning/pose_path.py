@@ -72,16 +72,6 @@ SEPTIC: Final = np.array(
 """The map from what a cubic lacks of value and three derivatives at 1 to the next four powers."""
 
 
-class Pieces(PiecewisePolynomial):
-    """Polynomials of seventh degree between places of sigma from 0 to 1."""
-
-    def __init__(self, places: FloatArray, terms: FloatArray) -> None:
-        """Take places (K,) and the terms (K - 1, 8, n) of each piece, from 0 of its own part."""
-        self._starts: list[float] = places[:-1].tolist()
-        self._terms = terms
-        self._total = 1.0
-
-
 @dataclass(frozen=True, eq=False)
 class PosePath(CurvePath):
     """The joints that keep the tool on ``curve``.
@@ -103,7 +93,7 @@ class PosePath(CurvePath):
     places: FloatArray
     terms: FloatArray
     narrow: tuple[float, ...] = ()
-    _pieces: Pieces = field(init=False, repr=False)
+    _pieces: PiecewisePolynomial = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         count = np.size(self.places)
@@ -115,7 +105,8 @@ class PosePath(CurvePath):
             raise InputError("The curve of a path of poses must have rotations.")
         object.__setattr__(self, "places", frozen(places))
         object.__setattr__(self, "terms", frozen(terms))
-        object.__setattr__(self, "_pieces", Pieces(self.places, self.terms))
+        pieces = PiecewisePolynomial(self.places[:-1].tolist(), self.terms, 1.0)
+        object.__setattr__(self, "_pieces", pieces)
 
     @property
     def joins(self) -> tuple[float, ...]:
@@ -125,16 +116,6 @@ class PosePath(CurvePath):
     def joints(self, sigma: Jet) -> JointJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         return self._pieces.at(sigma)
-
-    @property
-    def start(self) -> FloatArray:
-        """The joint angles (n,) [rad] at the start."""
-        return frozen(self.terms[0, 0])
-
-    @property
-    def end(self) -> FloatArray:
-        """The joint angles (n,) [rad] at the end."""
-        return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
 
     def turned_off(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
         """Return the angles (N,) [rad] between the tool at `q` (N, n) and at ``sigma`` (N,)."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.arm.control.messages import axis_names
-from katana450.caching import cached_property
 from katana450.errors import PathError
 from katana450.extensions.programs.planning.curves import Curve
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -91,16 +90,6 @@ class ToolPath(CurvePath):
             found.append(q + turns * math.tau if np.any(turns) else q)
         one, two, three, four, five = found
         return one, two, three, four, five
-
-    @cached_property
-    def start(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the start."""
-        return frozen([each.c0 for each in self.joints(Jet.variable(0.0))])
-
-    @cached_property
-    def end(self) -> FloatArray:
-        """The joint angles (5,) [rad] at the end."""
-        return frozen([each.c0 for each in self.joints(Jet.variable(1.0))])
 
     def _in_turn(self, q: FloatArray) -> FloatArray:
         """Return the angles `q` (5,) [rad], known up to whole turns, as the path starts at them."""

@@ -11,10 +11,9 @@ import numpy as np
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.joint_path import VIA_TOLERANCE, PolynomialPath
-from katana450.maths.planning.pacing import KNOTS, SLOWING_POWER, SPEEDING_POWER, SampledPath
+from katana450.maths.planning.pacing import KNOTS, SampledPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.polyline import PiecewisePolynomial
 from katana450.maths.planning.scaling import Bounds, Scaling
@@ -50,9 +49,8 @@ class CubicSpline(PiecewisePolynomial):
         terms[:, 1] = slopes - h * (2.0 * bends[:-1] + bends[1:]) / 6.0
         terms[:, 2] = 0.5 * bends[:-1]
         terms[:, 3] = (bends[1:] - bends[:-1]) / (6.0 * h)
-        self._starts: list[float] = (times[:-1] - times[0]).tolist()
-        self._terms = frozen(terms)
-        self._total = float(times[-1] - times[0])
+        passed = times - times[0]
+        super().__init__(passed[:-1].tolist(), frozen(terms), float(passed[-1]))
 
     def values_at(self, times: FloatArray) -> FloatArray:
         """Return the values (N, n) at ``times`` (N,) [s] after the first one."""
@@ -196,29 +194,6 @@ def recorded_scaling(path: Path, bounds: Bounds) -> Scaling:
     joints = bounds.joints
     a = float((joints.acceleration / joints.speed).min())
     j = float((joints.jerk / joints.speed).min())
-    tried = (_paced(sampled, own, factor * a, factor * j) for factor in FACTORS)
-    return min(tried, key=lambda scaling: scaling.duration)
-
-
-def _paced(sampled: SampledPath, own: FloatArray, a: float, j: float) -> Scaling:
-    """Return the fastest scaling found with a slowness of at least ``own`` (K + 3,) [s].
-
-    As in ``pacing.fastest`` a coefficient is raised while a limit is exceeded near it, and lowered
-    while no limit is reached.
-    """
-    found: Scaling | None = None
-    c = own
-    for _ in range(ROUNDS):
-        checkpoint()
-        excess = sampled.excess(c, a, j)
-        maximum = max(float(excess.max()), 1.0)
-        scaling = Scaling(maximum * c, a, j)
-        if found is None or scaling.duration < found.duration:
-            found = scaling
-        if maximum == 1.0 and c is own:
-            break
-        near = sampled.near(excess)
-        factor = np.where(near > 1.0, near**SLOWING_POWER, near**SPEEDING_POWER)
-        c = np.maximum(c * factor, own)
-    assert found is not None
-    return found
+    fits = (sampled.fitted(factor * a, factor * j, own, ROUNDS, floor=own) for factor in FACTORS)
+    best = min(fits, key=lambda fit: fit.time)
+    return Scaling(best.coefficients, best.acceleration, best.jerk)
