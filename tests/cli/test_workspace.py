@@ -130,6 +130,7 @@ def test_a_value_that_is_no_number_is_refused(capsys: pytest.CaptureFixture[str]
     assert "--voxel" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
     """Interrupt a map that takes minutes, on a terminal of its own, so that the bar is drawn."""
     master, slave = os.openpty()

@@ -31,6 +31,7 @@ SKEW = item("part", "box", (25.0, 25.0, 50.0), (200.0, 0.0), 40.0)
 STRAIGHT = item("part", "box", (25.0, 20.0, 50.0), (200.0, 0.0))
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     ("steps", "thing", "why"),
     [
@@ -50,6 +51,7 @@ def test_six_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_pa
         planned(tmp_path, gripping_urdf("UR5e"), steps, thing)
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     ("steps", "thing", "why"),
     [

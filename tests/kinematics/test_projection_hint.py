@@ -59,7 +59,7 @@ def with_hints(chain: Chain, T: FloatArray, priority: Priority) -> list[Projecti
 
 @pytest.mark.parametrize("priority", [Priority.POSE, Priority.POSITION])
 def test_no_hint_and_no_branch_is_better(chain: Chain, priority: Priority) -> None:
-    for T in targets(chain, np.random.default_rng(3), 60):
+    for T in targets(chain, np.random.default_rng(3), 30):
         found = misses(project(chain, T, priority=priority), priority)
         for other in with_hints(chain, T, priority):
             assert not beaten(found, misses(other, priority)), T.tolist()
@@ -81,7 +81,7 @@ def test_every_theta1_is_used_where_the_nearest_point_is_on_axis_1(
     slack, checked = 3e-3, 0
     wide = dataclasses.replace(chain, lower=chain.lower - slack, upper=chain.upper + slack)
     theta1s = np.linspace(chain.lower[0], chain.upper[0], 60)
-    for T in targets(chain, np.random.default_rng(11), 40):
+    for T in targets(chain, np.random.default_rng(11), 20):
         for branch in BRANCHES:
             p = project(chain, T, branch=branch)
             if math.hypot(*p.T[:2, 3]) > 1e-9 or p.position_error < 1e-6:
@@ -90,4 +90,4 @@ def test_every_theta1_is_used_where_the_nearest_point_is_on_axis_1(
             least = least_rotation(wide, lengths, T, on_axis, branch, theta1s)
             assert p.rotation_error <= least + 20.0 * slack
             checked += least < math.pi
-    assert checked > 10
+    assert checked > 5

@@ -29,6 +29,7 @@ def urdf(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("preset", CAMERA_POSES)
 def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
     robot, session, _ = find_robot(Settings(), urdf, None)

@@ -190,6 +190,7 @@ def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
     assert "other pitch" not in str(refused.value)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("untimed")
 def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
     with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:

@@ -70,6 +70,7 @@ def test_the_script_of_the_library_is_the_demo() -> None:
     assert [repr(a.step) for a in stored.steps] == [repr(b.step) for b in demo.steps]
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("cup", "basin", "said"),
     [
@@ -120,6 +121,7 @@ def test_half_of_the_water_is_poured(stage: Stage, full: float) -> None:
     assert water.total == counted(full * ML)
 
 
+@pytest.mark.long
 def test_flow_follows_the_rate(stage: Stage) -> None:
     ml, rate = 50.0, 10.0
     pour = f"- pour: {{into: basin, ml: {ml:g}, rate: {rate:g} ml/s}}\n"
@@ -143,6 +145,7 @@ def test_flow_follows_the_rate(stage: Stage) -> None:
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize(
     ("pour", "message"),
     [

@@ -84,20 +84,15 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
     np.testing.assert_allclose(there.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-6)
 
 
-@pytest.mark.cases(1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("full", "pour", "size", "pose"),
     [
         (220, "{into: glass, ml: 20, rate: 5}", [25, 60], [380, -100, 0, 0, 0, 0]),
-        pytest.param(
-            150, "{into: glass, ml: 80, rate: 10}", [40, 120], [450, -100, 0, 0, 0, 0],
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            100, "{into: glass, shake: 0}", [30, 80], [420, 40, 0, 0, 0, 0], marks=pytest.mark.long
-        ),
+        (150, "{into: glass, ml: 80, rate: 10}", [40, 120], [450, -100, 0, 0, 0, 0]),
+        (100, "{into: glass, shake: 0}", [30, 80], [420, 40, 0, 0, 0, 0]),
     ],
-)  # fmt: skip
+)
 def test_nothing_is_spilled_beside_a_glass(
     stage: Stage, full: int, pour: str, size: list[int], pose: list[int]
 ) -> None:
@@ -112,6 +107,7 @@ def test_nothing_is_spilled_beside_a_glass(
     assert stage.loads(states).max() <= 1.0 + 1e-6
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     ("steps", "said"),
     [

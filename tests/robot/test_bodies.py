@@ -166,6 +166,7 @@ def test_parts_that_are_apart_at_zero_are_checked_as_before(tmp_path: Path) -> N
     assert notes == ("Not checked, because they touch at rest: upper and cuff.",)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("form", ["obj", "stl", "dae", "ply"])
 def test_meshes_get_few_corners_and_are_read_once(
     tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch

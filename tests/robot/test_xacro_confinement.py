@@ -60,6 +60,7 @@ def test_the_environment_stays_private(tmp_path: Path, monkeypatch: pytest.Monke
     assert b"hidden jazzy" in read_urdf(path)
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["PATH", "LANG", "HOME"])
 def test_only_variables_of_ros_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
@@ -76,6 +77,7 @@ def test_only_variables_of_ros_are_read(
 OUTSIDE = r"secret\.xacro cannot be opened \(it is outside the packages of the robot\)"
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     "line",
     [
