@@ -127,7 +127,9 @@ def _with_lead(
     """Return factor and offset of a driven finger that closes when ``lead`` does."""
     low, high = _range(lead)
     lower, upper = _range(joint)
-    same, mirrored = (math.dist((low, high), each) for each in ((lower, upper), (-upper, -lower)))
+    same, mirrored = (
+        math.dist((low, high), limits) for limits in ((lower, upper), (-upper, -lower))
+    )
     if same == mirrored:
         # Fingers that close on each other move in opposite directions.
         one, other = (frames[j.child][:3, :3] @ np.asarray(j.axis) for j in (lead, joint))

@@ -33,12 +33,12 @@ def bare(robot: Robot) -> Robot:
         while above is not None and above not in carried:
             removed.add(above)
             above = parents[above]
-    kept = []
+    links = []
     for link in robot.links:
         if link.name in removed or link.parent in removed:
             removed.add(link.name)
         else:
-            kept.append(link)
+            links.append(link)
     bare_arm = replace(
         arm,
         chain=chain,
@@ -47,4 +47,4 @@ def bare(robot: Robot) -> Robot:
         gripper=NO_GRIPPER,
         fingers={},
     )
-    return replace(robot, links=tuple(kept), arm=bare_arm)
+    return replace(robot, links=tuple(links), arm=bare_arm)

@@ -85,7 +85,7 @@ def _pairs(
     def pairs() -> list[tuple[int, int]]:
         return pairs_that_meet(Linkage(groups), parts, lower, upper)
 
-    shapes = [each.mark for part in parts for each in part.shapes]
+    shapes = [shape.mark for part in parts for shape in part.shapes]
     places = [(part.mover, part.T_mover_shape) for part in parts]
     bodies = pickle.dumps((groups, places, shapes))
     return kept(pairs, list[tuple[int, int]], bodies, lower, upper)
@@ -103,10 +103,10 @@ def scene_objects_of(props: Props) -> tuple[SceneObject, ...]:
             name,
             Shape.CYLINDER,
             (vessel.outer_radius, vessel.height),
-            se3.from_rotation_translation(np.eye(3), at),
+            se3.from_rotation_translation(np.eye(3), place),
             can_be_held=name == "cup",
         )
-        for name, vessel, at in (("cup", props.cup, CUP_AT), ("basin", props.basin, BASIN_AT))
+        for name, vessel, place in (("cup", props.cup, CUP_AT), ("basin", props.basin, BASIN_AT))
     )
 
 

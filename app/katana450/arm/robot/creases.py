@@ -71,9 +71,11 @@ def drawn(vertices: FloatArray, faces: IntArray, colours: Colours | None = None)
     label = _joined(
         faces.size, np.concatenate((start[one], end[one])), np.concatenate((first, last))
     )
-    kept, number = np.unique(label, return_inverse=True)
+    labels, number = np.unique(label, return_inverse=True)
     return Drawn(
-        vertices[flat[kept]], number.reshape(-1, 3), None if colours is None else colours[kept // 3]
+        vertices[flat[labels]],
+        number.reshape(-1, 3),
+        None if colours is None else colours[labels // 3],
     )
 
 

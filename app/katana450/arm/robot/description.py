@@ -106,10 +106,10 @@ def checked(path: Path, expand: Callable[[Path], bytes] = unexpanded) -> bytes:
 
 def refuse_loops(data: bytes, path: Path) -> None:
     """Raise RobotDescriptionError if joints of the file at ``path`` close loops, by extensions."""
-    found = LOOP.search(data)
-    if found is not None:
+    match = LOOP.search(data)
+    if match is not None:
         raise RobotDescriptionError(
-            f"{path.name} has a closed loop of joints, <loop_joint {found[1].decode()!r}>. Only "
+            f"{path.name} has a closed loop of joints, <loop_joint {match[1].decode()!r}>. Only "
             "commands with --urdf solve it: remove it, or write a <mimic> in its place."
         )
 
@@ -123,7 +123,7 @@ def _mended(data: bytes) -> bytes:
     # The blank lines before the declaration are moved behind it.
     data = DECLARATION.sub(rb'<?xml version="1.0"\2\1', data, count=1)
     unknown = {*PREFIX.findall(data)} - {*DECLARED.findall(data), b"xml", b"xacro"}
-    declarations = b"".join(b' xmlns:%s="%s"' % (each, each) for each in sorted(unknown))
+    declarations = b"".join(b' xmlns:%s="%s"' % (prefix, prefix) for prefix in sorted(unknown))
     return ROOT.sub(lambda match: match[0] + declarations, data, count=1)
 
 
@@ -240,17 +240,17 @@ class _Checks:
             )
 
     def _named(self, root: Element, tag: str) -> dict[str, Element]:
-        found: dict[str, Element] = {}
+        elements: dict[str, Element] = {}
         for element in root.findall(tag):
             name = element.attrib["name"]
-            if name in found:
+            if name in elements:
                 raise self._refuse(
                     element,
-                    f"there is a {tag} {name!r} in line {self._line[found[name]]} already; "
+                    f"there is a {tag} {name!r} in line {self._line[elements[name]]} already; "
                     "give each a different name.",
                 )
-            found[name] = element
-        return found
+            elements[name] = element
+        return elements
 
     def _check_joint(self, joint: Element, links: Mapping[str, Element]) -> None:
         name = joint.attrib["name"]

@@ -50,15 +50,15 @@ def fitted(points: FloatArray, direction: FloatArray) -> InitialCamera:
     ``points``: (n, 3) [m] in the root's frame.
     """
     R = looking(direction)
-    seen = points @ R
+    projected = points @ R
     tangent = math.tan(FIELD_OF_VIEW / 2.0) / MARGIN
     # A point at depth z (towards the camera) is in the picture if |x - eye_x| is at most
     # (eye_z - z) tan: two bounds for each of x and y, which meet at the nearest camera.
-    right = (seen[:, :2] + seen[:, 2:] * tangent).max(axis=0)
-    left = (seen[:, :2] - seen[:, 2:] * tangent).min(axis=0)
+    right = (projected[:, :2] + projected[:, 2:] * tangent).max(axis=0)
+    left = (projected[:, :2] - projected[:, 2:] * tangent).min(axis=0)
     middle = (right + left) / 2.0
     depth = float(np.max(right - left)) / 2.0 / tangent + 1e-3
-    return InitialCamera(R @ (*middle, depth), R @ (*middle, float(seen[:, 2].mean())))
+    return InitialCamera(R @ (*middle, depth), R @ (*middle, float(projected[:, 2].mean())))
 
 
 def looking(direction: FloatArray) -> FloatArray:

@@ -111,10 +111,10 @@ class Meshes:
 
     def need(self, key: str) -> Mesh:
         """Return the mesh with ``key``. Raises InputError if it is not stored."""
-        found = self.get(key)
-        if found is None:
+        mesh = self.get(key)
+        if mesh is None:
             raise InputError("There is no mesh with this key any more. Upload its file again.")
-        return found
+        return mesh
 
     def put(self, meshes: Collection[Mesh], used: Collection[str]) -> None:
         """Store all ``meshes`` at once, in place of the oldest ones that are not ``used``.
@@ -123,18 +123,18 @@ class Meshes:
         """
         new = {mesh.key: mesh for mesh in meshes}
         with self._lock:
-            kept = {key: mesh for key, mesh in self._kept.items() if key not in new} | new
-            for key in list(kept):
-                if self._fits(kept):
+            together = {key: mesh for key, mesh in self._kept.items() if key not in new} | new
+            for key in list(together):
+                if self._fits(together):
                     break
                 if key not in new and key not in used:
-                    del kept[key]
-            if not self._fits(kept):
+                    del together[key]
+            if not self._fits(together):
                 raise InputError(
                     f"There is room for {self._limit} meshes of {self._max_bytes // 1_000_000} MB "
                     "in total. Remove objects first."
                 )
-            removed, self._kept = self._kept.keys() - kept.keys(), kept
+            removed, self._kept = self._kept.keys() - together.keys(), together
             if self._folder is not None:
                 # In a thread, because the server's thread must not wait for a disk.
                 work = (self._folder, tuple(new.values()), tuple(removed))
@@ -153,6 +153,6 @@ class Meshes:
                 except InputError as error:
                     log.warning("A mesh will be lost if the page's server ends: %s", error)
 
-    def _fits(self, kept: dict[str, Mesh]) -> bool:
-        total = sum(mesh.bytes for mesh in kept.values())
-        return len(kept) <= self._limit and total <= self._max_bytes
+    def _fits(self, meshes: dict[str, Mesh]) -> bool:
+        total = sum(mesh.bytes for mesh in meshes.values())
+        return len(meshes) <= self._limit and total <= self._max_bytes

@@ -111,10 +111,10 @@ class Robot:
                 f"({', '.join(driven)}), not {len(pose)}."
             )
         numbers = finite_array(pose, (len(pose),), "The pose").tolist()
-        given = dict(zip(driven, numbers, strict=False))
-        for name, value in given.items():
+        values = dict(zip(driven, numbers, strict=False))
+        for name, value in values.items():
             self.check(name, value)
-        return self.every(given)
+        return self.every(values)
 
     def check(self, name: str, value: float) -> None:
         """Raise InputError if `value` [rad] or [m] is outside the limits of joint `name`."""
@@ -126,29 +126,29 @@ class Robot:
                 f"its range is {joint.lower:g} to {joint.upper:g} {unit}."
             )
 
-    def every(self, given: Mapping[str, float]) -> dict[str, float]:
+    def every(self, values: Mapping[str, float]) -> dict[str, float]:
         """Return the value of every joint, from those of some driven joints."""
         leaders = {name: self.joints[name] for name in self.driven}
-        at = {
-            name: given.get(name, min(max(0.0, joint.lower), joint.upper))
+        every = {
+            name: values.get(name, min(max(0.0, joint.lower), joint.upper))
             for name, joint in leaders.items()
         }
         return {
-            name: joint.factor * at[joint.leader] + joint.offset
+            name: joint.factor * every[joint.leader] + joint.offset
             for name, joint in self.joints.items()
         }
 
     def frames(self, values: Mapping[str, float]) -> dict[str, FloatArray]:
         """Return the pose (4, 4) of each link in the root [m]; joints without a value are at 0."""
-        found: dict[str, FloatArray] = {}
+        frames: dict[str, FloatArray] = {}
         for link in self.links:
             T = link.T_parent_link
             if link.parent is not None:
-                T = found[link.parent] @ T
+                T = frames[link.parent] @ T
             if link.joint is not None and link.joint.name in values:
                 T = T @ link.joint.motion(values[link.joint.name])
-            found[link.name] = frozen(T)
-        return found
+            frames[link.name] = frozen(T)
+        return frames
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
@@ -186,13 +186,13 @@ class Robot:
     @cached_property
     def moving(self) -> frozenset[str]:
         """Names of the links that a driven joint moves, directly or through their parents."""
-        found: set[str] = set()
+        moving: set[str] = set()
         for link in self.links:
             joint = link.joint
             moved = joint is not None and (self.arm is None or self.arm.moves(joint.name))
-            if moved or link.parent in found:
-                found.add(link.name)
-        return frozenset(found)
+            if moved or link.parent in moving:
+                moving.add(link.name)
+        return frozenset(moving)
 
     def joint_values(self, q: FloatArray, gripper: float) -> dict[str, float]:
         """Return the value of every movable joint [rad] or [m].
@@ -207,8 +207,12 @@ class Robot:
 
     def distance(self, q: FloatArray, to: FloatArray) -> float:
         """Return the maximum distance of a link's origin between two postures of the joints [m]."""
-        here, there = (self.frames(self.joint_values(each, 0.0)) for each in (q, to))
-        return max(math.dist(here[name][:3, 3], there[name][:3, 3]) for name in here)
+        start_frames, end_frames = (
+            self.frames(self.joint_values(posture, 0.0)) for posture in (q, to)
+        )
+        return max(
+            math.dist(start_frames[name][:3, 3], end_frames[name][:3, 3]) for name in start_frames
+        )
 
     @cached_property
     def joint_group(self) -> JointSet:

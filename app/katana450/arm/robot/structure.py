@@ -136,20 +136,20 @@ class _Tree:
 
     def order(self, link: str) -> list[str]:
         """Return ``link`` and all its descendants, parents first."""
-        found = [link]
-        for name in found:
-            found.extend(joint.child for joint in self.below.get(name, ()))
-        return found
+        links = [link]
+        for name in links:
+            links.extend(joint.child for joint in self.below.get(name, ()))
+        return links
 
     def next_joints(self, link: str) -> list[UrdfJoint]:
         """Return the first movable joints behind ``link``, on every branch."""
-        found, waiting = [], list(self.below.get(link, ()))
+        joints, waiting = [], list(self.below.get(link, ()))
         for joint in waiting:
             if _moves(joint):
-                found.append(joint)
+                joints.append(joint)
             else:
                 waiting.extend(self.below.get(joint.child, ()))
-        return found
+        return joints
 
     def depth(self, joint: UrdfJoint) -> int:
         """Return the maximum number of consecutive driven joints, beginning with ``joint``."""
@@ -229,15 +229,15 @@ def _listed(joints: Iterable[UrdfJoint]) -> str:
 
 def _branches(tree: _Tree, link: str, axes: Sequence[UrdfJoint]) -> list[UrdfJoint]:
     """Return the next joints behind ``link``, without bars of ``axes`` that carry nothing."""
-    found = tree.next_joints(link)
+    joints = tree.next_joints(link)
     driven = {joint.name for joint in axes}
 
     def is_bar(joint: UrdfJoint) -> bool:
         leader = driver_of(joint, tree.joints)
         return joint.mimic is not None and leader is not None and leader.joint in driven
 
-    own = [joint for joint in found if not is_bar(joint) or tree.depth(joint)]
-    return own or found[:1]
+    own = [joint for joint in joints if not is_bar(joint) or tree.depth(joint)]
+    return own or joints[:1]
 
 
 def _is_finger(tree: _Tree, joint: UrdfJoint, number: int) -> bool:

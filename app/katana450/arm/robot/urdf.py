@@ -127,12 +127,12 @@ class Urdf:
 
     def frames(self) -> dict[str, FloatArray]:
         """Return the pose (4, 4) of each link in the root with every joint at zero [m]."""
-        found: dict[str, FloatArray] = {}
+        frames: dict[str, FloatArray] = {}
         above = {joint.child: joint for joint in self.joints.values()}
         for name in self.parents_first():
             joint = above.get(name)
-            found[name] = np.eye(4) if joint is None else found[joint.parent] @ joint.origin
-        return found
+            frames[name] = np.eye(4) if joint is None else frames[joint.parent] @ joint.origin
+        return frames
 
     def parents_first(self) -> list[str]:
         """Return the names of the links, each after its parent."""
@@ -189,8 +189,8 @@ def urdf_of(data: bytes, folder: Path) -> Urdf:
     """
     # Which file a name refers to depends on the files that exist.
     files = [mesh_file(name.decode(errors="replace"), folder) for name in FILENAME.findall(data)]
-    found = [f"{each} {each.is_file()}" for each in files]
-    return kept(lambda: _read(data, folder), Urdf, data, str(folder), *found)
+    states = [f"{file} {file.is_file()}" for file in files]
+    return kept(lambda: _read(data, folder), Urdf, data, str(folder), *states)
 
 
 def _read(data: bytes, folder: Path) -> Urdf:
@@ -199,7 +199,9 @@ def _read(data: bytes, folder: Path) -> Urdf:
 
     options = {"build_scene_graph": False, "load_meshes": False}
     robot = yourdfpy.URDF.load(_Stream(data), **options).robot
-    colors = {each.name: each.color for each in robot.materials if each.color is not None}
+    colors = {
+        material.name: material.color for material in robot.materials if material.color is not None
+    }
     return Urdf(
         name=robot.name,
         links={link.name: _link(link, colors, folder) for link in robot.links},

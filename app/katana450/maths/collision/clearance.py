@@ -76,15 +76,15 @@ def advance(
     if (towards == x).all():
         return Advance(x)
     minimum = world.kept(STOP) if keep is None else keep
-    here = world.at(x)
-    travel = world.travel(here, x, towards)
+    start = world.at(x)
+    travel = world.travel(start, x, towards)
     part = min(dt / MIN_STOP_TIME, 1.0)
     # Pairs so far apart that the whole path does not matter need no closer check.
     free = minimum + travel / part
     free[travel == 0.0] = -np.inf
     path = _Path(world, x, towards)
-    for pair in here.nearer_than(free)[0].tolist():
-        before = here.distance(pair)
+    for pair in start.nearer_than(free)[0].tolist():
+        before = start.distance(pair)
         if before < free[pair]:
             path.active.append(
                 _ActivePair(pair, float(travel[pair]), before, part, float(minimum[pair]))
@@ -93,9 +93,11 @@ def advance(
         return Advance(towards)
     fraction, held = 1.0, None
     for _ in range(STEP_ATTEMPTS):
-        there = path.at(fraction)
-        after = [(each, there.distance(each.pair)) for each in path.active if each.tight(fraction)]
-        fit, tightest = min(((each.fit(d), each) for each, d in after), default=(1.0, None))
+        end = path.at(fraction)
+        after = [
+            (active, end.distance(active.pair)) for active in path.active if active.tight(fraction)
+        ]
+        fit, tightest = min(((active.fit(d), active) for active, d in after), default=(1.0, None))
         if fit < 1.0:
             held = tightest
             fraction *= STEP_FRACTION * fit
@@ -105,11 +107,11 @@ def advance(
             held = passed
             fraction *= 0.5
         else:
-            contact = None if held is None else there.contact(held.pair)
+            contact = None if held is None else end.contact(held.pair)
             return Advance(path.x(fraction), contact)
         if fraction * float(travel.max()) < MIN_TRAVEL:
             break
-    return Advance(x, None if held is None else here.contact(held.pair), stopped=True)
+    return Advance(x, None if held is None else start.contact(held.pair), stopped=True)
 
 
 def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -> bool:
@@ -121,13 +123,13 @@ def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -
     turns = world.linkage.turned(towards - x)
     if turns >= MAX_GLANCE_ANGLE:
         return False
-    here = world.at(x)
+    placed = world.at(x)
     needed = (
         world.kept(STOP)
-        + world.travel(here, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
+        + world.travel(placed, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
     )
-    pairs, _ = here.nearer_than(needed)
-    return all(here.distance(pair) >= needed[pair] for pair in pairs.tolist())
+    pairs, _ = placed.nearer_than(needed)
+    return all(placed.distance(pair) >= needed[pair] for pair in pairs.tolist())
 
 
 @dataclass(frozen=True, order=True)
@@ -180,10 +182,10 @@ class _Path:
 
     def at(self, fraction: float) -> PlacedWorld:
         """Return the world at ``fraction`` of the path."""
-        found = self._placed.get(fraction)
-        if found is None:
-            found = self._placed[fraction] = self._world.at(self.x(fraction))
-        return found
+        placed = self._placed.get(fraction)
+        if placed is None:
+            placed = self._placed[fraction] = self._world.at(self.x(fraction))
+        return placed
 
     def passes(
         self, active: _ActivePair, low: float, d_low: float, high: float, d_high: float
@@ -193,14 +195,18 @@ class _Path:
         ``d_low``, ``d_high``: distance of its bodies at both [m].
         """
         travel = (high - low) * active.travel
-        kept = min(active.before, active.keep)
+        clearance = min(active.before, active.keep)
         # Bodies that overlap cannot pass each other.
-        if active.before <= 0.0 or travel <= MAX_UNCHECKED_PATH or d_low + d_high - travel >= kept:
+        if (
+            active.before <= 0.0
+            or travel <= MAX_UNCHECKED_PATH
+            or d_low + d_high - travel >= clearance
+        ):
             return False
         middle = 0.5 * (low + high)
         d_middle = self.at(middle).distance(active.pair)
         return (
-            d_middle < kept - DISTANCE_ROUNDING
+            d_middle < clearance - DISTANCE_ROUNDING
             or self.passes(active, low, d_low, middle, d_middle)
             or self.passes(active, middle, d_middle, high, d_high)
         )

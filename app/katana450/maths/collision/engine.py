@@ -129,7 +129,7 @@ def witness(placement: Placement, one: int, other: int) -> Witness:
             for step in STEP * np.eye(3)
         )
     length = hypot(*direction)
-    normal = [each / length for each in direction] if length > 0.0 else (0.0, 0.0, 1.0)
+    normal = [part / length for part in direction] if length > 0.0 else (0.0, 0.0, 1.0)
     return Witness(gap, frozen(points), frozen(normal))
 
 
@@ -177,7 +177,7 @@ class _Bench:
         self._data = mujoco.MjData(self._model)
         # As C expects them, because each call converts them otherwise.
         self._addresses = tuple(
-            ctypes.c_void_p(each._address) for each in (self._model, self._data)
+            ctypes.c_void_p(struct._address) for struct in (self._model, self._data)
         )
         self._positions, self._rotations = self._data.geom_xpos, self._data.geom_xmat
         self._forget()
@@ -216,8 +216,8 @@ class _Bench:
 
     def choose(self, geometries: tuple[Geometry, ...]) -> None:
         """Make the first geoms those of ``geometries``."""
-        new = dict.fromkeys(each for each in geometries if each not in self._meshes)
-        vertices = sum(len(each.vertices) for each in new)
+        new = dict.fromkeys(shape for shape in geometries if shape not in self._meshes)
+        vertices = sum(len(shape.vertices) for shape in new)
         model, count = self._model, len(geometries)
         if (
             count > model.ngeom
@@ -226,16 +226,16 @@ class _Bench:
         ):
             self._forget()
             new = dict.fromkeys(geometries)
-            vertices = sum(len(each.vertices) for each in new)
+            vertices = sum(len(shape.vertices) for shape in new)
             if count > model.ngeom or vertices > model.nmeshvert:
                 # With room for objects to come.
                 self._start(max(GEOMETRIES, 2 * count), max(VERTICES, 2 * vertices))
                 model = self._model
         for geometry in new:
             self._add(geometry)
-        model.geom_type[:count] = [KINDS[each.kind] for each in geometries]
-        model.geom_size[:count] = [each.size for each in geometries]
-        model.geom_dataid[:count] = [self._meshes[each] for each in geometries]
+        model.geom_type[:count] = [KINDS[shape.kind] for shape in geometries]
+        model.geom_size[:count] = [shape.size for shape in geometries]
+        model.geom_dataid[:count] = [self._meshes[shape] for shape in geometries]
         self._geometries = geometries
 
     def _add(self, geometry: Geometry) -> None:

@@ -108,23 +108,25 @@ class CollisionWorld:
         self.frame_of = np.array(frame_of, dtype=np.int64)
         self.frames = self.mover_of[first_of], self.T_mover_body[first_of, :3, :3]
         R = self.T_mover_body[:, :3, :3]
-        at = self.T_mover_body[:, :3, 3]
+        positions = self.T_mover_body[:, :3, 3]
         centres = np.array([shape.centre for shape in shapes]).reshape(-1, 3, 1)
         # The centres in the base frame are this (b, 4 m) times the columns of all poses, (4 m, 3).
         spread = np.zeros((count, linkage.count, 4))
-        spread[range(count), self.mover_of, :3] = (R @ centres)[:, :, 0] + at
+        spread[range(count), self.mover_of, :3] = (R @ centres)[:, :, 0] + positions
         spread[range(count), self.mover_of, 3] = 1.0
         self.spread = spread.reshape(count, -1)
         # A box along the axes of the group round the box along those of the body.
         middle = np.array([0.5 * (shape.low + shape.high) for shape in shapes]).reshape(-1, 3, 1)
         half = np.array([0.5 * (shape.high - shape.low) for shape in shapes]).reshape(-1, 3, 1)
-        self.box_middle = (R @ middle)[:, :, 0] + at
+        self.box_middle = (R @ middle)[:, :, 0] + positions
         self.box_half = (np.abs(R) @ half)[:, :, 0]
 
-        met = np.zeros((len(self.parts), len(self.parts)), dtype=bool)
+        pair_exists = np.zeros((len(self.parts), len(self.parts)), dtype=bool)
         for a, b in self.pairs:
-            met[a, b] = True
-        self.first, self.second = np.nonzero(met[self.part_of[:, None], self.part_of[None, :]])
+            pair_exists[a, b] = True
+        self.first, self.second = np.nonzero(
+            pair_exists[self.part_of[:, None], self.part_of[None, :]]
+        )
         self.geometries = tuple(shape.geometry for shape in shapes)
         self.radii = self.radius[self.first] + self.radius[self.second]
         # Flat indices into (b, m) of a body relative to a group.
@@ -148,8 +150,8 @@ class CollisionWorld:
         groups = self.mover_of[bodies]
         for body in self.planes:
             turning = self.linkage.turning_about(self.T_mover_body[body, :3, 2])
-            found = turning[self.mover_of[others]]
-            groups = np.where((bodies == body) & (groups == GROUND), found, groups)
+            turned = turning[self.mover_of[others]]
+            groups = np.where((bodies == body) & (groups == GROUND), turned, groups)
         return groups
 
     def load(self) -> None:
@@ -197,8 +199,8 @@ class CollisionWorld:
         names = [self.parts[number].name for number in self.part_of.tolist()]
         placed, wanted = self.at(x), {frozenset((one, other)) for other in others}
         pairs = zip(self.first.tolist(), self.second.tolist(), strict=True)
-        found = (pair for pair, (a, b) in enumerate(pairs) if {names[a], names[b]} in wanted)
-        return min(map(placed.distance, found), default=np.inf)
+        matches = (pair for pair, (a, b) in enumerate(pairs) if {names[a], names[b]} in wanted)
+        return min(map(placed.distance, matches), default=np.inf)
 
     @cached_property
     def fingerprint(self) -> Fingerprint:
@@ -218,20 +220,22 @@ class CollisionWorld:
         turns with it, and the next link turns under it.
         """
         count = len(self.parts)
-        met = [
+        new_pairs = [
             (number, count)
             for number, part in enumerate(self.parts)
             if len(self.linkage.variables_between(part.mover, carried.mover)) > 1
         ]
-        return CollisionWorld(self.linkage, (*self.parts, carried), (*self.pairs, *met), self.close)
+        return CollisionWorld(
+            self.linkage, (*self.parts, carried), (*self.pairs, *new_pairs), self.close
+        )
 
     def with_obstacles(self, obstacles: Sequence[Part]) -> CollisionWorld:
         """Return this world with ``obstacles``, which every part that moves may meet."""
         count = len(self.parts)
         moving = [number for number, part in enumerate(self.parts) if part.mover != GROUND]
-        met = [(number, count + k) for number in moving for k in range(len(obstacles))]
+        new_pairs = [(number, count + k) for number in moving for k in range(len(obstacles))]
         parts = (*self.parts, *obstacles)
-        return CollisionWorld(self.linkage, parts, (*self.pairs, *met), self.close)
+        return CollisionWorld(self.linkage, parts, (*self.pairs, *new_pairs), self.close)
 
 
 class PlacedWorld:
@@ -295,8 +299,8 @@ class PlacedWorld:
         a, b = world.first[pairs], world.second[pairs]
         boxes, balls = np.concatenate((a, b)), np.concatenate((b, a))
         T = self._T[world.mover_of[boxes]]
-        seen = np.einsum("ij,ijk->ik", self._centre[balls] - T[:, :3, 3], T[:, :3, :3])
-        outside = np.maximum(np.abs(seen - world.box_middle[boxes]) - world.box_half[boxes], 0.0)
+        local = np.einsum("ij,ijk->ik", self._centre[balls] - T[:, :3, 3], T[:, :3, :3])
+        outside = np.maximum(np.abs(local - world.box_middle[boxes]) - world.box_half[boxes], 0.0)
         away = np.sqrt(np.einsum("ij,ij->i", outside, outside))
         # For a centre inside the box the depth of the ball is unknown.
         away = np.where(away > 0.0, away - world.radius[balls], -np.inf)
@@ -341,6 +345,6 @@ class PlacedWorld:
         """Return the nearest points of the bodies of a pair."""
         world = self._world
         bodies = world.bodies_of[pair]
-        found = engine.witness(self._placement, *bodies)
+        witness = engine.witness(self._placement, *bodies)
         one, other = (world.parts[world.part_of[body]].name for body in bodies)
-        return Contact((one, other), found.distance, found.points, found.normal)
+        return Contact((one, other), witness.distance, witness.points, witness.normal)

@@ -34,7 +34,7 @@ class Course:
         """
         if dt <= 0.0:
             return self
-        jerk, at = 0.0, self.duration + (dt - (self.step or dt)) / 3.0
+        jerk, place = 0.0, self.duration + (dt - (self.step or dt)) / 3.0
         if self.acceleration is not None:
-            jerk = norm(scale(1.0 / (at - self.at), sub(acceleration, self.acceleration)))
-        return Course(self.duration + dt, max(self.peak_jerk, jerk), acceleration, at, dt)
+            jerk = norm(scale(1.0 / (place - self.at), sub(acceleration, self.acceleration)))
+        return Course(self.duration + dt, max(self.peak_jerk, jerk), acceleration, place, dt)

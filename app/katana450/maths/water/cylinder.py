@@ -123,12 +123,12 @@ class Cylinder:
             else:
                 low = level
             area = self.surface(tilt, level)
-            ahead = level - beyond / area if area > 0.0 else low
-            if not low < ahead < high:
-                ahead = 0.5 * (low + high)
-            if ahead in (level, low, high):
+            next_level = level - beyond / area if area > 0.0 else low
+            if not low < next_level < high:
+                next_level = 0.5 * (low + high)
+            if next_level in (level, low, high):
                 break
-            level = ahead
+            level = next_level
         return level
 
     def surface(self, tilt: float, level: float) -> float:

@@ -107,11 +107,11 @@ class Water:
     @property
     def total(self) -> int:
         """The volume of all water; a step never changes it."""
-        return sum(each.kept for each in self.vessels) + self.basin + self.air + self.spilled
+        return sum(vessel.kept for vessel in self.vessels) + self.basin + self.air + self.spilled
 
     def vessel(self, name: str) -> VesselWater | None:
         """Return the water in the vessel ``name``; None without such a vessel."""
-        return next((each for each in self.vessels if each.name == name), None)
+        return next((vessel for vessel in self.vessels if vessel.name == name), None)
 
 
 class VesselMove(NamedTuple):
@@ -174,23 +174,23 @@ class WaterFlow:
         invalid pose and for numbers that are not finite.
         """
         poses, pulls = [], []
-        for each in water.vessels:
-            T, acceleration = moves.get(each.name) or VesselMove(each.T)
-            poses.append(frozen(se3.validated(T, f"The pose of the {each.name}")))
-            what = f"The acceleration of the {each.name}"
+        for vessel in water.vessels:
+            T, acceleration = moves.get(vessel.name) or VesselMove(vessel.T)
+            poses.append(frozen(se3.validated(T, f"The pose of the {vessel.name}")))
+            what = f"The acceleration of the {vessel.name}"
             pulls.append(vector(finite_array(acceleration, (3,), what)))
         if not 0.0 <= dt < math.inf:
             raise InputError(f"The time step is {dt} s; give 0 or more seconds.")
         if dt == 0.0:
-            moved = [replace(each, T=T) for each, T in zip(water.vessels, poses, strict=True)]
+            moved = [replace(vessel, T=T) for vessel, T in zip(water.vessels, poses, strict=True)]
             return replace(water, vessels=tuple(moved))
         swung = [
-            self._swing(each, pull, dt) for each, pull in zip(water.vessels, pulls, strict=True)
+            self._swing(vessel, pull, dt) for vessel, pull in zip(water.vessels, pulls, strict=True)
         ]
         water = self._fly(replace(water, vessels=tuple(swung)), poses, dt)
         vessels, parcels = [], list(water.parcels)
-        for each, T, pull in zip(water.vessels, poses, pulls, strict=True):
-            left, parcel = self._pour(each, T, dt)
+        for vessel, T, pull in zip(water.vessels, poses, pulls, strict=True):
+            left, parcel = self._pour(vessel, T, dt)
             vessels.append(self._drain(left, _along_wall(T, pull), dt))
             if parcel is not None:
                 parcels.append(parcel)
@@ -237,16 +237,16 @@ class WaterFlow:
         g = GRAVITY * weight
         weir = weir_flow(inside.radius, tilt, head, g)
         viscous = viscous_flow(inside.radius, tilt, head, g)
-        gone = over - left_over(over, weir, viscous, dt)
-        if gone == 0:
+        poured = over - left_over(over, weir, viscous, dt)
+        if poured == 0:
             return replace(water, T=T), None
         mouth = self.water_environment.vessels[water.name].mouth
         point = (inside.radius * downhill[0], inside.radius * downhill[1], mouth)
         lip = _moved(T, point)
         carried = scale(1.0 / dt, sub(lip, _moved(water.T, point)))
         velocity = add(carried, scale(lip_speed(head, g), _outwards(T, tilt, downhill)))
-        left = replace(water, volume=water.volume - gone, T=T)
-        return left, Parcel(gone, lip, velocity, 0.0, dt)
+        left = replace(water, volume=water.volume - poured, T=T)
+        return left, Parcel(poured, lip, velocity, 0.0, dt)
 
     def _drain(self, water: VesselWater, g: float, dt: float) -> VesselWater:
         """Leave a film where the surface fell, cover it where it rose, and let it drain.
@@ -291,8 +291,8 @@ class WaterFlow:
             return water
         vessels, basin, puddles = list(water.vessels), water.basin, water.puddles
         mouths = [
-            (self.water_environment.vessels[each.name], each.T.tolist(), T.tolist())
-            for each, T in zip(vessels, poses, strict=True)
+            (self.water_environment.vessels[receiver.name], receiver.T.tolist(), T.tolist())
+            for receiver, T in zip(vessels, poses, strict=True)
         ]
         level = self.water_environment.basin.level(basin * FEMTOLITRE)
         over, flying = max(self.water_environment.basin.rim, 0.0), []

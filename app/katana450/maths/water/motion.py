@@ -39,6 +39,8 @@ class MotionWithWater:
     @property
     def still(self) -> bool:
         """True if the water is at rest as long as no vessel moves, except for the films."""
-        if self.water.parcels or any(each.velocity != NO_VELOCITY for each in self.motions):
+        if self.water.parcels or any(vessel.velocity != NO_VELOCITY for vessel in self.motions):
             return False
-        return all(each.slosh.lean == each.slosh.rate == (0.0, 0.0) for each in self.water.vessels)
+        return all(
+            vessel.slosh.lean == vessel.slosh.rate == (0.0, 0.0) for vessel in self.water.vessels
+        )

@@ -71,10 +71,10 @@ def body(cylinder: Cylinder, surface: WaterSurface) -> FloatArray:
     # The wall, then a copy for underside and upper side; bottom and top of each.
     corners = np.empty((2, 2, 2 * RUNGS + 1, 3))
     for side, columns in ((-aside[::-1], slice(0, RUNGS + 1)), (aside, slice(RUNGS, None))):
-        ahead = near if columns.start else near[::-1]
+        forward = near if columns.start else near[::-1]
         height = cut if columns.start else cut[::-1]
-        corners[:, :, columns, 0] = ahead * x - side * y
-        corners[:, :, columns, 1] = ahead * y + side * x
+        corners[:, :, columns, 0] = forward * x - side * y
+        corners[:, :, columns, 1] = forward * y + side * x
         corners[:, 0, columns, 2] = 0.0 if cosine > 0.0 else height
         corners[:, 1, columns, 2] = height if cosine > 0.0 else cylinder.depth
     return corners.reshape(-1, 3)
@@ -114,14 +114,14 @@ def stream(parcels: Sequence[Parcel], radius: float, end: float) -> FloatArray:
     before = np.minimum(behind + 1, len(ages) - 1)
     between = np.maximum(ages[before] - ages[behind], AGE_ROUNDING)
     fraction = np.minimum((age - ages[behind]) / between, 1.0)
-    here = left[behind] + fraction[:, None] * (left[before] - left[behind])
-    p, v, fall = here[:, 3:6], here[:, 6:9], GRAVITY * age
+    centre = left[behind] + fraction[:, None] * (left[before] - left[behind])
+    p, v, fall = centre[:, 3:6], centre[:, 6:9], GRAVITY * age
     p += v * age[:, None]
     p[:, 2] -= 0.5 * fall * age
     v[:, 2] -= fall
 
     speed = np.maximum(np.sqrt((v * v).sum(axis=1)), MIN_STREAM_SPEED)
-    jet = np.minimum(np.sqrt(here[:, 2] / (math.pi * speed)), MAX_STREAM_RADIUS * radius)
+    jet = np.minimum(np.sqrt(centre[:, 2] / (math.pi * speed)), MAX_STREAM_RADIUS * radius)
     jet[age > ages[behind] + left[behind, 1] + AGE_ROUNDING] = 0.0
     jet[0] = jet[-1] = 0.0
 
@@ -165,8 +165,8 @@ def _tube() -> Faces:
     b = (a + 1) % SIDES
     quads = []
     for row in range(SECTIONS - 1):
-        here, ahead = row * SIDES, (row + 1) * SIDES
-        quads += [(a + here, a + ahead, b + ahead), (a + here, b + ahead, b + here)]
+        near, far = row * SIDES, (row + 1) * SIDES
+        quads += [(a + near, a + far, b + far), (a + near, b + far, b + near)]
     return _stacked(quads)
 
 
