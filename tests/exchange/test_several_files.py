@@ -185,7 +185,7 @@ def test_files_beyond_the_limit_are_not_read() -> None:
 
     world = HEADER + "".join(f'\nInline {{ url "{name}" }}' for name in names)
     with pytest.raises(InputError, match="and the files that it names have over 20 MB"):
-        read_mesh(world.encode(), "a.wrl", beside=beside)
+        read_mesh(world.encode(), "a.wrl", companion=beside)
     left = 20_000_000 - len(world)
     assert asked == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
 

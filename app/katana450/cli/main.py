@@ -59,7 +59,7 @@ def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="katana450", description="Teleoperate and simulate the Katana450 arm in a browser."
     )
-    shown = version() if any(each.startswith("--v") for each in arguments) else ""
+    shown = version() if any(argument.startswith("--v") for argument in arguments) else ""
     parser.add_argument("--version", action="version", version=f"katana450 {shown}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     added = [command for extension in extensions() for command in extension.commands]

@@ -121,7 +121,7 @@ def serve(options: Namespace) -> int:
         if not stopping.is_set():
             if lines is not None:
                 say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-            for line in (*event_log.description, *(each.description for each in extra)):
+            for line in (*event_log.description, *(added.description for added in extra)):
                 say(line)
             say(f"katana450 is ready: {url} (STOP also on port {stop_port}; Ctrl-C stops)")
         supervisor.run()

@@ -68,7 +68,7 @@ class AsyncClient:
         self._states: list[asyncio.Queue[answers.State | None]] = []
         self._lost: str | None = None
         self._stops: set[asyncio.Task[str]] = set()
-        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._heartbeat())]
+        self._tasks = [asyncio.create_task(work) for work in (self._listen(), self._heartbeat())]
 
     async def close(self) -> None:
         """Close the connection."""
@@ -128,9 +128,9 @@ class AsyncClient:
         ports = (None,) if port is None else (None, port)
         paths = [
             self._stop_here(press),
-            *(asyncio.to_thread(self._site.stop, press, each) for each in ports),
+            *(asyncio.to_thread(self._site.stop, press, attempt) for attempt in ports),
         ]
-        tasks = [asyncio.create_task(each) for each in paths]
+        tasks = [asyncio.create_task(attempt) for attempt in paths]
         # They end by themselves, also those that are not waited for.
         self._stops.update(tasks)
         for task in tasks:

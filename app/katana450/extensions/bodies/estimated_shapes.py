@@ -69,7 +69,7 @@ def _capsules(robot: Robot, link: Link) -> list[Visual]:
     It begins inside the stick, so that a link that stands on the table does not reach into it. The
     other end goes round the joint of the child.
     """
-    lengths = [float(np.linalg.norm(each.T_parent_link[:3, 3])) for each in robot.links]
+    lengths = [float(np.linalg.norm(member.T_parent_link[:3, 3])) for member in robot.links]
     radius = min(RADIUS_RATIO * max(lengths), MAX_RADIUS)
     ends = [child.T_parent_link[:3, 3] for child in robot.children(link)]
     return [

@@ -91,12 +91,12 @@ def _nearest(
 
 def _parts_above(linkage: Linkage, parts: Sequence[Part]) -> list[int]:
     """Return for each part the group of the next parts towards the root; its own for the root."""
-    shaped, found = {part.mover for part in parts}, []
+    shaped, ancestors = {part.mover for part in parts}, []
     for part in parts:
         group = part.mover
         while group != GROUND:
             group = int(linkage.parent[group])
             if group in shaped:
                 break
-        found.append(group)
-    return found
+        ancestors.append(group)
+    return ancestors

@@ -80,15 +80,15 @@ def divided_mesh(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> list[Flo
     mesh = _Mesh(merged, numbers.reshape(-1)[faces])
     whole = np.arange(len(faces))
     least = max(MIN_GAIN, MIN_GAIN_FRACTION * _volume(mesh.points(whole)))
-    found = [_best_split(mesh, whole)]
+    splits = [_best_split(mesh, whole)]
     parts = [whole]
     while len(parts) < MAX_PIECES:
-        best = int(np.argmax([each.gain for each in found]))
-        if found[best].gain < least:
+        best = int(np.argmax([split.gain for split in splits]))
+        if splits[best].gain < least:
             break
-        halves = found[best].one, found[best].other
+        halves = splits[best].one, splits[best].other
         parts[best : best + 1] = halves
-        found[best : best + 1] = [_best_split(mesh, half) for half in halves]
+        splits[best : best + 1] = [_best_split(mesh, half) for half in halves]
     return [convex_body(mesh.points(part)).corners for part in parts]
 
 
@@ -100,13 +100,13 @@ def _best_split(mesh: _Mesh, numbers: npt.NDArray[np.int64]) -> _Split:
     low, high = middles.min(axis=0), middles.max(axis=0)
     best, place = 0.0, None
     for axis in range(3):
-        for at in (low[axis] + PLACES * (high[axis] - low[axis])).tolist():
-            side = sampled[:, axis] < at
+        for cut in (low[axis] + PLACES * (high[axis] - low[axis])).tolist():
+            side = sampled[:, axis] < cut
             if side.all() or not side.any():
                 continue
-            gain = volume - sum(_volume(mesh.points(sample[each])) for each in (side, ~side))
+            gain = volume - sum(_volume(mesh.points(sample[half])) for half in (side, ~side))
             if gain > best:
-                best, place = gain, (axis, at)
+                best, place = gain, (axis, cut)
     if place is None:
         return _Split(0.0, numbers, numbers[:0])
     side = middles[:, place[0]] < place[1]

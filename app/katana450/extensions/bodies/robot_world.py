@@ -48,17 +48,17 @@ def robot_world(robot: Robot) -> RobotWorld:
     five_axes = robot.arm is not None and robot.arm.chain.n == ARM_JOINTS
     divide = cache(as_modelled if five_axes and robot.collides else pieces)
     complete, unknown = with_estimates(robot, divide)
-    found: list[str] = []
+    findings: list[str] = []
 
     def make(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
         rest = pairs_at_rest(linkage, parts, _at_rest(robot), _at_home(robot))
         touching = [f"{parts[a].name} and {parts[b].name}" for a, b in rest.touching]
         if touching:
-            found.append(f"Not checked, because they touch at rest: {'; '.join(touching)}.")
+            findings.append(f"Not checked, because they touch at rest: {'; '.join(touching)}.")
         if robot.arm is not None:
             return CollisionWorld(linkage, parts, rest.checked, rest.close)
         under = standing(linkage, parts, robot.joint_group)
-        found.extend(under.notes)
+        findings.extend(under.notes)
         return CollisionWorld(
             linkage,
             (*parts, *under.table),
@@ -70,7 +70,7 @@ def robot_world(robot: Robot) -> RobotWorld:
     on_table = world if world is None or robot.arm is None else world.with_obstacles((table(),))
     start = _at_home(robot)
     x = _at_rest(robot) if start is None else start
-    return world, (*notes, *found), tuple(cautions(robot, unknown, on_table, x))
+    return world, (*notes, *findings), tuple(cautions(robot, unknown, on_table, x))
 
 
 def _at_rest(robot: Robot) -> FloatArray:

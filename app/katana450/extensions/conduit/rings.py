@@ -49,8 +49,8 @@ class _StretchNode:
         """Add the rings to the scene as the node ``path``."""
         self.stretch = stretch
         count = round(stretch.length / PITCH)
-        made = pickle.dumps(stretch)
-        self._poses = kept(lambda: poses(stretch, count), Floats, made, str(count))
+        pickled = pickle.dumps(stretch)
+        self._poses = kept(lambda: poses(stretch, count), Floats, pickled, str(count))
         self._steps = np.diff(self._poses, axis=0)
         self._shown = 0.0
         rings = self._at(0.0)

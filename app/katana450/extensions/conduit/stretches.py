@@ -275,25 +275,25 @@ def read_stretches(path: Path, find: Callable[[str, str], Hinge]) -> tuple[Condu
         return ()
     try:
         stretches = json.loads(path.read_text(encoding="utf-8"))["conduits"]
-        return tuple(_stretch(each, find) for each in stretches)
+        return tuple(_stretch(element, find) for element in stretches)
     except (InputError, KeyError, TypeError, ValueError) as error:
         raise RobotDescriptionError(f"{path} does not describe conduits: {error!r}.") from error
 
 
-def _stretch(each: Any, find: Callable[[str, str], Hinge]) -> ConduitStretch:
+def _stretch(element: Any, find: Callable[[str, str], Hinge]) -> ConduitStretch:
     start, end = (
         End(
             str(one["link"]),
             finite_array(one["point"], (3,), "The point of a conduit"),
             finite_array(one["tangent"], (3,), "The tangent of a conduit"),
         )
-        for one in each["ends"]
+        for one in element["ends"]
     )
     hinge = find(start.link, end.link)
-    radius, length = float(each["radius"]), float(each["length"])
+    radius, length = float(element["radius"]), float(element["length"])
     if not 0.0 < radius < length < math.inf:
         raise ValueError(f"the radius {radius} m is not between 0 and the length {length} m")
-    return ConduitStretch(start, end, radius, length, hinge, winds=each["winds"] == hinge.joint)
+    return ConduitStretch(start, end, radius, length, hinge, winds=element["winds"] == hinge.joint)
 
 
 def stretches_of(robot: Robot) -> tuple[ConduitStretch, ...]:
@@ -321,12 +321,12 @@ def _hinge(robot: Robot, start: str, end: str) -> Hinge:
     driven = [i for i, joint in enumerate(joints) if joint in chain.names]
     if len(driven) != 1:
         raise KeyError(f"there are {len(driven)} driven joints between {start} and {end}, not one")
-    (at,) = driven
+    (index,) = driven
     before, after = (
         functools.reduce(np.matmul, (link.at_rest(arm.resting) for link in some), np.eye(4))
-        for some in (path[: at + 1], path[at + 1 :])
+        for some in (path[: index + 1], path[index + 1 :])
     )
-    joint = path[at].joint
+    joint = path[index].joint
     assert joint is not None
     number = chain.names.index(joint.name)
     lower, upper = float(chain.lower[number]), float(chain.upper[number])

@@ -58,10 +58,10 @@ def _check(options: argparse.Namespace) -> None:
     kind: str = options.format
     row = FORMATS[kind]
     if options.trajectory is not None and not row.animated:
-        names = ", ".join(named(lambda each: each.animated))
+        names = ", ".join(named(lambda listed: listed.animated))
         raise InputError(f"{kind} has no motion. Use --trajectory with {names}.")
     if options.run is not None:
         raise InputError(f"{kind} has no run. Use --run with html.")
     if options.pose and not row.posed:
-        names = ", ".join(named(lambda each: each.posed))
+        names = ", ".join(named(lambda listed: listed.posed))
         raise InputError(f"{kind} has no pose. Use --pose with {names}.")

@@ -14,17 +14,17 @@ def distinct(names: Iterable[str], reserved: Container[str] = ()) -> list[str]:
     No two identifiers are equal, even without regard to case.
     A name that is a valid identifier stays, unless it is ``reserved`` or was used before.
     """
-    found: list[str] = []
-    taken: set[str] = set()
+    identifiers: list[str] = []
+    used: set[str] = set()
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
         plain = plain if re.match(r"[A-Za-z]", plain) else f"n{plain}"
         candidate, number = plain, 2
-        while candidate.lower() in taken or candidate in reserved:
+        while candidate.lower() in used or candidate in reserved:
             candidate, number = f"{plain}_{number}", number + 1
-        taken.add(candidate.lower())
-        found.append(candidate)
-    return found
+        used.add(candidate.lower())
+        identifiers.append(candidate)
+    return identifiers
 
 
 EPOCH = (1980, 1, 1, 0, 0, 0)

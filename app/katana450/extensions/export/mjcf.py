@@ -86,7 +86,7 @@ def is_frame(robot: Robot, link: Link) -> bool:
 def drives_of(robot: Robot) -> dict[str, Drive]:
     """Return a drive for each movable joint of ``robot``."""
     carried = {joint.name: _carried(robot, link, joint) for link, joint in moved_links(robot)}
-    found: dict[str, Drive] = {}
+    drives: dict[str, Drive] = {}
     for _, joint in moved_links(robot):
         # A drive carries the joints that follow it too.
         moved = [
@@ -101,10 +101,10 @@ def drives_of(robot: Robot) -> dict[str, Drive]:
         is_credible = CREDIBLE_RATIO * load <= joint.effort < np.inf
         force = joint.effort if is_credible else FORCE_RATIO * load
         spring = DAMPING_RATIO * 2.0 * float(np.sqrt(stiffness * (inertia + armature)))
-        found[joint.name] = Drive(
+        drives[joint.name] = Drive(
             stiffness, armature, joint.damping or spring, joint.friction, force
         )
-    return found
+    return drives
 
 
 def moved_links(robot: Robot) -> Iterator[tuple[Link, Joint]]:
@@ -186,7 +186,7 @@ def mjcf_files(robot: Robot) -> dict[str, bytes]:
         **{f"meshes/{file}.obj": text.encode() for file, text in model.meshes.items()},
     }
     return {
-        f"{name}_mjcf.zip": zipped({f"{name}/{each}": files[each] for each in files}, mode=0o644)
+        f"{name}_mjcf.zip": zipped({f"{name}/{path}": files[path] for path in files}, mode=0o644)
     }
 
 
@@ -409,12 +409,12 @@ def _scene(model: str, robot: Robot) -> ET.Element:
 
 def _place(T: FloatArray) -> dict[str, str]:
     """Return position and quaternion of a pose (4, 4) [m], without those that are zero."""
-    found = {}
+    attributes = {}
     if T[:3, 3].any():
-        found["pos"] = _numbers(T[:3, 3])
+        attributes["pos"] = _numbers(T[:3, 3])
     if not np.array_equal(T[:3, :3], np.eye(3)):
-        found["quat"] = _numbers(so3.to_quaternion(T[:3, :3]))
-    return found
+        attributes["quat"] = _numbers(so3.to_quaternion(T[:3, :3]))
+    return attributes
 
 
 def _numbers(values: Sequence[float] | FloatArray, digits: int | None = None) -> str:

@@ -96,8 +96,10 @@ def _faces(points: IntArray, normals: IntArray) -> list[str]:
     ``points`` and ``normals`` (n, 3): indices of the corners and of their normals, from 1.
     """
     a, b, c = points.T
-    kept = (a != b) & (b != c) & (c != a)
+    whole = (a != b) & (b != c) & (c != a)
     return [
         f"f {i}//{u} {j}//{v} {k}//{w}"
-        for (i, j, k), (u, v, w) in zip(points[kept].tolist(), normals[kept].tolist(), strict=True)
+        for (i, j, k), (u, v, w) in zip(
+            points[whole].tolist(), normals[whole].tolist(), strict=True
+        )
     ]

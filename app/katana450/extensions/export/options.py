@@ -59,7 +59,7 @@ def export_format(options: argparse.Namespace) -> int:
     """Execute ``katana450 export``; return the exit status."""
     row = FORMATS[options.format]
     if not row.scene and (options.plain or not options.objects):
-        names = " or ".join(named(lambda each: each.scene))
+        names = " or ".join(named(lambda listed: listed.scene))
         raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
     if row.files is None:
         from katana450.extensions.export.page import write_page

@@ -137,16 +137,16 @@ def _motion(path: Path, columns: Mapping[str, list[float]], robot: Robot) -> Rec
     if not (np.diff(t) > 0.0).all():
         row = int(np.argmin(np.diff(t) > 0.0)) + 2
         raise InputError(f"t of {path} must increase from row to row; in row {row} it does not.")
-    given: dict[str, FloatArray] = {}
+    columns_by_joint: dict[str, FloatArray] = {}
     for column, values in table.items():
         name = _joint(path, column, robot)
-        if name in given:
+        if name in columns_by_joint:
             raise InputError(f"{path} names the joint {name} twice.")
         for value in (values.min(), values.max()):
             robot.check(name, float(value))
-        given[name] = values
+        columns_by_joint[name] = values
     rows = [
-        robot.every({name: float(values[row]) for name, values in given.items()})
+        robot.every({name: float(values[row]) for name, values in columns_by_joint.items()})
         for row in range(count)
     ]
     every = {name: frozen([row[name] for row in rows]) for name in robot.joints}
@@ -220,9 +220,9 @@ def of_script(name: str, urdf: Path) -> Playback:
         text = demos[name]().text if name in demos else script_text(Path(name))
         plan = plan_script(parse(text), urdf)
     except ScriptError as error:
-        found = error.problems[0]
-        file = str(Path(name).parent / found.file) if found.file else name
-        raise InputError(f"{file}:{found.line}:{found.column}: {found.text}") from error
+        problem = error.problems[0]
+        file = str(Path(name).parent / problem.file) if problem.file else name
+        raise InputError(f"{file}:{problem.line}:{problem.column}: {problem.text}") from error
     states = run_by_clock(plan).states
     return Playback(plan.robot, plan.session, states, Settings().rate, plan.script.bare)
 

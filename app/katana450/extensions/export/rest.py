@@ -78,8 +78,8 @@ def excluded_pairs(robot: Robot) -> list[tuple[str, str, str]]:
 def _joints_between(robot: Robot, a: Link, b: Link) -> set[str]:
     """Return the driven joints that move ``b`` relative to ``a``."""
     above = [
-        {link.joint.name: link.joint.leader for link in robot.path_to(each) if link.joint}
-        for each in (a, b)
+        {link.joint.name: link.joint.leader for link in robot.path_to(end) if link.joint}
+        for end in (a, b)
     ]
     only = above[0].keys() ^ above[1].keys()
     return {(above[0] | above[1])[name] for name in only}

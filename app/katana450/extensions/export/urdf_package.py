@@ -147,10 +147,10 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
         for key, group in groups.items()
     }
     for (parent, element, _), key in zip(used, keys, strict=True):
-        at = list(parent).index(element)
+        index = list(parent).index(element)
         parent.remove(element)
         for k, (place, part) in enumerate(placed[key]):
-            parent.insert(at + k, _pointed(element, prefix + place, part.material, k))
+            parent.insert(index + k, _pointed(element, prefix + place, part.material, k))
     for k, (material, name) in enumerate(names.items()):
         root.insert(k, _material(name, material))
     _configure_mujoco(root)

@@ -79,9 +79,11 @@ def initial_objects(robot: Robot) -> tuple[PlacedObject, ...]:
     session = arm_session(Settings(), robot).session
     return tuple(
         PlacedObject(
-            each.name, each.T, shapes_of(Visual(frozen(np.eye(4)), ones, files[each.name]))
+            scene_object.name,
+            scene_object.T,
+            shapes_of(Visual(frozen(np.eye(4)), ones, files[scene_object.name])),
         )
-        for each in session.begin(session.ready, 0.0, 0.0).objects
+        for scene_object in session.begin(session.ready, 0.0, 0.0).objects
     )
 
 
@@ -105,18 +107,21 @@ def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]
             vertices = np.concatenate([shape.vertices for shape in link.shapes])
             points[link.name] = vertices @ T[:3, :3].T + T[:3, 3]
     everything = np.concatenate([*points.values(), np.zeros((1, 3))])
-    found = {name: fitted(everything, np.array(way)) for name, way in DIRECTIONS.items()}
+    cameras = {name: fitted(everything, np.array(way)) for name, way in DIRECTIONS.items()}
     if robot.arm is not None:
         last = robot.arm.chain.names[-1]
         behind = [
             points[link.name]
             for link in robot.links
             if link.name in points
-            and any(at.joint is not None and at.joint.name == last for at in robot.path_to(link))
+            and any(
+                ancestor.joint is not None and ancestor.joint.name == last
+                for ancestor in robot.path_to(link)
+            )
         ]
         if behind:
-            found[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
-    return found
+            cameras[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
+    return cameras
 
 
 SURFACE = "_surface"
@@ -146,7 +151,7 @@ class _Writing:
     def __init__(self, robot: Robot, objects: Sequence[PlacedObject], *, plain: bool) -> None:
         self.robot = robot
         self.names = VrmlNames(robot)
-        self.objects = self.names.objects([each.name for each in objects])
+        self.objects = self.names.objects([placed_object.name for placed_object in objects])
         self.plain = plain
         placed = [name for name, _ in self.objects.values()]
         self.surface = self.names.unused_suffix(SURFACE, placed)
@@ -170,10 +175,10 @@ def world_of(
     writing = _Writing(robot, objects, plain=plain)
     names = writing.names
     contents = [_link(writing, robot.links[0], values)]
-    for each in objects:
-        name, dressed = writing.objects[each.name]
-        shown = _dressed(writing, each.shapes, each.colour, name, dressed)
-        contents.append(Node("Transform", (*_pose(each.T), ("children", shown)), name))
+    for placed in objects:
+        name, dressed = writing.objects[placed.name]
+        shown = _dressed(writing, placed.shapes, placed.colour, name, dressed)
+        contents.append(Node("Transform", (*_pose(placed.T), ("children", shown)), name))
     nodes = [
         *_surroundings(robot, values),
         Node("Transform", (("rotation", Z_UP), ("children", contents))),
@@ -297,21 +302,21 @@ def _dressed(
 
     A plain world has the shapes as made alone.
     """
-    made = [_shape(writing, shape) for shape in shapes]
+    nodes = [_shape(writing, shape) for shape in shapes]
     if writing.plain:
-        return made
+        return nodes
     colours = (("diffuseColor", _rounded(colour, 4)), ("transparency", 0.0))
     paint: Node | Use = Node("Material", colours, dressed.paint)
     painted: list[Node] = []
-    for number, shape in enumerate(made):
+    for number, shape in enumerate(nodes):
         surface_name = f"{name}{writing.surface}{number}"
         look, (field, surface) = shape.fields
         assert isinstance(surface, Node)
-        made[number] = replace(shape, fields=(look, (field, replace(surface, name=surface_name))))
+        nodes[number] = replace(shape, fields=(look, (field, replace(surface, name=surface_name))))
         one = Node("Appearance", (("material", paint),))
         painted.append(Node("Shape", (("appearance", one), (field, Use(surface_name)))))
         paint = Use(dressed.paint)
-    choices: list[Node] = [_group(made), _group(painted)]
+    choices: list[Node] = [_group(nodes), _group(painted)]
     return [Node("Switch", (("whichChoice", 0), ("choice", choices)), dressed.appearance)]
 
 

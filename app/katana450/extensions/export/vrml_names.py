@@ -59,7 +59,9 @@ class VrmlNames:
         self.dressed: Mapping[str, NodeNames] = {
             name: NodeNames(next(unused), next(unused)) for name in shown
         }
-        self.appearances: Mapping[Material, str] = {each: next(unused) for each in ordered}
+        self.appearances: Mapping[Material, str] = {
+            appearance: next(unused) for appearance in ordered
+        }
         self.clock = next(unused)
         self.way = self.unused_suffix("_motion")
 
@@ -68,8 +70,8 @@ class VrmlNames:
 
         ``others``: names of the world beside those of the robot.
         """
-        taken = [name.lower() for name in (*self._made, *others)]
-        while any(f"{name}{suffix}" in other for name in taken for other in taken):
+        names = [name.lower() for name in (*self._made, *others)]
+        while any(f"{name}{suffix}" in other for name in names for other in names):
             suffix += "_"
         return suffix
 

@@ -106,25 +106,33 @@ def gripper_nodes(model: TouchModel) -> dict[str, NamedNode]:
     """Return the nodes of the pads of the gripper, which the files lack."""
 
     def pad(number: int) -> NamedNode:
-        def value(state: State, of: Callable[[PadPressure], FieldValue], none: FieldValue) -> Any:
+        def value(
+            state: State, measure: Callable[[PadPressure], FieldValue], none: FieldValue
+        ) -> Any:
             squeeze = model.squeeze(state)
-            return none if squeeze is None else of(squeeze.pads[number])
+            return none if squeeze is None else measure(squeeze.pads[number])
 
         no_pressure = [0.0] * (ROWS * COLUMNS)
         fields = {
-            "force": NamedField(Type.FLOAT, lambda state: value(state, lambda at: at.force, 0.0)),
+            "force": NamedField(
+                Type.FLOAT, lambda state: value(state, lambda pressure: pressure.force, 0.0)
+            ),
             "centre": NamedField(
                 Type.PAIR,
-                lambda state: value(state, lambda at: [*(at.centre or (0.0, 0.0))], [0.0, 0.0]),
+                lambda state: value(
+                    state, lambda pressure: [*(pressure.centre or (0.0, 0.0))], [0.0, 0.0]
+                ),
             ),
             "pressure": NamedField(
                 Type.FLOAT_LIST,
-                lambda state: value(state, lambda at: at.pressure.ravel().tolist(), no_pressure),
+                lambda state: value(
+                    state, lambda pressure: pressure.pressure.ravel().tolist(), no_pressure
+                ),
             ),
         }
         return NamedNode("Touch", f"link {model.pads[number].finger}", fields)
 
-    return {f"touch_{each.finger.split('_')[1]}": pad(n) for n, each in enumerate(model.pads)}
+    return {f"touch_{touched.finger.split('_')[1]}": pad(n) for n, touched in enumerate(model.pads)}
 
 
 AXIS_TOLERANCE = 1e-6
@@ -162,37 +170,39 @@ class VrmlNodes(Nodes):
                     fields=[
                         answers.Field(
                             field=field,
-                            type=each.type.value,
-                            value=each.read(state),
-                            settable=each.put is not None,
+                            type=named_field.type.value,
+                            value=named_field.read(state),
+                            settable=named_field.put is not None,
                         )
-                        for field, each in node.fields.items()
+                        for field, named_field in node.fields.items()
                     ],
                 )
                 for name, node in self._nodes(state).items()
             ]
         )
 
-    def read(self, state: State, asked: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
+    def read(self, state: State, names: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
         """Return the present values of the fields. Raises InputError for an unknown name."""
         return tuple(
             answers.Value(
-                node=each.node,
-                field=each.field,
-                value=self._field(state, each.node, each.field).read(state),
+                node=name.node,
+                field=name.field,
+                value=self._field(state, name.node, name.field).read(state),
             )
-            for each in asked
+            for name in names
         )
 
     def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
         """Return the command for all settings. Raises InputError with the reason of a refusal."""
         orders = FieldOrders(state)
-        for each in settings:
-            name = f"{each.node}.{each.field}"
-            field = self._field(state, each.node, each.field)
+        for setting in settings:
+            name = f"{setting.node}.{setting.field}"
+            field = self._field(state, setting.node, setting.field)
             if field.put is None:
                 raise InputError(field.why or f"{name} can be read but not set.")
-            field.put(orders, None if each.value is None else _fitting(name, field, each.value))
+            field.put(
+                orders, None if setting.value is None else _fitting(name, field, setting.value)
+            )
         self._check_carried(orders)
         commands = (*self._motion(orders), *orders.others)
         return commands[0] if len(commands) == 1 else cmd.Batch(commands)
@@ -217,23 +227,23 @@ class VrmlNodes(Nodes):
 
     def _check_carried(self, orders: FieldOrders) -> None:
         """Raise InputError if an object has no support after all moves."""
-        moves = [each for each in orders.others if isinstance(each, cmd.MoveObject)]
+        moves = [order for order in orders.others if isinstance(order, cmd.MoveObject)]
         objects = functools.reduce(with_moved_object, moves, orders.state).objects
-        for name in {each.name for each in moves}:
-            scene_object = next(each for each in objects if each.name == name)
+        for name in {order.name for order in moves}:
+            scene_object = next(candidate for candidate in objects if candidate.name == name)
             if is_loose(scene_object):
                 check_carried(self._surroundings.table, objects, scene_object)
 
     def _field(self, state: State, node: str, field: str) -> NamedField:
-        found = self._nodes(state).get(node)
-        if found is None:
+        named = self._nodes(state).get(node)
+        if named is None:
             raise InputError(
                 f"There is no node {node!r}. The request `query` of `world` lists all nodes."
             )
-        if field not in found.fields:
-            known = ", ".join(found.fields)
-            raise InputError(f"{node!r} is a {found.kind} with {known}; it has no field {field!r}.")
-        return found.fields[field]
+        if field not in named.fields:
+            known = ", ".join(named.fields)
+            raise InputError(f"{node!r} is a {named.kind} with {known}; it has no field {field!r}.")
+        return named.fields[field]
 
     def _nodes(self, state: State) -> Mapping[str, NamedNode]:
         names = tuple(scene_object.name for scene_object in state.objects)
@@ -268,8 +278,8 @@ class VrmlNodes(Nodes):
             return [*(value * axis).tolist()] if joint.slides else [*axis.tolist(), value]
 
         def put(orders: FieldOrders, value: FieldValue | None) -> None:
-            given = _given(name, value)
-            amount = _along(name, axis, given) if joint.slides else _about(name, axis, given)
+            numbers = _given(name, value)
+            amount = _along(name, axis, numbers) if joint.slides else _about(name, axis, numbers)
             if name in self._axes:
                 orders.axes[self._axes[name] + 1] = amount
             else:
@@ -331,11 +341,11 @@ Put = Callable[[FieldOrders, FieldValue | None], None]
 """A function that sets a field."""
 
 
-def _placed(of: str, pose: Callable[[State], FloatArray], move: Put, turn: Put) -> NamedNode:
+def _placed(owner: str, pose: Callable[[State], FloatArray], move: Put, turn: Put) -> NamedNode:
     """Return the Transform of something at ``pose`` (4, 4), which can be moved and turned."""
     return NamedNode(
         "Transform",
-        of,
+        owner,
         {
             "translation": NamedField(
                 Type.VECTOR, lambda state: [*pose(state)[:3, 3].tolist()], move
@@ -347,7 +357,7 @@ def _placed(of: str, pose: Callable[[State], FloatArray], move: Put, turn: Put) 
     )
 
 
-def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, NamedNode]:
+def _dress(name: str, owner: str, dressed: NodeNames, colour: Colour) -> dict[str, NamedNode]:
     """Return the Switch of a link or object, and the Material of its paint."""
 
     def put(trait: AppearanceTrait) -> Put:
@@ -360,7 +370,7 @@ def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, 
     return {
         dressed.appearance: NamedNode(
             "Switch",
-            of,
+            owner,
             {
                 "whichChoice": NamedField(
                     Type.INT,
@@ -371,7 +381,7 @@ def _dress(name: str, of: str, dressed: NodeNames, colour: Colour) -> dict[str, 
         ),
         dressed.paint: NamedNode(
             "Material",
-            of,
+            owner,
             {
                 "diffuseColor": NamedField(
                     Type.COLOR,
@@ -417,19 +427,19 @@ def _about(name: str, axis: FloatArray, rotation: list[float]) -> float:
     angle = rotation[3]
     if angle == 0.0:
         return 0.0
-    given = _unit(rotation[:3])
-    if given is None or float(np.linalg.norm(np.cross(axis, given))) > AXIS_TOLERANCE:
+    direction = _unit(rotation[:3])
+    if direction is None or float(np.linalg.norm(np.cross(axis, direction))) > AXIS_TOLERANCE:
         about = _shown(np.array(rotation[:3]))
         raise InputError(f"{name} turns about {_shown(axis)} and cannot turn about {about}.")
-    return angle if float(axis @ given) > 0.0 else -angle
+    return angle if float(axis @ direction) > 0.0 else -angle
 
 
 def _along(name: str, axis: FloatArray, translation: list[float]) -> float:
     """Return the distance [m] along ``axis``. Raises InputError for another direction."""
-    given = np.array(translation)
-    amount = float(axis @ given)
-    if float(np.linalg.norm(given - amount * axis)) > AXIS_TOLERANCE * max(abs(amount), 1.0):
-        raise InputError(f"{name} slides along {_shown(axis)} and cannot move to {_shown(given)}.")
+    vector = np.array(translation)
+    amount = float(axis @ vector)
+    if float(np.linalg.norm(vector - amount * axis)) > AXIS_TOLERANCE * max(abs(amount), 1.0):
+        raise InputError(f"{name} slides along {_shown(axis)} and cannot move to {_shown(vector)}.")
     return amount
 
 
@@ -437,22 +447,22 @@ def _shown(vector: FloatArray) -> str:
     return " ".join(f"{number + 0.0:g}" for number in np.round(vector, 6))
 
 
-def _rotation(name: str, given: list[float]) -> FloatArray:
+def _rotation(name: str, numbers: list[float]) -> FloatArray:
     """Return the matrix (3, 3) of a VRML rotation: an axis and an angle [rad]."""
-    if given[3] == 0.0:
+    if numbers[3] == 0.0:
         return np.eye(3)
-    axis = _unit(given[:3])
+    axis = _unit(numbers[:3])
     if axis is None:
         raise InputError(f"{name} cannot turn about an axis of length 0.")
-    return so3.exp(math.remainder(given[3], math.tau) * axis)
+    return so3.exp(math.remainder(numbers[3], math.tau) * axis)
 
 
-def _unit(given: list[float]) -> FloatArray | None:
+def _unit(numbers: list[float]) -> FloatArray | None:
     """Return the direction of a vector; None for a zero vector."""
-    largest = max(map(abs, given))
+    largest = max(map(abs, numbers))
     if largest == 0.0:
         return None
-    scaled = np.array([number / largest for number in given])
+    scaled = np.array([number / largest for number in numbers])
     return np.asarray(scaled / np.linalg.norm(scaled))
 
 

@@ -82,8 +82,10 @@ def listed_robots() -> dict[str, ListedRobot]:
             f"This version of {PACKAGE} has no list of robots. Install a newer one."
         ) from error
     repositories = _repositories()
-    found = [_listed(key, each, repositories) for key, each in sorted(descriptions.items())]
-    return {each.name: each for each in found}
+    robots = [
+        _listed(key, description, repositories) for key, description in sorted(descriptions.items())
+    ]
+    return {description.name: description for description in robots}
 
 
 def robot_named(name: str) -> ListedRobot:
@@ -91,14 +93,14 @@ def robot_named(name: str) -> ListedRobot:
 
     Raises ConfigurationError with the nearest names if there is none, or if it has no URDF.
     """
-    robots = {each.name: each for each in listed_robots().values() if each.urdf}
-    others = {each.name for each in listed_robots().values()} - set(robots)
+    robots = {robot.name: robot for robot in listed_robots().values() if robot.urdf}
+    others = {robot.name for robot in listed_robots().values()} - set(robots)
     wanted = _plain(name)
     wanted = _plain(ALIASES.get(wanted, wanted))
-    by_plain = {_plain(each): each for each in robots}
+    by_plain = {_plain(listed): listed for listed in robots}
     if wanted in by_plain:
         return robots[by_plain[wanted]]
-    known = {_plain(each.robot): each for each in reversed(robots.values())}
+    known = {_plain(robot.robot): robot for robot in reversed(robots.values())}
     if wanted in known:
         return known[wanted]
     if wanted in map(_plain, others):
@@ -106,7 +108,7 @@ def robot_named(name: str) -> ListedRobot:
     else:
         problem = f"The gallery has no robot {name!r}."
     near = get_close_matches(wanted, (*by_plain, *known), MAX_SUGGESTIONS, SIMILAR)
-    names = dict.fromkeys(by_plain.get(each) or known[each].name for each in near)
+    names = dict.fromkeys(by_plain.get(plain) or known[plain].name for plain in near)
     hint = f" Nearest names: {', '.join(names)}." if names else ""
     raise ConfigurationError(f"{problem}{hint} `katana450 arms` lists all.")
 
@@ -130,10 +132,10 @@ def _listed(key: str, description: Any, repositories: Mapping[str, Any]) -> List
 def _repositories() -> Mapping[str, Any]:
     """Return the repositories of the package by name; none if this version keeps them elsewhere."""
     try:
-        found: Mapping[str, Any] = import_module(f"{PACKAGE}._repositories").REPOSITORIES
+        repositories: Mapping[str, Any] = import_module(f"{PACKAGE}._repositories").REPOSITORIES
     except (ImportError, AttributeError):
         return {}
-    return found
+    return repositories
 
 
 def _plain(name: str) -> str:
@@ -190,8 +192,8 @@ def _downloaded(robot: ListedRobot) -> ModuleType:
 
 def _reason(error: Exception) -> str:
     lines = [line.strip() for line in str(error).splitlines()]
-    told = [line for line in lines if "fatal:" in line or "error:" in line]
-    text = (told or [line for line in lines if line] or [type(error).__name__])[-1]
+    errors = [line for line in lines if "fatal:" in line or "error:" in line]
+    text = (errors or [line for line in lines if line] or [type(error).__name__])[-1]
     text = re.sub(r"^(stderr:\s*)?['\"]*(fatal|error):\s*", "", text).strip("'\" .")
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -244,15 +246,17 @@ def arms(options: Namespace) -> int:
         print(file_of(robot))
         print(f"katana450: {credit(robot)}", file=sys.stderr)
         return 0
-    robots = [each for each in listed_robots().values() if each.urdf]
+    robots = [listed for listed in listed_robots().values() if listed.urdf]
     if options.find is not None:
         word = options.find.lower()
         robots = [
-            each for each in robots if word in f"{each.name} {each.robot} {each.maker}".lower()
+            listed
+            for listed in robots
+            if word in f"{listed.name} {listed.robot} {listed.maker}".lower()
         ]
         if not robots:
             raise ConfigurationError(f"No robot of the gallery has {options.find!r} in its name.")
-    rows = [(each.name, each.robot, each.maker, each.licence) for each in robots]
+    rows = [(listed.name, listed.robot, listed.maker, listed.licence) for listed in robots]
     rows.insert(0, ("NAME", "ROBOT", "MAKER", "LICENCE"))
     widths = [max(len(row[column]) for row in rows) for column in range(3)]
     for row in rows:

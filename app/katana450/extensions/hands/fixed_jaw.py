@@ -59,8 +59,12 @@ class FixedJaw:
         T = item.T.copy()
         T[:2, 3] -= TOUCH_DISTANCE * y[:2]
         pushed = replace(item, T=frozen(T))
-        others = [each for each in state.objects if each is not item and not each.carried]
-        blocked = any(_overlaps_more(pushed, item, each) for each in others)
+        others = [
+            neighbour
+            for neighbour in state.objects
+            if neighbour is not item and not neighbour.carried
+        ]
+        blocked = any(_overlaps_more(pushed, item, neighbour) for neighbour in others)
         return name, distance, None if blocked else pushed
 
     def _nearest(
@@ -73,14 +77,16 @@ class FixedJaw:
         y: (3,) as ``y`` of this jaw, in the base frame.
         """
         number, placed = [part.name for part in world.parts].index(name), world.at(x)
-        found = MAX_PUSH, self.name
+        nearest = MAX_PUSH, self.name
         for pair in placed.nearer_than(MAX_PUSH)[0].tolist():
-            one, other = (int(world.part_of[each[pair]]) for each in (world.first, world.second))
+            one, other = (
+                int(world.part_of[bodies[pair]]) for bodies in (world.first, world.second)
+            )
             if other == number and world.parts[one].mover == self.palm:
                 contact = placed.contact(pair)
                 if float(contact.normal @ y) >= MIN_FACE_COSINE:
-                    found = min(found, (contact.distance, contact.parts[0]))
-        return found
+                    nearest = min(nearest, (contact.distance, contact.parts[0]))
+        return nearest
 
 
 def _overlaps_more(pushed: SceneObject, item: SceneObject, other: SceneObject) -> bool:
@@ -94,5 +100,8 @@ def _overlaps_more(pushed: SceneObject, item: SceneObject, other: SceneObject) -
 
 def _gap(one: SceneObject, other: SceneObject) -> float:
     """Return the distance [m] of two objects that are not held; negative if they overlap."""
-    shapes = ((each.collision_shape, each.T_collision_shape) for each in (one, other))
+    shapes = (
+        (scene_object.collision_shape, scene_object.T_collision_shape)
+        for scene_object in (one, other)
+    )
     return distance(placement(*shapes), 0, 1)

@@ -104,7 +104,7 @@ def with_sides(world: CollisionWorld, hand: Hand) -> Hand:
     return replace(
         hand,
         gripper=sides.gripper,
-        sides=tuple(tuple(part.name for part in each) for each in sides.parts if each),
+        sides=tuple(tuple(part.name for part in side) for side in sides.parts if side),
         fixed_jaw=None if jaw is None else FixedJaw(jaw.name, hand.palm, sides.y),
     )
 
@@ -178,7 +178,11 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
     )
     main = max(moved, key=lambda mover: _length(moved[mover]), default=None)
     palm = [part for part in world.parts if part.mover == hand.palm]
-    if main is None or not palm or any(_astray(each, moved[main]) for each in moved.values()):
+    if (
+        main is None
+        or not palm
+        or any(_astray(candidate, moved[main]) for candidate in moved.values())
+    ):
         raise refusal
     fixed = PlacedBodies(world, palm, hand.palm, hand.gripper.lower)
 
@@ -193,18 +197,18 @@ def _of_one_jaw(world: CollisionWorld, hand: Hand, groups: Groups, moved: Motion
     facing = (
         fixed.nearest(tip(closed + fraction * (opened - closed))) for fraction in FACE_FRACTIONS
     )
-    found = next((each for each in facing if each.distance >= MIN_TIP_DISTANCE), None)
-    if found is None or apart(closed) > MAX_FACE_GAP or apart(opened) - apart(closed) < MIN_STROKE:
+    jaw = next((candidate for candidate in facing if candidate.distance >= MIN_TIP_DISTANCE), None)
+    if jaw is None or apart(closed) > MAX_FACE_GAP or apart(opened) - apart(closed) < MIN_STROKE:
         raise refusal
-    y = snapped(found.points[0] - found.points[1], frames_of(hand), float(SNAP_COSINE), None)
+    y = snapped(jaw.points[0] - jaw.points[1], frames_of(hand), float(SNAP_COSINE), None)
     moving = [*groups[main], *(part for m in moved if m != main for part in groups[m])]
 
     def far(part: Part) -> float:
         bodies = PlacedBodies(world, [part], hand.palm, closed)
-        return bodies.nearest(found.points[1]).distance
+        return bodies.nearest(jaw.points[1]).distance
 
     name = min(palm, key=far).name
-    places = JawPlaces(name, float(found.points[1] @ y), tip(closed), tip(opened))
+    places = JawPlaces(name, float(jaw.points[1] @ y), tip(closed), tip(opened))
     return Sides(((), tuple(moving)), ((), tuple(groups[main])), y, gripper, places)
 
 

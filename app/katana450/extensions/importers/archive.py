@@ -34,24 +34,25 @@ class Companions:
         self.used: dict[str, None] = {}
         self.missing: dict[str, None] = {}
 
-    def find(self, urls: Iterable[str], beside: str = "") -> tuple[str, bytes] | None:
+    def find(self, urls: Iterable[str], naming_file: str = "") -> tuple[str, bytes] | None:
         """Return path and content of the first of ``urls`` that is there.
 
-        They are named in the file at path ``beside``, the main file if it is left out. A file in
-        another folder of the upload counts if its name is unique, because browsers drop the folders
-        of chosen files. Returns None, and lists the names in ``missing``, without such a file.
+        They are named in the file at path ``naming_file``, the main file if it is left out. A file
+        in another folder of the upload counts if its name is unique, because browsers drop the
+        folders of chosen files. Returns None, and lists the names in ``missing``, without such a
+        file.
         """
         names: list[str] = []
         for url in urls:
             if SCHEME.match(url):
                 names.append(url)
                 continue
-            folder = posixpath.dirname(beside or self._main)
+            folder = posixpath.dirname(naming_file or self._main)
             wanted = [
                 posixpath.normpath(posixpath.join(folder, name.replace("\\", "/")))
                 for name in dict.fromkeys((url, unquote(url)))
             ]
-            for path in (*wanted, *(self._alike(path, beside) for path in wanted)):
+            for path in (*wanted, *(self._alike(path, naming_file) for path in wanted)):
                 if path in self._files:
                     self.used[path] = None
                     return path, self._files[path]
@@ -59,15 +60,17 @@ class Companions:
         self.missing |= dict.fromkeys(names)
         return None
 
-    def _alike(self, path: str, beside: str) -> str:
+    def _alike(self, path: str, naming_file: str) -> str:
         """Return the only path with the same name in any folder and case; empty without one.
 
         Neither the main file nor the one that names it is meant.
         """
         name = posixpath.basename(path).casefold()
-        others = self._files.keys() - {self._main, beside}
-        found = [each for each in others if posixpath.basename(each).casefold() == name]
-        return found[0] if len(found) == 1 and name else ""
+        others = self._files.keys() - {self._main, naming_file}
+        matches = [
+            candidate for candidate in others if posixpath.basename(candidate).casefold() == name
+        ]
+        return matches[0] if len(matches) == 1 and name else ""
 
 
 def is_inside(path: str) -> bool:
@@ -166,8 +169,8 @@ def unpacked(
 
     Raises ChoiceError if there are several, and InputError for a .zip that cannot be read.
     """
-    shapes = tuple(f".{each}" for each in suffixes)
-    endings = (*shapes, *(f".{each}" for each in COMPANION_SUFFIXES))
+    shapes = tuple(f".{suffix}" for suffix in suffixes)
+    endings = (*shapes, *(f".{suffix}" for suffix in COMPANION_SUFFIXES))
 
     def wanted(file: str) -> str | None:
         if file == SCENE:
@@ -195,9 +198,9 @@ def _main(listed: list[str], files: Mapping[str, bytes], name: str, main: str) -
     depth = min(path.count("/") for path in free)
     top = [path for path in free if path.count("/") == depth]
     alike = [path for path in top if _stem(path) == _stem(name)]
-    for found in (top, alike):
-        if len(found) == 1:
-            return found[0]
+    for candidates in (top, alike):
+        if len(candidates) == 1:
+            return candidates[0]
     few = ", ".join(posixpath.basename(path) for path in top[:8])
     more = f" and {len(top) - 8} more" if len(top) > 8 else ""
     raise ChoiceError(f"There are several shapes: choose one of {few}{more}.", top)
@@ -210,9 +213,9 @@ def _stem(path: str) -> str:
 def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
     """Return those names of the shape files ``listed`` that are in the text of another file."""
     names = {posixpath.basename(path).casefold() for path in listed}
-    endings = "|".join(sorted({re.escape(posixpath.splitext(each)[1]) for each in names}))
+    endings = "|".join(sorted({re.escape(posixpath.splitext(file)[1]) for file in names}))
     pattern = re.compile(f"({endings})\\b".encode(), re.IGNORECASE)
-    found: set[str] = set()
+    named: set[str] = set()
     for path, content in files.items():
         if not path.lower().endswith(NAMING):
             continue
@@ -220,10 +223,10 @@ def _named(files: Mapping[str, bytes], listed: Iterable[str]) -> set[str]:
             before = content[max(match.end() - LONGEST_NAME, 0) : match.end()]
             word = re.split(r"[\"'/\\\\\n]", before.decode("utf-8", "replace"))[-1].casefold()
             # An OBJ file names its materials after a blank.
-            found |= {word, word.rpartition(" ")[2]} & (
+            named |= {word, word.rpartition(" ")[2]} & (
                 names - {posixpath.basename(path).casefold()}
             )
-    return found
+    return named
 
 
 def packed(main: str, files: Mapping[str, bytes]) -> bytes:

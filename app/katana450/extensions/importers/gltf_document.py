@@ -201,23 +201,23 @@ def decoded(data: bytes, name: str) -> tuple[Document, bytes | None]:
 
 def _chunks(data: bytes, name: str) -> tuple[bytes, bytes | None]:
     """Return the document and the buffer of a .glb; other chunks are ignored."""
-    found: dict[bytes, bytes] = {}
-    at = 12
-    version, length = struct.unpack_from("<II", data, 4) if len(data) >= at else (2, at)
+    chunks: dict[bytes, bytes] = {}
+    offset = 12
+    version, length = struct.unpack_from("<II", data, 4) if len(data) >= offset else (2, offset)
     if version != 2:
         raise InputError(_other_version(str(version), name))
     if length > len(data):
         raise InputError(f"{name} is corrupt or not GLB 2.0: it is shorter than its header says.")
     data = data[:length]
-    while at + 8 <= len(data):
-        size, kind = struct.unpack_from("<I4s", data, at)
-        if at + 8 + size > len(data):
+    while offset + 8 <= len(data):
+        size, kind = struct.unpack_from("<I4s", data, offset)
+        if offset + 8 + size > len(data):
             raise InputError(f"{name} is corrupt: it ends within a chunk.")
-        found.setdefault(kind, data[at + 8 : at + 8 + size])
-        at += 8 + size
-    if b"JSON" not in found:
+        chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
+        offset += 8 + size
+    if b"JSON" not in chunks:
         raise InputError(f"{name} is corrupt: it has no JSON chunk.")
-    return found[b"JSON"], found.get(b"BIN\0")
+    return chunks[b"JSON"], chunks.get(b"BIN\0")
 
 
 def _other_version(version: str, name: str) -> str:
@@ -279,9 +279,9 @@ class Buffers:
         data = self._view(part.buffer_view)
         decoder = library("DracoPy", "meshes", "glTF files with Draco compression")
         with failures_in_words(self._name):
-            found = decoder.decode(data)
-            by_id = {each["unique_id"]: each["data"] for each in found.attributes}
-            faces = np.asarray(getattr(found, "faces", np.zeros((0, 3), np.uint32)))
+            mesh = decoder.decode(data)
+            by_id = {attribute["unique_id"]: attribute["data"] for attribute in mesh.attributes}
+            faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3), np.uint32)))
         attributes = {
             name: np.asarray(by_id[number]).reshape(len(by_id[number]), -1)
             for name, number in part.attributes.items()
@@ -358,10 +358,10 @@ class Buffers:
             except (binascii.Error, ValueError) as error:
                 raise self.broken(f"a buffer is not base64: {error}") from error
             return unquote_to_bytes(content)
-        found = self._companions.find([uri])
-        if found is None:
+        companion = self._companions.find([uri])
+        if companion is None:
             raise InputError(
                 f"{self._name} has its shapes in another file, {uri[:60]!r}, which is not there. "
                 "Add both together, as their folder or as a .zip; or save it as .glb."
             )
-        return found[1]
+        return companion[1]

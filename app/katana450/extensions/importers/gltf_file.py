@@ -125,12 +125,12 @@ class _File:
         mode, own = primitive.mode, None
         draco = primitive.extensions.draco
         if draco is not None:
-            found, index = self._buffers.draco(draco)
-            if found.get("POSITION", index).shape[1:] != (3,):
+            attributes, index = self._buffers.draco(draco)
+            if attributes.get("POSITION", index).shape[1:] != (3,):
                 raise self._buffers.broken("compressed vertices do not have three coordinates")
-            points = self._buffers.scaled(found["POSITION"], primitive.attributes["POSITION"])
-            if "COLOR_0" in found and "COLOR_0" in primitive.attributes:
-                own = self._buffers.scaled(found["COLOR_0"], primitive.attributes["COLOR_0"])
+            points = self._buffers.scaled(attributes["POSITION"], primitive.attributes["POSITION"])
+            if "COLOR_0" in attributes and "COLOR_0" in primitive.attributes:
+                own = self._buffers.scaled(attributes["COLOR_0"], primitive.attributes["COLOR_0"])
             mode = TRIANGLES
         else:
             points = self._buffers.numbers(primitive.attributes["POSITION"], 3)

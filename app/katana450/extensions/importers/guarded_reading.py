@@ -58,7 +58,7 @@ class ShapeReading:
     missing: tuple[str, ...] = ()
 
 
-Beside = Callable[[str, int], bytes | None]
+ReadCompanion = Callable[[str, int], bytes | None]
 """A function that returns the content of a file by its path in the folder of the shape file, up to
 one byte more than a maximum; None if it is not there.
 """
@@ -72,12 +72,12 @@ def read_shape_guarded(
     up: Up | None = None,
     *,
     main: str = "",
-    beside: Beside | None = None,
+    companion: ReadCompanion | None = None,
 ) -> tuple[ShapeFile, ConvexBody]:
     """Return the result of `read_shape`, and its convex body, from a subprocess.
 
     The subprocess has `SECONDS` of processor time and, where the system supports it,
-    `MAX_MEMORY_BYTES`. ``beside`` is asked for the files that the file names; their paths never
+    `MAX_MEMORY_BYTES`. ``companion`` is asked for the files that the file names; their paths never
     lead out of its folder. Then the file is read again with them. Raises InputError as
     `read_shape`, at these limits, and after a crash; and the error of a `checkpoint`, which ends
     the subprocess.
@@ -91,7 +91,7 @@ def read_shape_guarded(
     # What a .zip names is in it.
     for _ in range(0 if format is Format.ZIP else MAX_PASSES):
         left = MAX_FILE_BYTES - len(data) - sum(map(len, companions.values()))
-        more = _companions(answer, beside, companions.keys() | {own}, file, left)
+        more = _companions(answer, companion, companions.keys() | {own}, file, left)
         if not more:
             break
         companions |= more
@@ -105,20 +105,20 @@ def read_shape_guarded(
 
 
 def _companions(
-    answer: ShapeReading, beside: Beside | None, known: set[str], file: str, left: int
+    answer: ShapeReading, companion: ReadCompanion | None, known: set[str], file: str, left: int
 ) -> dict[str, bytes]:
     """Return those files beside a file that it names and that are not ``known`` yet.
 
     Raises InputError once they have more than ``left`` bytes; no further one is then read.
     """
-    if beside is None:
+    if companion is None:
         return {}
     paths = [path for path in answer.missing if is_inside(path) and path not in known]
     if len(paths) + len(known) > MAX_COMPANIONS:
         raise InputError(f"{file} names more than {MAX_COMPANIONS} other files.")
     contents: dict[str, bytes] = {}
     for path in paths:
-        content = beside(path, left)
+        content = companion(path, left)
         if content is None:
             continue
         contents[path] = content

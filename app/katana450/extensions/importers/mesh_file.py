@@ -11,7 +11,7 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.convex_body import ConvexBody
-from katana450.extensions.importers.guarded_reading import Beside, read_shape_guarded
+from katana450.extensions.importers.guarded_reading import ReadCompanion, read_shape_guarded
 from katana450.extensions.importers.shape_file import (
     UNITS,
     Format,
@@ -33,7 +33,7 @@ def read_mesh(
     up: Up | None = None,
     *,
     main: str = "",
-    beside: Beside | None = None,
+    companion: ReadCompanion | None = None,
 ) -> Mesh:
     """Return the mesh in a file, read in a subprocess within some seconds.
 
@@ -43,13 +43,13 @@ def read_mesh(
         unit: a key of UNITS; None to guess it.
         up: axis that points up, as in `read_shape`.
         main: path of the shape file in a .zip, as in `read_shape`.
-        beside: returns the content of a file in the same folder, as in `read_shape_guarded`.
+        companion: returns the content of a file in the same folder, as in `read_shape_guarded`.
 
     Raises InputError with the defect of the file.
     """
     format = Format.of(file)
     metres = None if unit is None else unit_of(unit)
-    shape, found = read_shape_guarded(data, format, file, metres, up, main=main, beside=beside)
+    shape, body = read_shape_guarded(data, format, file, metres, up, main=main, companion=companion)
     sign = next(sign for sign, length in UNITS.items() if length == shape.unit)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
     foot = np.array((*(0.5 * (low + high)[:2]), low[2]))
@@ -65,8 +65,8 @@ def read_mesh(
         shape.vertices - foot,
         shape.faces,
         shape.colours,
-        Solid(key, (x, y, z), found.corners - foot),
-        f"{shape.text} {_counted(shape, found)}",
+        Solid(key, (x, y, z), body.corners - foot),
+        f"{shape.text} {_counted(shape, body)}",
         shape.scale,
     )
 
@@ -78,14 +78,14 @@ def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) ->
     """
     folder = path.resolve().parent
 
-    def beside(name: str, maximum: int) -> bytes | None:
-        found = (folder / name).resolve()
-        if not found.is_relative_to(folder) or not found.is_file():
+    def companion(name: str, maximum: int) -> bytes | None:
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder) or not file.is_file():
             return None
-        return content_of(found, maximum)
+        return content_of(file, maximum)
 
     content = content_of(path, Format.of(path.name).max_bytes)
-    return read_mesh(content, path.name, unit, up, beside=beside)
+    return read_mesh(content, path.name, unit, up, companion=companion)
 
 
 def content_of(path: Path, maximum: int) -> bytes:
@@ -104,16 +104,16 @@ def unit_of(sign: str) -> float:
     return UNITS[sign]
 
 
-def _counted(shape: ShapeFile, found: ConvexBody) -> str:
+def _counted(shape: ShapeFile, body: ConvexBody) -> str:
     """Return a sentence on the convex hull that stands for the mesh in collision checks."""
     notes = ["Collision checks use its convex hull"]
-    if found.thickened:
+    if body.thickened:
         notes.append("it is flat, so the hull is made slightly thick")
-    if found.off > HULL_DISTANCE_TO_REPORT:
-        notes.append(f"the hull is simplified and reaches up to {1e3 * found.off:.1f} mm beyond it")
+    if body.off > HULL_DISTANCE_TO_REPORT:
+        notes.append(f"the hull is simplified and reaches up to {1e3 * body.off:.1f} mm beyond it")
     volume = _volume(shape)
-    if volume is not None and found.volume > HULL_VOLUME_RATIO_TO_REPORT * volume:
-        notes.append(f"its hollows count as filled: {found.volume / volume:.1f} times its volume")
+    if volume is not None and body.volume > HULL_VOLUME_RATIO_TO_REPORT * volume:
+        notes.append(f"its hollows count as filled: {body.volume / volume:.1f} times its volume")
     return "; ".join(notes) + "."
 
 

@@ -33,7 +33,7 @@ def read_mtl(text: str) -> tuple[dict[str, Material], bool]:
 
     Lines that are no MTL are ignored, because a surface without its colours is still a surface.
     """
-    found: dict[str, Material] = {}
+    materials: dict[str, Material] = {}
     name, has_pictures = None, False
     for line in text.splitlines():
         words = line.partition("#")[0].split()
@@ -42,29 +42,29 @@ def read_mtl(text: str) -> tuple[dict[str, Material], bool]:
         kind = words[0].lower()
         if kind == "newmtl":
             name = line.split(None, 1)[1].strip()
-            found[name] = PLAIN
+            materials[name] = PLAIN
         elif name is not None and kind in ("kd", "d", "tr"):
             numbers = _numbers(words[1:])
-            red, green, blue, opacity = found[name]
+            red, green, blue, opacity = materials[name]
             if kind == "kd" and numbers:
                 # A single number stands for grey.
                 red, green, blue = numbers[:3] if len(numbers) >= 3 else (numbers[0],) * 3
             elif numbers:
                 opacity = numbers[-1] if kind == "d" else 1.0 - numbers[-1]
-            found[name] = (red, green, blue, opacity)
+            materials[name] = (red, green, blue, opacity)
         has_pictures |= kind.startswith("map_")
-    return found, has_pictures
+    return materials, has_pictures
 
 
 def _numbers(words: list[str]) -> list[float]:
     """Return the finite numbers among ``words``, such as those after the option -halo."""
-    found: list[float] = []
+    numbers: list[float] = []
     for word in words:
         try:
-            found.append(float(word))
+            numbers.append(float(word))
         except ValueError:
             continue
-    return [number for number in found if math.isfinite(number)]
+    return [number for number in numbers if math.isfinite(number)]
 
 
 IGNORED_STATEMENTS = frozenset(
@@ -93,13 +93,13 @@ LEFT_OUT = {
 
 def read_obj(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
     """Return all polygons. Raises InputError with the line of an invalid statement."""
-    found = _Lines(name, companions or Companions())
+    lines = _Lines(name, companions or Companions())
     text = plain_text(data).replace("\r\n", "\n").replace("\\\n", " ")
     for number, line in enumerate(text.split("\n"), 1):
         words = line.partition("#")[0].split()
         if words:
-            found.take(words, number)
-    return found.reading()
+            lines.take(words, number)
+    return lines.reading()
 
 
 def plain_text(data: bytes) -> str:
@@ -165,11 +165,11 @@ class _Lines:
         whole = " ".join(words)
         is_list = all(word.lower().endswith(".mtl") for word in words)
         for name in words if is_list else [whole]:
-            found = self._companions.find([name])
-            if found is None or found[0] in self._read:
+            companion = self._companions.find([name])
+            if companion is None or companion[0] in self._read:
                 continue
-            self._read.add(found[0])
-            materials, has_pictures = read_mtl(plain_text(found[1]))
+            self._read.add(companion[0])
+            materials, has_pictures = read_mtl(plain_text(companion[1]))
             self._materials |= materials
             if has_pictures:
                 self._left_out["pictures on the surface"] += 1

@@ -73,13 +73,13 @@ def read_ply(data: bytes, name: str) -> MeshReading:
     """Return all faces. Raises InputError for an invalid file."""
     order, elements, body = _header(data, name)
     numbers = _Numbers(body, order, name)
-    found: dict[str, dict[str, Column]] = {}
+    tables: dict[str, dict[str, Column]] = {}
     for element in elements:
         # Some programs declare elements after the faces that they do not write.
-        if found.keys() >= {"vertex", "face"}:
+        if tables.keys() >= {"vertex", "face"}:
             break
-        found[element.name] = numbers.columns(element)
-    vertices, faces = found.get("vertex", {}), found.get("face", {})
+        tables[element.name] = numbers.columns(element)
+    vertices, faces = tables.get("vertex", {}), tables.get("face", {})
     if not all(axis in vertices and vertices[axis].sizes is None for axis in "xyz"):
         raise InputError(f"{name} has no vertices with x, y and z.")
     points = np.column_stack([doubles(vertices[axis].values) for axis in "xyz"])
@@ -143,10 +143,10 @@ def _header(data: bytes, name: str) -> tuple[str, list[Element], bytes]:
 
 def _paint(columns: dict[str, Column]) -> FloatArray | None:
     """Return colours (rows, 4) 0..1, scaled by the type of the numbers; None without colours."""
-    found = [columns[key] for key in PAINT if key in columns and columns[key].sizes is None]
-    if len(found) < 3:
+    paint = [columns[key] for key in PAINT if key in columns and columns[key].sizes is None]
+    if len(paint) < 3:
         return None
-    parts = [doubles(each.values) / (1.0 if each.numbers[0] == "f" else 255.0) for each in found]
+    parts = [doubles(part.values) / (1.0 if part.numbers[0] == "f" else 255.0) for part in paint]
     return np.column_stack([*parts, np.ones(len(parts[0]))][:4])
 
 
@@ -167,53 +167,53 @@ class _Numbers:
         if not (element.rows and properties):
             empty = np.zeros(0, dtype=np.int64)
             return {
-                each.name: Column(empty, None if each.counts is None else empty, each.numbers)
-                for each in properties
+                column.name: Column(empty, None if column.counts is None else empty, column.numbers)
+                for column in properties
             }
         columns = self._alike(element)
         if columns is not None:
             return columns
-        rows = [[self._next(each) for each in properties] for _ in range(element.rows)]
+        rows = [[self._next(column) for column in properties] for _ in range(element.rows)]
         return {
-            each.name: Column(
+            column.name: Column(
                 np.concatenate(values),
-                None if each.counts is None else np.array([len(row) for row in values]),
-                each.numbers,
+                None if column.counts is None else np.array([len(row) for row in values]),
+                column.numbers,
             )
-            for each, values in zip(properties, zip(*rows, strict=True), strict=True)
+            for column, values in zip(properties, zip(*rows, strict=True), strict=True)
         }
 
     def _alike(self, element: Element) -> dict[str, Column] | None:
         """Return the columns if the lists of all rows are as long as those of the first row."""
         start = self._at
-        lengths = [len(self._next(each)) for each in element.properties]
+        lengths = [len(self._next(column)) for column in element.properties]
         self._at = start
         fields: list[tuple[Any, ...]] = []
-        for n, (each, length) in enumerate(zip(element.properties, lengths, strict=True)):
-            if each.counts is not None:
-                fields.append((f"count {n}", self._kind(each.counts)))
-            fields.append((f"value {n}", self._kind(each.numbers), (length,)))
+        for n, (column, length) in enumerate(zip(element.properties, lengths, strict=True)):
+            if column.counts is not None:
+                fields.append((f"count {n}", self._kind(column.counts)))
+            fields.append((f"value {n}", self._kind(column.numbers), (length,)))
         kind = np.dtype(fields)
         if kind.itemsize * element.rows > len(self._body) - start:
             return None
         table = np.frombuffer(self._body, kind, element.rows, start)
         columns: dict[str, Column] = {}
-        for n, (each, length) in enumerate(zip(element.properties, lengths, strict=True)):
-            sizes = None if each.counts is None else np.full(element.rows, length)
+        for n, (column, length) in enumerate(zip(element.properties, lengths, strict=True)):
+            sizes = None if column.counts is None else np.full(element.rows, length)
             if sizes is not None and (table[f"count {n}"] != length).any():
                 return None
-            columns[each.name] = Column(table[f"value {n}"].ravel(), sizes, each.numbers)
+            columns[column.name] = Column(table[f"value {n}"].ravel(), sizes, column.numbers)
         self._at += kind.itemsize * element.rows
         return columns
 
-    def _next(self, each: Property) -> npt.NDArray[Any]:
+    def _next(self, column: Property) -> npt.NDArray[Any]:
         """Return the next value or list of values."""
         count = 1.0
-        if each.counts is not None:
-            count = float(self._take(each.counts, 1)[0])
+        if column.counts is not None:
+            count = float(self._take(column.counts, 1)[0])
             if not (0.0 <= count <= len(self._body) and count == int(count)):
                 raise InputError(f"{self._name} is corrupt: a list has no length.")
-        return self._take(each.numbers, int(count))
+        return self._take(column.numbers, int(count))
 
     def _take(self, numbers: str, count: int) -> npt.NDArray[Any]:
         kind = self._kind(numbers)

@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> None:
     """Read one file. The process fails only at the limits of memory and time."""
     bind()
     format, name, unit, up, chosen = arguments
-    found = answer(
+    reading = answer(
         sys.stdin.buffer.read(),
         Format(format),
         name,
@@ -38,7 +38,7 @@ def main(arguments: list[str]) -> None:
         Up(up) if up else None,
         chosen,
     )
-    sys.stdout.buffer.write(encoded(found))
+    sys.stdout.buffer.write(encoded(reading))
 
 
 def answer(

@@ -60,7 +60,7 @@ def written(scene: Scene, files: Mapping[str, MeshFile], T_palm_tool: FloatArray
     """Return the text of a scene. ``files`` are the files of its meshes by their keys."""
     entry: dict[str, object] = {"scene": VERSION}
     if scene.joints is not None:
-        entry["joints"] = [_round(each, ANGLE_DIGITS) for each in np.degrees(scene.joints)]
+        entry["joints"] = [_round(angle, ANGLE_DIGITS) for angle in np.degrees(scene.joints)]
     if scene.water is not None:
         entry["water"] = _round(scene.water / ML, LENGTH_DIGITS)
     entry["objects"] = [
@@ -79,7 +79,7 @@ class _Dumper(yaml.SafeDumper):  # type: ignore[misc]  # PyYAML has no types
 
     def represent_list(self, data: list[object]) -> yaml.Node:
         """Return the node of a list; a list of numbers is on one line."""
-        plain = all(isinstance(each, int | float) for each in data)
+        plain = all(isinstance(number, int | float) for number in data)
         return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=plain)
 
 
@@ -94,17 +94,17 @@ def _object_entry(
     if scene_object.fixed and T_palm_tool is not None:
         T = se3.inverse(T_palm_tool) @ T
     if scene_object.solid is None:
-        entry["size"] = [_round(1e3 * each, LENGTH_DIGITS) for each in scene_object.size]
+        entry["size"] = [_round(1e3 * number, LENGTH_DIGITS) for number in scene_object.size]
     else:
         file = files[scene_object.solid.key]
         values = {"file": file.path, "unit": file.unit, "up": file.up, "sha256": file.sha256}
-        entry["mesh"] = {name: each for name, each in values.items() if each is not None}
+        entry["mesh"] = {name: fact for name, fact in values.items() if fact is not None}
     entry["pose"] = [
-        *(_round(1e3 * each, LENGTH_DIGITS) for each in T[:3, 3]),
-        *(_round(each, ANGLE_DIGITS) for each in np.degrees(so3.to_rpy(T[:3, :3]))),
+        *(_round(1e3 * number, LENGTH_DIGITS) for number in T[:3, 3]),
+        *(_round(number, ANGLE_DIGITS) for number in np.degrees(so3.to_rpy(T[:3, :3]))),
     ]
     scale, opacity = (
-        float(f"{each:.12g}") for each in (scene_object.scale, scene_object.appearance.opacity)
+        float(f"{number:.12g}") for number in (scene_object.scale, scene_object.appearance.opacity)
     )
     if scale != 1.0:
         entry["scale"] = scale
@@ -190,10 +190,10 @@ def read_scene_folder(path: Path, T_palm_tool: FloatArray | None) -> StoredScene
     folder = path.resolve().parent
 
     def opened(name: str, maximum: int) -> bytes:
-        found = (folder / name).resolve()
-        if not found.is_relative_to(folder):
+        file = (folder / name).resolve()
+        if not file.is_relative_to(folder):
             raise InputError(f"{name} is not in the folder of the scene.")
-        return content_of(found, maximum)
+        return content_of(file, maximum)
 
     try:
         if path.suffix.lower() == ".zip":
@@ -242,16 +242,16 @@ def _stored(
     }
     meshes: dict[MeshFile, Mesh] = {}
     problems: list[Problem] = []
-    for file, at in reversed(mesh_files.items()):
+    for file, source in reversed(mesh_files.items()):
         try:
             meshes[file] = _mesh(file, opened)
         except InputError as error:
-            problems += at.wrong(str(error)).problems
+            problems += source.wrong(str(error)).problems
     if problems:
         raise ScriptError(tuple(problems))
     scene = draft.scene({file: mesh.solid for file, mesh in meshes.items()}, T_palm_tool)
-    kept = {mesh.key: mesh for mesh in meshes.values()}
-    return StoredScene(scene, tuple(kept.values()))
+    distinct = {mesh.key: mesh for mesh in meshes.values()}
+    return StoredScene(scene, tuple(distinct.values()))
 
 
 def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
@@ -271,14 +271,14 @@ def _mesh(file: MeshFile, opened: Callable[[str, int], bytes]) -> Mesh:
             f"{sha256}. To use it nevertheless, remove `sha256`."
         )
 
-    def beside(name: str, maximum: int) -> bytes | None:
+    def companion(name: str, maximum: int) -> bytes | None:
         try:
             return opened(str(parts.parent / name), maximum)
         except InputError:
             return None
 
     up = None if file.up is None else Up(file.up)
-    return read_mesh(content, file.path, file.unit, up, beside=beside)
+    return read_mesh(content, file.path, file.unit, up, companion=companion)
 
 
 def _text(content: bytes, name: str) -> str:
@@ -327,8 +327,8 @@ def load_initial_scene(
         meshes.append(mesh)
         notes.append(f"{scene_object.name}: {mesh.text}")
     session.check(cmd.ReplaceScene(tuple(objects), stored.scene.water))
-    kept = {mesh.key: mesh for mesh in meshes}
-    complete = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(kept.values()))
+    distinct = {mesh.key: mesh for mesh in meshes}
+    complete = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(distinct.values()))
     return complete, tuple(notes)
 
 
@@ -354,7 +354,7 @@ def _object(
     if match["at"] is None:
         return mesh, replace(scene_object, T=free_place(scene_object, objects, table))
     try:
-        at = [1e-3 * float(each) for each in match["at"].split(",")]
+        position = [1e-3 * float(number) for number in match["at"].split(",")]
     except ValueError:
         raise InputError(f"{argument!r}: the place must be x,y,z in mm, as in @300,0,0.") from None
-    return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), at))
+    return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), position))

@@ -83,16 +83,16 @@ class Format(Enum):
         """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
         others = {"wrz": cls.WRL, "zae": cls.ZIP}
-        known = {each.value: each for each in cls} | others
+        known = {member.value: member for member in cls} | others
         if suffix not in known:
             raise InputError(
                 f"{label(file)} has an unknown format. Use a file that ends in "
-                f"{', '.join(f'.{each}' for each in known)}."
+                f"{', '.join(f'.{suffix}' for suffix in known)}."
             )
         return known[suffix]
 
 
-SHAPE_SUFFIXES = (*(each.value for each in Format if each is not Format.ZIP), "wrz")
+SHAPE_SUFFIXES = (*(member.value for member in Format if member is not Format.ZIP), "wrz")
 """Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
@@ -200,11 +200,13 @@ def read_shape(
     if left_out:
         text += f" Left out: {_listed(left_out)}."
     text += _not_there(companions) + _scaled(longest, metres, scale)
-    used = {each: others[each] for each in companions.used if each != path}
+    used = {companion: others[companion] for companion in companions.used if companion != path}
     unread = [
-        label(each)
-        for each in others
-        if each.lower().endswith(SHAPE_SUFFIXES) and each not in used and each != path
+        label(companion)
+        for companion in others
+        if companion.lower().endswith(SHAPE_SUFFIXES)
+        and companion not in used
+        and companion != path
     ]
     if unread:
         text += f" Other shapes of the .zip were not read: {_listed(unread)}."
@@ -302,11 +304,11 @@ def _in_known_unit(reading: MeshReading, file: str) -> MeshReading:
 
 
 def _unit(
-    format: Format, longest: float, given: float | None, of_file: float | None
+    format: Format, longest: float, chosen: float | None, of_file: float | None
 ) -> tuple[float, str]:
     """Return the unit [m], and a clause on its source."""
-    if given is not None:
-        return given, f"the unit is {_sign(given)}, as given"
+    if chosen is not None:
+        return chosen, f"the unit is {_sign(chosen)}, as given"
     if of_file is not None:
         return of_file, f"the unit is {_sign(of_file)}, as in the file"
     if format in (Format.GLB, Format.GLTF):
@@ -329,8 +331,8 @@ def fitting_scale(length: float) -> float | None:
     if MIN_SIZE * (1.0 - ROUNDING) <= length <= MAX_SIZE * (1.0 + ROUNDING):
         return 1.0
     if length > MAX_SIZE:
-        return next((each for each in SCALES[::-1] if each * length <= MAX_SIZE), None)
-    return next((each for each in SCALES if each * length >= SMALL), None)
+        return next((scale for scale in SCALES[::-1] if scale * length <= MAX_SIZE), None)
+    return next((scale for scale in SCALES if scale * length >= SMALL), None)
 
 
 def _scaled(longest: float, unit: float, scale: float) -> str:
@@ -366,8 +368,8 @@ def _size(vertices: FloatArray, surface: MeshSurface) -> str:
     return f"{count} triangle{'s' if count > 1 else ''}, {x} × {y} × {z} mm"
 
 
-def _turned(axis: Up, given: Up | None) -> str:
-    why = ", as given" if given is not None else ""
+def _turned(axis: Up, chosen: Up | None) -> str:
+    why = ", as given" if chosen is not None else ""
     return f"z is up{why}" if axis is Up.Z else f"y of the file is up{why}, and rotated to z"
 
 

@@ -71,25 +71,25 @@ def read_stl(data: bytes, name: str) -> MeshReading:
 
 def _corners(data: bytes, name: str) -> list[tuple[bytes, ...]]:
     """Return the nine numbers of each triangle of a text file."""
-    found: list[tuple[bytes, ...]] = []
-    at, end, is_open = 0, len(data.rstrip()), False
-    while at < end:
-        match = _FACET.match(data, at) if is_open else None
+    corners: list[tuple[bytes, ...]] = []
+    offset, end, is_open = 0, len(data.rstrip()), False
+    while offset < end:
+        match = _FACET.match(data, offset) if is_open else None
         if match is not None:
-            found.append(match.groups())
-            check_triangles(len(found), name)
+            corners.append(match.groups())
+            check_triangles(len(corners), name)
         else:
-            match = _SOLID.match(data, at)
+            match = _SOLID.match(data, offset)
             if match is None or bool(match[1]) != is_open:
-                raise _broken(data, at, name, "expected a facet, 'solid' or 'endsolid'")
+                raise _broken(data, offset, name, "expected a facet, 'solid' or 'endsolid'")
             is_open = not is_open
-        at = match.end()
+        offset = match.end()
     if is_open:
         raise _broken(data, end, name, "the file ends before 'endsolid'")
-    return found
+    return corners
 
 
-def _broken(data: bytes, at: int, name: str, what: str) -> InputError:
-    blank = len(data[at:]) - len(data[at:].lstrip())
-    line = data.count(b"\n", 0, at + blank) + 1
+def _broken(data: bytes, offset: int, name: str, what: str) -> InputError:
+    blank = len(data[offset:]) - len(data[offset:].lstrip())
+    line = data.count(b"\n", 0, offset + blank) + 1
     return InputError(f"{name} is corrupt at line {line}: {what}.")

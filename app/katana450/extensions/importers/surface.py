@@ -52,15 +52,15 @@ def cut(vertices: FloatArray, corners: IntArray, sizes: IntArray) -> tuple[IntAr
 
 def _normals(points: FloatArray) -> FloatArray:
     """Return normals (p, 3) of polygons (p, k, 3), of any length, by Newell's sum."""
-    ahead = np.roll(points, -1, axis=1)
-    return np.asarray(np.cross(points, ahead).sum(axis=1))
+    following = np.roll(points, -1, axis=1)
+    return np.asarray(np.cross(points, following).sum(axis=1))
 
 
 def _concave(points: FloatArray) -> IntArray:
     """Return for each polygon of (p, k, 3) whether it has a concave corner, (p,)."""
     points = points - points[:, :1]
-    before, ahead = np.roll(points, 1, axis=1), np.roll(points, -1, axis=1)
-    turns = np.einsum("pkc,pc->pk", np.cross(points - before, ahead - points), _normals(points))
+    before, following = np.roll(points, 1, axis=1), np.roll(points, -1, axis=1)
+    turns = np.einsum("pkc,pc->pk", np.cross(points - before, following - points), _normals(points))
     scale = np.abs(turns).max(axis=1, keepdims=True)
     return np.asarray((turns < -1e-9 * scale).any(axis=1))
 
@@ -74,31 +74,31 @@ def _ears(points: FloatArray) -> IntArray:
     if (normal[axis] < 0.0) != (axis == 1):
         flat = flat[:, ::-1]
     count = len(flat)
-    before, ahead = [*range(-1, count - 1)], [*range(1, count), 0]
+    before, following = [*range(-1, count - 1)], [*range(1, count), 0]
     before[0] = count - 1
     rest = _RemainingCorners(flat)
-    is_ear = [rest.is_ear(before[b], b, ahead[b]) for b in range(count)]
+    is_ear = [rest.is_ear(before[b], b, following[b]) for b in range(count)]
     ears = deque(b for b in range(count) if is_ear[b])
-    found: list[tuple[int, int, int]] = []
+    triangles: list[tuple[int, int, int]] = []
     b = 0
-    while len(found) < count - 2:
+    while len(triangles) < count - 2:
         while ears and not is_ear[ears[0]]:
             ears.popleft()
         # Without an ear the polygon crosses itself; then any corner is taken.
-        b = ears.popleft() if ears else ahead[b]
-        a, c = before[b], ahead[b]
-        found.append((a, b, c))
+        b = ears.popleft() if ears else following[b]
+        a, c = before[b], following[b]
+        triangles.append((a, b, c))
         rest.left[b] = is_ear[b] = False
-        ahead[a], before[c] = c, a
+        following[a], before[c] = c, a
         # Only the two neighbours can become an ear by this, or cease to be one.
         for corner in (a, c):
             was, is_ear[corner] = (
                 is_ear[corner],
-                rest.is_ear(before[corner], corner, ahead[corner]),
+                rest.is_ear(before[corner], corner, following[corner]),
             )
             if is_ear[corner] and not was:
                 ears.append(corner)
-    return np.array(found, dtype=np.int64)
+    return np.array(triangles, dtype=np.int64)
 
 
 class _RemainingCorners:
@@ -189,9 +189,9 @@ class MeshSurface:
         number[order] = np.cumsum(first) - 1
         faces = number[faces]
         a, b, c = faces.T
-        kept = (a != b) & (b != c) & (c != a)
-        vertices, faces = _used(rows[order][first], faces[kept])
-        return MeshSurface(vertices, faces, None if self.colours is None else self.colours[kept])
+        whole = (a != b) & (b != c) & (c != a)
+        vertices, faces = _used(rows[order][first], faces[whole])
+        return MeshSurface(vertices, faces, None if self.colours is None else self.colours[whole])
 
 
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
@@ -344,31 +344,31 @@ def coarser(surface: MeshSurface, maximum: int) -> tuple[MeshSurface, float]:
     edges = np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1)
     fine = float((high - low).max()) / MAX_CELLS
     cell = max(0.5 * float(np.median(edges)), fine)
-    found: tuple[IntArray, FloatArray, IntArray] | None = None
+    clusters: tuple[IntArray, FloatArray, IntArray] | None = None
     tries, growth = FINER_GRIDS, 1.1
-    while found is None or tries:
+    while clusters is None or tries:
         cluster, means = _clustered(vertices, low, cell)
-        kept = _distinct(cluster[faces], len(means))
-        if len(kept) <= maximum:
-            found, coarse = (cluster, means, kept), cell
-            if len(kept) > ENOUGH * maximum:
+        faces_left = _distinct(cluster[faces], len(means))
+        if len(faces_left) <= maximum:
+            clusters, coarse = (cluster, means, faces_left), cell
+            if len(faces_left) > ENOUGH * maximum:
                 break
         else:
             fine = cell
-        if found is None:
+        if clusters is None:
             # The number of triangles of a surface falls with the square of the size of a cell. It
             # falls later if there are many small triangles beside large ones.
-            cell *= max(float(np.sqrt(len(kept) / maximum)), growth)
+            cell *= max(float(np.sqrt(len(faces_left) / maximum)), growth)
             growth **= 2
         else:
             cell = float(np.sqrt(fine * coarse)) if fine * 8.0 > coarse else coarse / 2.0
             tries -= 1
-    cluster, means, kept = found
+    cluster, means, faces_left = clusters
     near, far = means.min(axis=0), means.max(axis=0)
     means = low + (means - near) * ((high - low) / np.where(far > near, far - near, 1.0))
     moved = float(np.linalg.norm(vertices - means[cluster], axis=1).max())
-    colours = None if surface.colours is None else surface.colours[kept]
-    return MeshSurface(means, cluster[faces[kept]], colours).tidy(), moved
+    colours = None if surface.colours is None else surface.colours[faces_left]
+    return MeshSurface(means, cluster[faces[faces_left]], colours).tidy(), moved
 
 
 def _clustered(vertices: FloatArray, low: FloatArray, cell: float) -> tuple[IntArray, FloatArray]:

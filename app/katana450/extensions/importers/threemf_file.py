@@ -46,14 +46,14 @@ def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
     require("networkx", "meshes", "3MF files")
     builder = MeshBuilder(name)
     with failures_in_words(name):
-        found = load_3MF(io.BytesIO(data))  # type: ignore[no-untyped-call]
-        surfaces = {key: _surface(mesh, name) for key, mesh in found["geometry"].items()}
-        for number, item in enumerate(found["graph"]):
+        scene = load_3MF(io.BytesIO(data))  # type: ignore[no-untyped-call]
+        surfaces = {key: _surface(mesh, name) for key, mesh in scene["geometry"].items()}
+        for number, item in enumerate(scene["graph"]):
             if number >= MAX_COPIES:
                 raise InputError(f"{name} shows more than {MAX_COPIES} objects.")
             if item["geometry"] in surfaces:
                 builder.add(surfaces[item["geometry"]].moved(np.asarray(item["matrix"])))
-        unit = found["metadata"]["units"]
+        unit = scene["metadata"]["units"]
     if unit not in UNITS:
         raise InputError(f"{name} is corrupt: {str(unit)[:20]!r} is not a unit of 3MF.")
     return MeshReading(builder.surface(), _left_out(data), unit=UNITS[unit], up="z")

@@ -239,12 +239,12 @@ class Uploads:
 
         async with self._reading:
             reading = asyncio.create_task(asyncio.to_thread(checked))
-            gone = asyncio.create_task(_disconnected(request))
+            disconnection = asyncio.create_task(_disconnected(request))
             try:
-                await asyncio.wait((reading, gone), return_when=asyncio.FIRST_COMPLETED)
+                await asyncio.wait((reading, disconnection), return_when=asyncio.FIRST_COMPLETED)
             finally:
                 cancelled.set()
-                gone.cancel()
+                disconnection.cancel()
                 # The next file is read after this thread has ended, at its next checkpoint.
                 await asyncio.wait((reading,))
             return reading.result()

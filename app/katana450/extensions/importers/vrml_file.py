@@ -146,18 +146,20 @@ def _turned(
     points = (outline[:, None, :1] * ring + outline[:, None, 1:] * (0.0, 1.0, 0.0)).reshape(-1, 3)
     corners: list[IntArray] = []
     sizes: list[int] = []
-    here, ahead = np.arange(ROUND), np.roll(np.arange(ROUND), -1)
+    corner, next_corner = np.arange(ROUND), np.roll(np.arange(ROUND), -1)
     if side:
         for row in range(len(outline) - 1):
             low, high = row * ROUND, (row + 1) * ROUND
-            quads = np.column_stack((low + here, low + ahead, high + ahead, high + here))
+            quads = np.column_stack(
+                (low + corner, low + next_corner, high + next_corner, high + corner)
+            )
             corners.append(quads.ravel())
             sizes += [4] * ROUND
     if bottom:
-        corners.append(here[::-1])
+        corners.append(corner[::-1])
         sizes.append(ROUND)
     if top:
-        corners.append((len(outline) - 1) * ROUND + here)
+        corners.append((len(outline) - 1) * ROUND + corner)
         sizes.append(ROUND)
     flat = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
     # At the axis, two corners are one.
@@ -166,8 +168,8 @@ def _turned(
 
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
     coord, table = part(node, "coord"), colour_table(node)
-    there = coord is not None and coord.kind == "Coordinate"
-    points = rows(coord, "point", 3) if coord is not None and there else np.zeros((0, 3))
+    has_points = coord is not None and coord.kind == "Coordinate"
+    points = rows(coord, "point", 3) if coord is not None and has_points else np.zeros((0, 3))
     index = indices(node, "coordIndex")
     corners, sizes = split(index)
     face_colours = corner_colours = None
@@ -264,13 +266,13 @@ def _frames(spine: FloatArray) -> list[FloatArray]:
     before.
     """
     closed = bool((spine[0] == spine[-1]).all())
-    ahead, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
+    following, behind = np.roll(spine, -1, axis=0), np.roll(spine, 1, axis=0)
     if closed:
-        ahead[-1], behind[0] = spine[1], spine[-2]
+        following[-1], behind[0] = spine[1], spine[-2]
     else:
-        ahead[-1], behind[0] = spine[-1], spine[0]
-    along = [unit(row) for row in ahead - behind]
-    bends = [unit(row) for row in np.cross(ahead - spine, behind - spine)]
+        following[-1], behind[0] = spine[-1], spine[0]
+    along = [unit(row) for row in following - behind]
+    bends = [unit(row) for row in np.cross(following - spine, behind - spine)]
     if not closed:
         bends[0], bends[-1] = bends[min(1, len(bends) - 1)], bends[max(len(bends) - 2, 0)]
     frames: list[FloatArray] = []
@@ -388,10 +390,10 @@ class _Worlds:
 
     def _shown(self, urls: tuple[str, ...]) -> MeshSurface | None:
         """Return the surface of the first world of ``urls`` that is there; else None."""
-        found = self._companions.find((url.partition("#")[0] for url in urls), self._open[-1])
-        if found is None:
+        companion = self._companions.find((url.partition("#")[0] for url in urls), self._open[-1])
+        if companion is None:
             return None
-        path, data = found
+        path, data = companion
         if path in self._open:
             self.left_out["worlds that show themselves"] += 1
             return None
@@ -418,14 +420,14 @@ class _Worlds:
 def _unpacked(data: bytes, name: str, maximum: int) -> bytes:
     unpacker = zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
     try:
-        found = unpacker.decompress(data, maximum + 1)
+        content = unpacker.decompress(data, maximum + 1)
     except zlib.error as error:
         raise InputError(f"{name} is corrupt: {error}.") from error
-    if len(found) > maximum:
+    if len(content) > maximum:
         raise InputError(f"{name} has more than {maximum // 1_000_000} MB when unpacked.")
     if not unpacker.eof:
         raise InputError(f"{name} is corrupt: it ends too early.")
-    return found
+    return content
 
 
 class _Flattening:
@@ -455,9 +457,9 @@ class _Flattening:
             if node.kind == "Shape":
                 self._shape(node, T)
             if node.kind == "Inline":
-                found = self._shown_file(texts(node.get("url")))
-                if found is not None:
-                    self._builder.add(found.moved(T))
+                surface = self._shown_file(texts(node.get("url")))
+                if surface is not None:
+                    self._builder.add(surface.moved(T))
             waiting += [(child, T_child) for child, T_child in reversed(self._shown(node, T))]
         return self._builder.surface()
 

@@ -109,17 +109,17 @@ class Reader:
 
     def nodes(self) -> tuple[Node | Use, ...]:
         """Return the nodes of the file. Raises InputError with the line of an error."""
-        found: list[Node | Use] = []
+        nodes: list[Node | Use] = []
         while self._ahead:
-            found += self._statement(0)
-        return tuple(found)
+            nodes += self._statement(0)
+        return tuple(nodes)
 
     def _advance(self) -> None:
         """Move to the next token; at the end of the file it is empty."""
-        found = _TOKEN.match(self._text, self._next)
-        if found is None:
+        match = _TOKEN.match(self._text, self._next)
+        if match is None:
             raise self._error("unterminated text or unexpected character")
-        self._at, self._next, self._ahead = found.start(1), found.end(), found[1]
+        self._at, self._next, self._ahead = match.start(1), match.end(), match[1]
 
     def _error(self, what: str) -> InputError:
         line = self._text.count("\n", 0, self._at) + 1

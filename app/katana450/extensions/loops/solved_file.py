@@ -35,8 +35,8 @@ def solved_file(path: Path) -> Path:
     with explained(path):
         root, urdf = fromstring(data), urdf_of(data, path.parent)
         loops = [_loop(element, set(urdf.links), path) for element in root.findall("loop_joint")]
-        found = [each.followers() for each in closures(urdf, loops, path.name)]
-        followers = {each.joint: each for some in found for each in some}
+        solved = [closure.followers() for closure in closures(urdf, loops, path.name)]
+        followers = {closure.joint: closure for some in solved for closure in some}
     for element in root.findall("loop_joint"):
         root.remove(element)
     for joint in root.findall("joint"):
@@ -52,7 +52,7 @@ def _loop(element: Element, links: set[str], path: Path) -> JointLoop:
     name, kind = element.get("name", "without a name"), element.get("type", "")
     where = f"{path.name}: <loop_joint> {name!r}"
     # Isaac Sim names both ends link1.
-    ends = [each for each in element if each.tag in ("link1", "link2")]
+    ends = [child for child in element if child.tag in ("link1", "link2")]
     named = tuple(end.get("link", "") for end in ends)
     if kind not in KINDS:
         raise RobotDescriptionError(
@@ -145,9 +145,9 @@ def closures(urdf: Urdf, loops: Sequence[JointLoop], file: str) -> list[Closure]
     groups: list[Closure] = []
     for loop in loops:
         new = Closure(urdf, [loop], file)
-        shared = [each for each in groups if {*each.joints} & {*new.joints}]
-        together = [other for each in shared for other in each.loops]
-        groups = [each for each in groups if each not in shared]
+        shared = [group for group in groups if {*group.joints} & {*new.joints}]
+        together = [other for group in shared for other in group.loops]
+        groups = [group for group in groups if group not in shared]
         groups.append(Closure(urdf, [*together, loop], file))
     return groups
 
@@ -223,13 +223,13 @@ class Closure:
             for place in places.tolist():
                 q = q.copy()
                 q[driver] = start[driver] + RANGE * place
-                found = self._projected(q, following)
-                if found is None:
+                posture = self._projected(q, following)
+                if posture is None:
                     raise self._refusal(
                         f"opens where joint {self.joints[driver]!r} turns by "
                         f"{np.degrees(RANGE * place):.0f}°"
                     )
-                q = found
+                q = posture
 
     def _divided(self, q: FloatArray) -> tuple[list[int], list[int]]:
         """Return the joints that drive, first in the file, and those that follow."""
@@ -239,7 +239,7 @@ class Closure:
         for joint in reversed(range(len(self.joints))):
             if _rank(J[:, [joint, *following]]) > len(following):
                 following.insert(0, joint)
-        drivers = [each for each in range(len(self.joints)) if each not in following]
+        drivers = [index for index in range(len(self.joints)) if index not in following]
         if not drivers or rank == 0:
             raise self._refusal("leaves no joint free to move")
         return drivers, following
@@ -282,16 +282,16 @@ class Closure:
         return np.stack(columns, axis=1)
 
     def _frames(self, values: Mapping[str, float]) -> dict[str, FloatArray]:
-        found: dict[str, FloatArray] = {}
+        frames: dict[str, FloatArray] = {}
         for name in self._urdf.parents_first():
             joint = self._above.get(name)
             if joint is None:
-                found[name] = np.eye(4)
+                frames[name] = np.eye(4)
                 continue
             leader, factor, offset = joint.mimic or (joint.name, 1.0, 0.0)
             value = factor * values.get(leader, 0.0) + offset
-            found[name] = found[joint.parent] @ joint.origin @ _motion(joint, value)
-        return found
+            frames[name] = frames[joint.parent] @ joint.origin @ _motion(joint, value)
+        return frames
 
     def _path(self, link: str) -> list[str]:
         names = []

@@ -52,28 +52,28 @@ def measured_figure(run: MeasuredRun) -> bytes:
 
 def magnification(deviations: tuple[Deviation, ...]) -> float:
     """Return the round number, at least 1, by which distances from paths are best drawn."""
-    points = np.concatenate([each.nearest for each in deviations])
+    points = np.concatenate([deviation.nearest for deviation in deviations])
     size = float((points.max(axis=0) - points.min(axis=0)).max())
-    worst = max(float(each.error.max()) for each in deviations)
+    worst = max(float(deviation.error.max()) for deviation in deviations)
     if worst <= 0.0 or size <= 0.0:
         return 1.0
     most = max(DRAWN * size / worst, 1.0)
     power = 10.0 ** math.floor(math.log10(most))
-    return power * max(each for each in (1.0, 2.0, 5.0) if power * each <= most)
+    return power * max(step for step in (1.0, 2.0, 5.0) if power * step <= most)
 
 
 def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None:
     times = magnification(deviations)
     by = f", distances × {times:g}" if times > 1.0 else ""
     drawn: list[FloatArray] = []
-    for number, each in enumerate(deviations):
-        desired = 1e3 * point_derivatives(each.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
-        seen = 1e3 * (each.nearest + times * (each.measured - each.nearest))
+    for number, deviation in enumerate(deviations):
+        desired = 1e3 * point_derivatives(deviation.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
+        magnified = 1e3 * (deviation.nearest + times * (deviation.measured - deviation.nearest))
         names = ("desired", f"measured{by}") if number == 0 else (None, None)
         space.plot(*desired.T, color=DESIRED, linewidth=3.0, alpha=0.7, label=names[0])
-        space.plot(*seen.T, color=ERROR, linewidth=1.1, label=names[1])
+        space.plot(*magnified.T, color=ERROR, linewidth=1.1, label=names[1])
         space.scatter(*desired[0], color=INK, s=12)
-        drawn += [desired, seen]
+        drawn += [desired, magnified]
     _frame(plt, space, np.concatenate(drawn))
     space.legend(loc="upper center", bbox_to_anchor=(0.54, 0.06), fontsize=8.0)
 
@@ -81,13 +81,13 @@ def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None
 def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
     """Draw the distances of setpoints and measured tool from the paths over time."""
     measured = commanded = 0.0
-    for each in deviations:
-        off = 1e3 * each.error
-        panel.plot(*_broken(each.t, off), color=ERROR, linewidth=1.0)
-        sent = _broken(each.t_commanded, 1e3 * each.commanded)
+    for deviation in deviations:
+        off = 1e3 * deviation.error
+        panel.plot(*_broken(deviation.t, off), color=ERROR, linewidth=1.0)
+        sent = _broken(deviation.t_commanded, 1e3 * deviation.commanded)
         panel.plot(*sent, color=AXES[0], linewidth=1.6)
         measured = max(measured, float(off.max()))
-        commanded = max(commanded, 1e3 * float(each.commanded.max()))
+        commanded = max(commanded, 1e3 * float(deviation.commanded.max()))
     panel.set_title("Distance from the path")
     panel.set_ylabel("distance (mm)")
     panel.set_ylim(0.0, 1.5 * measured or 1.0)
@@ -350,16 +350,16 @@ def equal_axes(space: Any, points: FloatArray) -> None:
 def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
     """Write the name of each line at its end, separated if ends are close."""
     apart = 0.055 * max(float(values.max() - values.min()), 1.0)
-    at = values[-1].copy()
-    order = np.argsort(at, kind="stable").tolist()
+    heights = values[-1].copy()
+    order = np.argsort(heights, kind="stable").tolist()
     for _ in range(LABEL_ITERATIONS):
         for low, high in pairwise(order):
-            short = 0.5 * max(apart - float(at[high] - at[low]), 0.0)
-            at[low], at[high] = at[low] - short, at[high] + short
+            short = 0.5 * max(apart - float(heights[high] - heights[low]), 0.0)
+            heights[low], heights[high] = heights[low] - short, heights[high] + short
     for axis, name in enumerate(names):
         panel.annotate(
             name,
-            (t[-1], at[axis]),
+            (t[-1], heights[axis]),
             xytext=(5, 0),
             textcoords="offset points",
             va="center",

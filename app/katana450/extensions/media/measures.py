@@ -94,15 +94,15 @@ def executed_tasks(program: Program, trace: Trace) -> tuple[Task, ...]:
 
 def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
     """Return the paths of the tool in a run, each repeated path once."""
-    found: dict[int, PathTrace] = {}
+    traces: dict[int, PathTrace] = {}
     for task in executed_tasks(program, trace):
         if not isinstance(task.action, FollowPlan):
             continue
         for segment in task.action.plan.segments:
             path = segment.path
-            if isinstance(path, ToolPath | PosePath) and id(path) not in found:
-                found[id(path)] = _along(task.name, path)
-    return tuple(found.values())
+            if isinstance(path, ToolPath | PosePath) and id(path) not in traces:
+                traces[id(path)] = _along(task.name, path)
+    return tuple(traces.values())
 
 
 def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, float | None]:
@@ -174,7 +174,7 @@ def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]
 def _along(name: str, path: ToolPath | PosePath) -> PathTrace:
     sigma = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
     q = joint_derivatives(path, sigma)[0]
-    traced = np.array([_point(path, each) for each in q])
+    traced = np.array([_point(path, posture) for posture in q])
     return PathTrace(
         name, sigma, point_derivatives(path, sigma)[0], traced, _turned(path, sigma, q)
     )
@@ -185,12 +185,13 @@ def _turned(path: ToolPath | PosePath, sigma: FloatArray, q: FloatArray) -> Floa
     if isinstance(path, PosePath):
         return path.turned_off(sigma, q)
     tool = path.curve.at(Jet.variable(sigma))
-    pitch, roll = (np.broadcast_to(each.c0, sigma.shape) for each in tool[3:5])
-    found = [ToolTarget.at(path.chain, each) for each in q]
+    pitch, roll = (np.broadcast_to(part.c0, sigma.shape) for part in tool[3:5])
+    targets = [ToolTarget.at(path.chain, posture) for posture in q]
     off = [
-        (each.pitch - pitch[number], each.roll - roll[number]) for number, each in enumerate(found)
+        (target.pitch - pitch[number], target.roll - roll[number])
+        for number, target in enumerate(targets)
     ]
-    return np.array([max(abs(math.remainder(angle, math.tau)) for angle in each) for each in off])
+    return np.array([max(abs(math.remainder(angle, math.tau)) for angle in pair) for pair in off])
 
 
 def path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:
@@ -211,7 +212,8 @@ def _curve(path: CurvePath, sigma: float) -> tuple[FloatArray, FloatArray]:
     """Return point (3,) [m] and unit tangent (3,) at ``sigma``; no motion gives a zero tangent."""
     point = path.point(Jet.variable(sigma))
     p, rate = (
-        np.array([each.derivatives()[order] for each in point], dtype=float) for order in (0, 1)
+        np.array([coordinate.derivatives()[order] for coordinate in point], dtype=float)
+        for order in (0, 1)
     )
     length = float(np.linalg.norm(rate))
     return p, rate / length if length > 0.0 else rate
@@ -234,15 +236,15 @@ def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
     end = trace.water[-1]
     if end is None:
         return {}
-    found = water_measures(end)
+    measured = water_measures(end)
     executed = sorted(set(trace.task.tolist()))
     pours = [number for number in executed if program.tasks[number].name == POURING]
     carried = trace.task < (pours[0] if pours else len(program.tasks))
     return {
-        "emptied_percent": found["emptied_percent"],
-        "spilled_ml": found["spilled_ml"],
+        "emptied_percent": measured["emptied_percent"],
+        "spilled_ml": measured["spilled_ml"],
         "carried_margin_to_rim_mm": 1e3 * float(trace.margin[carried].min()),
-        "cup_peak_jerk_m_s3": found["cup_peak_jerk_m_s3"],
+        "cup_peak_jerk_m_s3": measured["cup_peak_jerk_m_s3"],
     }
 
 
@@ -292,13 +294,13 @@ class PourRecord:
     @property
     def flow(self) -> FloatArray:
         """The flow out of the cup (N,) [ml/s], the mean of FLOW_TICKS ticks."""
-        kept = self.cup + self.film
-        before = np.roll(kept, FLOW_TICKS)
+        content = self.cup + self.film
+        before = np.roll(content, FLOW_TICKS)
         before[:FLOW_TICKS] = math.nan
         passed = self.t - np.roll(self.t, FLOW_TICKS)
-        found = (before - kept) / np.where(passed > 0.0, passed, math.nan)
+        rate = (before - content) / np.where(passed > 0.0, passed, math.nan)
         # The filling of the cup is no flow.
-        return np.maximum(np.nan_to_num(found), 0.0)
+        return np.maximum(np.nan_to_num(rate), 0.0)
 
     def cells(self, tick: int) -> list[str]:
         """Return the values of COLUMNS at ``tick`` as text; what is not known is empty."""
@@ -321,6 +323,6 @@ def _row(poured: MotionWithWater | None) -> tuple[float, ...]:
     water = poured.water
     volumes = (water.cup.volume, water.cup.film, water.basin, water.air, water.spilled)
     return (
-        *(each / MILLILITRE for each in volumes),
+        *(volume / MILLILITRE for volume in volumes),
         math.acos(min(max(float(water.cup.T[2, 2]), -1.0), 1.0)),
     )

@@ -85,8 +85,8 @@ def _lines(camera: Camera, hits: Hits, apart: float, wide: float) -> Floats:
         # Distance on the floor along the axis between neighbouring pixels.
         slope = hits.directions[:, axis] / down
         moved = step * np.hypot(right[axis] - slope * right[2], up[axis] - slope * up[2])
-        at = hits.points[:, axis] / apart
-        off = np.abs(at - np.round(at)) * apart / moved
+        place = hits.points[:, axis] / apart
+        off = np.abs(place - np.round(place)) * apart / moved
         line = np.clip(0.5 * wide + 0.5 - off, 0.0, min(wide, 1.0))
         # Lines closer than pixels merge to a uniform tone.
         tone = np.minimum(wide * moved / apart, 1.0)
@@ -133,9 +133,9 @@ def shaded(colour: Floats, normals: Floats, lit: Bools) -> Floats:
     """Return the light (n, 3) of surfaces. ``lit`` (n,): whether lamp 0 reaches them."""
     up = 0.5 + 0.5 * normals[:, 2:]
     total = np.tile(GROUND + (ZENITH - GROUND) * up, (1, 3))
-    for number, each in enumerate(LAMPS):
-        cosine = np.maximum(normals @ each.towards, 0.0)
-        total += (cosine * lit if number == 0 else cosine)[:, None] * each.colour
+    for number, source in enumerate(LAMPS):
+        cosine = np.maximum(normals @ source.towards, 0.0)
+        total += (cosine * lit if number == 0 else cosine)[:, None] * source.colour
     return np.asarray((SHEEN + (1.0 - SHEEN) * colour) * total, dtype=np.float32)
 
 
@@ -287,9 +287,9 @@ class _Renderer:
         normals = samples.hits.normals.reshape(height, width, 3)
         edges = np.zeros((height, width), dtype=bool)
         for axis in (0, 1):
-            here, there = [slice(None)] * 2, [slice(None)] * 2
-            here[axis], there[axis] = slice(None, -1), slice(1, None)
-            one, other = tuple(here), tuple(there)
+            first, second = [slice(None)] * 2, [slice(None)] * 2
+            first[axis], second[axis] = slice(None, -1), slice(1, None)
+            one, other = tuple(first), tuple(second)
             differs = (item[one] != item[other]) | (reached[one] != reached[other])
             bent = np.einsum("hwi,hwi->hw", normals[one], normals[other]) < EDGE_COSINE
             apart = points[other] - points[one]

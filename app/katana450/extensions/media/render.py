@@ -42,8 +42,8 @@ def render(options: argparse.Namespace) -> int:
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)
         stage = RenderStage(shown.robot, shown.session, load_props())
-        taken = shot.taken(stage, shown.robot, state)
-        write_files({path: writer_of(taken.png)})
+        rendered = shot.taken(stage, shown.robot, state)
+        write_files({path: writer_of(rendered.png)})
     else:
         _film(path, shown, shot, options)
     print(f"{path}: {path.stat().st_size} bytes")
@@ -55,5 +55,5 @@ def _film(path: Path, shown: Playback, shot: Shot, options: argparse.Namespace) 
     count = int(shown.duration * fps) + 1
     states = (shown.at(number / fps) for number in range(count))
     with rendering_pool((shot,), options.urdf, shown.bare, count) as rendered:
-        pictures = (taken for (taken,) in rendered(states))
+        pictures = (image for (image,) in rendered(states))
         write_film(path, progress(pictures, count, path.name), shot.size, fps)

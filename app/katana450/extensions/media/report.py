@@ -134,7 +134,7 @@ class Report:
             }
             for bound in self.bounds
         ]
-        found = {
+        entries = {
             **self.values,
             "bounds_held": self.held,
             "bounds": expected,
@@ -143,7 +143,7 @@ class Report:
             "notes": list(self.notes),
             "written": written.isoformat(timespec="seconds"),
         }
-        return json.dumps(found, indent=2, ensure_ascii=False) + "\n"
+        return json.dumps(entries, indent=2, ensure_ascii=False) + "\n"
 
     @cached_property
     def _pour(self) -> PourRecord | None:

@@ -46,15 +46,15 @@ def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]
     points = points[np.concatenate(([True], far))]
     if len(points) < 2:
         return None
-    ahead = unit(np.gradient(points, axis=0)).astype(float)
+    tangents = unit(np.gradient(points, axis=0)).astype(float)
     aside = np.empty_like(points)
-    last = np.eye(3)[int(np.abs(ahead[0]).argmin())]
-    for number, direction in enumerate(ahead):
+    last = np.eye(3)[int(np.abs(tangents[0]).argmin())]
+    for number, direction in enumerate(tangents):
         # The vector aside is projected from point to point, so that the tube does not twist.
         last = last - (last @ direction) * direction
         last /= float(np.linalg.norm(last))
         aside[number] = last
-    upright = np.cross(ahead, aside)
+    upright = np.cross(tangents, aside)
     turn = np.arange(SIDES) * (math.tau / SIDES)
     out = np.cos(turn)[:, None] * aside[:, None] + np.sin(turn)[:, None] * upright[:, None]
     a = np.arange(SIDES)
@@ -105,20 +105,20 @@ def moments(program: Program, trace: Trace) -> dict[str, int]:
     names = {number: program.tasks[number].name for number in executed}
     takes = [number for number, name in names.items() if name.endswith(CLOSING)]
     pours = [number for number, name in names.items() if name == POURING]
-    found: dict[str, int] = {}
+    ticks_by_name: dict[str, int] = {}
     if takes:
         start = next(number for number in executed if _same(program, number, takes[0]))
-        found["initial"] = _ticks(trace, start)[0]
-        found["grasping"] = _ticks(trace, takes[0])[-1]
+        ticks_by_name["initial"] = _ticks(trace, start)[0]
+        ticks_by_name["grasping"] = _ticks(trace, takes[0])[-1]
     if pours:
         ticks = _ticks(trace, pours[0])
-        found["approaching"] = ticks[0]
-        found["emptying"] = ticks[int(EMPTYING * (len(ticks) - 1))]
-    if not found:
+        ticks_by_name["approaching"] = ticks[0]
+        ticks_by_name["emptying"] = ticks[int(EMPTYING * (len(ticks) - 1))]
+    if not ticks_by_name:
         drawn = [tick for tick in range(len(trace.t)) if path_at(program, trace, tick) is not None]
         if drawn:
-            found["tracing"] = drawn[int(DONE * (len(drawn) - 1))]
-    return found
+            ticks_by_name["tracing"] = drawn[int(DONE * (len(drawn) - 1))]
+    return ticks_by_name
 
 
 DONE = 0.7
@@ -135,7 +135,7 @@ def stage_pictures(
 ) -> Mapping[str, bytes]:
     """Return the PNG files by their names."""
     stage = RenderStage(robot, session, props)
-    found: dict[str, bytes] = {}
+    pictures: dict[str, bytes] = {}
     ticks = moments(program, trace)
     on_object = ON_TABLE if "grasping" not in ticks else _look(robot, states[ticks["grasping"]])
     for name, tick in ticks.items():
@@ -145,8 +145,8 @@ def stage_pictures(
             items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        found[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT).png
-    return found
+        pictures[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT).png
+    return pictures
 
 
 Look = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -160,8 +160,8 @@ def _look(robot: Robot, state: State) -> Look:
         return ON_TABLE
     x, y, z = (arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q))[:3, 3].tolist()
     reach = math.hypot(x, y, z)
-    ahead, beside, above = (FROM_HAND * reach * each for each in BESIDE)
-    return (x + ahead, y + beside, z + above), (0.6 * x, 0.6 * y, 0.4 * reach)
+    distance_ahead, aside, above = (FROM_HAND * reach * share for share in BESIDE)
+    return (x + distance_ahead, y + aside, z + above), (0.6 * x, 0.6 * y, 0.4 * reach)
 
 
 def _same(program: Program, one: int, other: int) -> bool:
@@ -183,8 +183,8 @@ def _lines(program: Program, robot: Robot, trace: Trace, tick: int) -> list[Item
         return np.asarray(points @ T[:3, :3].T + T[:3, 3])
 
     whole = point_derivatives(path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
-    before = [each for each in range(tick + 1) if path_at(program, trace, each) is path]
-    traced = np.array([forward(path.chain, trace.sent[each])[:3, 3] for each in before])
+    before = [number for number in range(tick + 1) if path_at(program, trace, number) is path]
+    traced = np.array([forward(path.chain, trace.sent[number])[:3, 3] for number in before])
     desired = point_derivatives(path, trace.sigma[before])[0]
     worst = np.linalg.norm(traced - desired, axis=1).max()
     red, green, blue = coloured(np.array([worst]))[0].tolist()

@@ -68,7 +68,9 @@ class RenderScene:
             tuple(item.name for item in items),
             _stacked([shape.vertices @ R + p for shape, R, p in turned], np.float32),
             _stacked([shape.normals @ R for shape, R, _ in turned], np.float32),
-            _stacked([s.faces + at for s, at in zip(shapes, starts[:-1], strict=True)], np.int32),
+            _stacked(
+                [s.faces + start for s, start in zip(shapes, starts[:-1], strict=True)], np.int32
+            ),
             np.repeat(np.arange(len(shapes)), [len(shape.faces) for shape in shapes]).astype("i4"),
             _stacked([[to_light(material.colour) for material in materials]], np.float32),
         )
@@ -83,8 +85,8 @@ class RenderScene:
 def unit(v: npt.NDArray[Any]) -> Floats:
     """Return vectors (..., 3) scaled to length 1; zero vectors stay 0."""
     length = np.sqrt(np.einsum("...i,...i->...", v, v))[..., None]
-    found = np.divide(v, length, out=np.zeros_like(v), where=length > 0.0)
-    return np.asarray(found, dtype=np.float32)
+    units = np.divide(v, length, out=np.zeros_like(v), where=length > 0.0)
+    return np.asarray(units, dtype=np.float32)
 
 
 def _stacked(parts: Sequence[Any], kind: Any) -> npt.NDArray[Any]:
@@ -130,9 +132,9 @@ class Camera:
     @cached_property
     def frame(self) -> Floats:
         """The rows (3, 3) of its axes in the base frame: right, up and ahead."""
-        ahead = unit(np.subtract(self.target, self.position))
-        right = unit(np.cross(ahead, (0.0, 0.0, 1.0)))
-        return np.stack((right, np.cross(right, ahead), ahead)).astype(np.float32)
+        forward = unit(np.subtract(self.target, self.position))
+        right = unit(np.cross(forward, (0.0, 0.0, 1.0)))
+        return np.stack((right, np.cross(right, forward), forward)).astype(np.float32)
 
     @property
     def pixel(self) -> float:
@@ -225,12 +227,12 @@ class Tracer:
         item = np.full(count, NOWHERE, dtype=np.int32)
         normals = np.tile(UPWARD, (count, 1))
         if not self._empty and count:
-            found = self._embree.run(_from(eye, directions), directions, output=True)
-            face: Ints = found["primID"]
+            hits = self._embree.run(_from(eye, directions), directions, output=True)
+            face: Ints = hits["primID"]
             hit = np.flatnonzero(face != NOTHING)
-            distance[hit] = np.minimum(found["tfar"][hit], BACKGROUND_DISTANCE)
+            distance[hit] = np.minimum(hits["tfar"][hit], BACKGROUND_DISTANCE)
             item[hit] = self._scene.item[face[hit]]
-            places = (found["u"][hit, None], found["v"][hit, None])
+            places = (hits["u"][hit, None], hits["v"][hit, None])
             normals[hit] = _normals(self._scene, face[hit], places, directions[hit])
         return Hits(directions, distance, _ends(eye, distance, directions), normals, item)
 
@@ -239,8 +241,8 @@ class Tracer:
         if self._empty or not len(origins):
             return np.zeros(len(origins), dtype=bool)
         reached = np.full(len(origins), reach, dtype=np.float32)
-        found = self._embree.run(origins, directions, dists=reached, query="OCCLUDED")
-        return np.asarray(found != NOTHING)
+        faces = self._embree.run(origins, directions, dists=reached, query="OCCLUDED")
+        return np.asarray(faces != NOTHING)
 
 
 def first_hits(tracer: Tracer, eye: Floats, directions: Floats, floor: float) -> Hits:

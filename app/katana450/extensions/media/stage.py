@@ -64,33 +64,35 @@ MATERIAL = Material("water", (RED / 255.0, GREEN / 255.0, BLUE / 255.0))
 
 def translucents_of(water: Water, water_environment: WaterEnvironment) -> list[Translucent]:
     """Return all visible parts of the water."""
-    found: list[Translucent] = []
+    translucents: list[Translucent] = []
     basin, level = water_environment.basin, water_environment.basin.level(water.basin * FEMTOLITRE)
     flow = WaterFlow(water_environment)
-    for each in water.vessels:
-        vessel = water_environment.vessels.get(each.name)
-        if vessel is not None and each.volume >= WORTH_SHOWING:
+    for held in water.vessels:
+        vessel = water_environment.vessels.get(held.name)
+        if vessel is not None and held.volume >= WORTH_SHOWING:
             up = se3.from_rotation_translation(np.eye(3), (0.0, 0.0, vessel.floor))
-            shape = _shape(body(vessel.inside, flow.surface(each)) * INSET, BODY_FACES)
-            found.append(Translucent(Item(f"water in {each.name}", shape, each.T @ up), IN_VESSEL))
+            shape = _shape(body(vessel.inside, flow.surface(held)) * INSET, BODY_FACES)
+            translucents.append(
+                Translucent(Item(f"water in {held.name}", shape, held.T @ up), IN_VESSEL)
+            )
     if water.parcels:
         end = landing(water.parcels[0], water_environment, level).age
         corners = stream(water.parcels, water_environment.cup.inside.radius, end)
         shape = _shape(corners, STREAM_FACES)
-        found.append(Translucent(Item(STREAM, shape, np.eye(4)), IN_AIR))
+        translucents.append(Translucent(Item(STREAM, shape, np.eye(4)), IN_AIR))
     if water.basin >= WORTH_SHOWING:
         level = max(level, CLEAR)
         radius, (x, y, z) = basin.radius(level), basin.at
         corners, faces = disc()
         shape = _shape(corners * (radius, radius, level), faces)
         T = se3.from_rotation_translation(np.eye(3), (x, y, z + basin.floor))
-        found.append(Translucent(Item(BASIN, shape, T), IN_VESSEL))
+        translucents.append(Translucent(Item(BASIN, shape, T), IN_VESSEL))
     for number, puddle in enumerate(water.puddles):
         corners, faces = blob()
         scaled = corners * (puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0))
         T = se3.from_rotation_translation(so3.rotation_z(TWIST * number), puddle.at)
-        found.append(Translucent(Item(PUDDLE, _shape(scaled, faces), T), ON_TABLE))
-    return found
+        translucents.append(Translucent(Item(PUDDLE, _shape(scaled, faces), T), ON_TABLE))
+    return translucents
 
 
 def _shape(corners: FloatArray, faces: Faces) -> VisualMesh:
@@ -142,14 +144,14 @@ class RenderStage:
     def surrounding_items(self, state: State) -> list[Item]:
         """Return the items of the table and the scene objects."""
         x = state.x
-        found = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
+        items = [Item(TABLE, shape, np.eye(4)) for shape in self._table]
         for scene_object in state.objects:
             if scene_object.appearance.hidden:
                 continue
             T = self._session.environment.pose(scene_object, x)
             shapes = self._shapes(scene_object)
-            found += [Item(scene_object.name, shape, T) for shape in shapes]
-        return found
+            items += [Item(scene_object.name, shape, T) for shape in shapes]
+        return items
 
     def _shapes(self, scene_object: SceneObject) -> Sequence[VisualMesh]:
         prop = self._props.file_of(scene_object)
@@ -213,6 +215,6 @@ def _in_file(
 def _plain(scene_object: SceneObject) -> VisualMesh:
     red, green, blue = scene_object.appearance.colour or PLAIN_COLOUR
     colour = red / 255.0, green / 255.0, blue / 255.0
-    made = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(scene_object), PLAIN_COLOUR)
-    (shape,) = shapes_of(made)
+    visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(scene_object), PLAIN_COLOUR)
+    (shape,) = shapes_of(visual)
     return VisualMesh(Material("plain", colour), shape.vertices, shape.normals, shape.faces)

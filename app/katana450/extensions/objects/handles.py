@@ -97,7 +97,7 @@ class ObjectHandles:
             return
         if event.phase == "end":
             self._dragged = None
-        x, y, _ = (float(each) for each in event.target.position)
+        x, y, _ = (float(coordinate) for coordinate in event.target.position)
         T = se3.from_rotation_translation(
             scene_object.T[:3, :3], (x, y, float(scene_object.T[2, 3]))
         )

@@ -58,7 +58,7 @@ class ObjectRequests(RequestHandler):
         if known is None and len(arm.state.objects) >= MAX_OBJECTS:
             raise InputError(f"There are {MAX_OBJECTS} objects already: remove one first.")
         scene_object = self._shaped(request, known)
-        others = [each for each in arm.state.objects if each.name != request.name]
+        others = [other for other in arm.state.objects if other.name != request.name]
         if is_vessel(scene_object) and sum(map(is_vessel, others)) >= MAX_VESSELS:
             raise InputError(f"There are {MAX_VESSELS} vessels already: remove one first.")
         if request.T is None:

@@ -212,7 +212,7 @@ def _looking(scene_object: SceneObject, **changes: Any) -> cmd.Command:
 
 
 def _recoloured(scene_object: SceneObject, value: tuple[int, int, int]) -> cmd.Command:
-    red, green, blue = (int(each) for each in value)
+    red, green, blue = (int(part) for part in value)
     return _placed(
         scene_object,
         appearance=ObjectAppearance(

@@ -76,7 +76,7 @@ def used_in(state: State | None) -> frozenset[str]:
     )
 
 
-def free_name(name: str, taken: set[str]) -> str:
-    """Return ``name``, with a number appended if it is ``taken``."""
+def free_name(name: str, names: set[str]) -> str:
+    """Return ``name``, with a number appended if it is one of ``names``."""
     candidates = [name, *(f"{name[:36]} {number}" for number in range(2, MAX_OBJECTS + 3))]
-    return next(each for each in candidates if each not in taken)
+    return next(candidate for candidate in candidates if candidate not in names)

@@ -199,9 +199,10 @@ class RosChannel(Channel):
         topic = names.resolved(topic)
         known = names.COMMANDED.get(topic)
         if known is None:
-            of = "published by the server" if topic in names.PUBLISHED else "unknown"
+            reason = "published by the server" if topic in names.PUBLISHED else "unknown"
             raise InputError(
-                f"The topic {topic} is {of}. Clients can publish to {', '.join(names.COMMANDED)}."
+                f"The topic {topic} is {reason}. Clients can publish to "
+                f"{', '.join(names.COMMANDED)}."
             )
         if kind and not names.is_type(kind, known):
             raise InputError(f"The messages of {topic} are {known}, not {kind}.")
@@ -228,7 +229,7 @@ class RosChannel(Channel):
     def _call(self, op: ops.CallService) -> None:
         service = names.resolved(op.service)
         if service not in names.SERVICES:
-            known = ", ".join(each for each in names.SERVICES if names.CANCEL not in each)
+            known = ", ".join(name for name in names.SERVICES if names.CANCEL not in name)
             why = f"There is no service {service}. The services are {known}."
             self._respond(op, why, result=False)
             raise InputError(why)

@@ -107,20 +107,23 @@ class CheckedTrajectory:
 
         ``now`` is the time [s since the epoch]. Raises GoalError with the reason for a refusal.
         """
-        given = goal.trajectory
-        if sorted(given.joint_names) != sorted(joints):
+        trajectory = goal.trajectory
+        if sorted(trajectory.joint_names) != sorted(joints):
             raise GoalError(
                 ErrorCode.INVALID_JOINTS,
-                f"The joints of the goal are {', '.join(given.joint_names) or 'none'}; they must "
-                f"be {', '.join(joints)}, in any order.",
+                f"The joints of the goal are {', '.join(trajectory.joint_names) or 'none'}; they "
+                f"must be {', '.join(joints)}, in any order.",
             )
-        if not 0 < len(given.points) <= MAX_POINTS:
+        if not 0 < len(trajectory.points) <= MAX_POINTS:
             raise _invalid(
-                f"The trajectory has {len(given.points)} points; it must have 1 to {MAX_POINTS}."
+                f"The trajectory has {len(trajectory.points)} points; it must have 1 to "
+                f"{MAX_POINTS}."
             )
-        order = [given.joint_names.index(name) for name in joints]
-        rows = [_positions(point, number, order) for number, point in enumerate(given.points, 1)]
-        times = [point.time_from_start.seconds for point in given.points]
+        order = [trajectory.joint_names.index(name) for name in joints]
+        rows = [
+            _positions(point, number, order) for number, point in enumerate(trajectory.points, 1)
+        ]
+        times = [point.time_from_start.seconds for point in trajectory.points]
         for number, (before, after) in enumerate(zip((0.0, *times), times, strict=False), 1):
             least = 0.0 if number == 1 else MIN_INTERVAL
             if not after - before >= least - 1e-9:
@@ -130,8 +133,8 @@ class CheckedTrajectory:
                 )
         if times[-1] > MAX_SECONDS:
             raise _invalid(f"A trajectory lasts at most {MAX_SECONDS:g} s.")
-        _check_end(given.points[-1])
-        _check_stamp(given.header.stamp.seconds, times[-1], now)
+        _check_end(trajectory.points[-1])
+        _check_stamp(trajectory.header.stamp.seconds, times[-1], now)
         postures = np.array(rows)
         if times[0] < MIN_INTERVAL:
             away = float(np.abs(postures[0] - q).max())
@@ -234,19 +237,23 @@ def _check_stamp(stamp: float, duration: float, now: float) -> None:
     )
 
 
-def _tolerances(given: Sequence[JointTolerance], joints: Sequence[str], what: str) -> FloatArray:
+def _tolerances(
+    tolerances: Sequence[JointTolerance], joints: Sequence[str], what: str
+) -> FloatArray:
     """Return the tolerances of positions (n,); 0 and less stand for none, as in ROS."""
-    found = dict.fromkeys(joints, math.inf)
-    for each in given:
-        if each.name not in found:
+    maxima = dict.fromkeys(joints, math.inf)
+    for tolerance in tolerances:
+        if tolerance.name not in maxima:
             raise GoalError(
-                ErrorCode.INVALID_JOINTS, f"{what} names the unknown joint {each.name!r}."
+                ErrorCode.INVALID_JOINTS, f"{what} names the unknown joint {tolerance.name!r}."
             )
-        if each.velocity > 0.0 or each.acceleration > 0.0:
-            raise _invalid(f"{what} of {each.name}: only tolerances of `position` are supported.")
-        if each.position > 0.0:
-            found[each.name] = each.position
-    return np.array(list(found.values()))
+        if tolerance.velocity > 0.0 or tolerance.acceleration > 0.0:
+            raise _invalid(
+                f"{what} of {tolerance.name}: only tolerances of `position` are supported."
+            )
+        if tolerance.position > 0.0:
+            maxima[tolerance.name] = tolerance.position
+    return np.array(list(maxima.values()))
 
 
 def _check_error(

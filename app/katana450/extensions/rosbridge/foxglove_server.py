@@ -96,8 +96,12 @@ class FoxgloveServer:
     def _publish(self, arm: ArmHandle) -> None:
         state = arm.state
         if self._frames.has_sinks():
-            found = [self._publications.message(each) for each in (names.TF_STATIC, names.TF)]
-            self._frames.log(_frame_transforms([each for each in found if each is not None]))
+            frames = [
+                self._publications.message(message) for message in (names.TF_STATIC, names.TF)
+            ]
+            self._frames.log(
+                _frame_transforms([message for message in frames if message is not None])
+            )
         if self._joints.has_sinks():
             stamp = _stamp(self._publications.stamp(arm))
             values = arm.robot.joint_values(state.q, state.gripper)
@@ -128,28 +132,30 @@ def _stamp(seconds: float) -> Any:
     return messages.Timestamp.from_epoch_secs(seconds)
 
 
-def _frame_transforms(found: list[Any]) -> Any:
+def _frame_transforms(frames: list[Any]) -> Any:
     """Return the poses of ROS messages as a message of Foxglove."""
     return messages.FrameTransforms(
         transforms=[
             messages.FrameTransform(
-                timestamp=_stamp(each.header.stamp.sec + 1e-9 * each.header.stamp.nanosec),
-                parent_frame_id=each.header.frame_id,
-                child_frame_id=each.child_frame_id,
+                timestamp=_stamp(
+                    transform.header.stamp.sec + 1e-9 * transform.header.stamp.nanosec
+                ),
+                parent_frame_id=transform.header.frame_id,
+                child_frame_id=transform.child_frame_id,
                 translation=messages.Vector3(
-                    x=each.transform.translation.x,
-                    y=each.transform.translation.y,
-                    z=each.transform.translation.z,
+                    x=transform.transform.translation.x,
+                    y=transform.transform.translation.y,
+                    z=transform.transform.translation.z,
                 ),
                 rotation=messages.Quaternion(
-                    x=each.transform.rotation.x,
-                    y=each.transform.rotation.y,
-                    z=each.transform.rotation.z,
-                    w=each.transform.rotation.w,
+                    x=transform.transform.rotation.x,
+                    y=transform.transform.rotation.y,
+                    z=transform.transform.rotation.z,
+                    w=transform.transform.rotation.w,
                 ),
             )
-            for message in found
+            for message in frames
             if isinstance(message, TFMessage)
-            for each in message.transforms
+            for transform in message.transforms
         ]
     )

@@ -193,20 +193,20 @@ class GripperGoal(Goal):
 
     def start(self) -> Result | None:
         """Check the goal and give the command."""
-        arm, given = self.host.arm, self._command
+        arm, command = self.host.arm, self._command
         gripper = arm.arm.gripper
         if not gripper.moves:
             raise InputError("This arm has no fingers that move.")
-        if not gripper.lower <= given.position <= gripper.upper:
+        if not gripper.lower <= command.position <= gripper.upper:
             raise InputError(
-                f"The position {given.position:g} is not between {gripper.closed:g} (closed) and "
+                f"The position {command.position:g} is not between {gripper.closed:g} (closed) and "
                 f"{gripper.opened:g} (open)."
             )
-        if given.max_effort:
+        if command.max_effort:
             raise InputError("The effort of the fingers cannot be limited. Set max_effort to 0.")
         self._revocations = self.host.hub.gate.revocations
         self._answer = self.host.ask(
-            requests.Gripper(angle=given.position, revocations=self._revocations)
+            requests.Gripper(angle=command.position, revocations=self._revocations)
         )
         self._outcome = self.host.outcome(self._answer)
         return None

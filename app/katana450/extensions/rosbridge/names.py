@@ -78,7 +78,7 @@ def resolved(name: str) -> str:
     return name if name.startswith("/") else f"/{name}"
 
 
-def is_type(given: str, known: str) -> bool:
-    """Return whether ``given`` names the type ``known``; the middle part is left out in ROS 1."""
+def is_type(kind: str, known: str) -> bool:
+    """Return whether ``kind`` names the type ``known``; the middle part is left out in ROS 1."""
     package, _, name = known.split("/")
-    return given in (known, f"{package}/{name}")
+    return kind in (known, f"{package}/{name}")

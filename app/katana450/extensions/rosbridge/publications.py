@@ -114,7 +114,7 @@ def axis_names(robot: Robot) -> tuple[str, ...]:
 
 def transforms(links: list[Link], values: Mapping[str, float], stamp: Time) -> TFMessage:
     """Return the poses of ``links`` in their parents with the joints at ``values`` [rad or m]."""
-    found: list[TransformStamped] = []
+    stamped: list[TransformStamped] = []
     for link in links:
         if link.parent is None:
             continue
@@ -122,10 +122,10 @@ def transforms(links: list[Link], values: Mapping[str, float], stamp: Time) -> T
         if link.joint is not None:
             T = T @ link.joint.motion(values[link.joint.name])
         header = Header(stamp=stamp, frame_id=link.parent)
-        found.append(
+        stamped.append(
             TransformStamped(header=header, child_frame_id=link.name, transform=_transform(T))
         )
-    return TFMessage(transforms=found)
+    return TFMessage(transforms=stamped)
 
 
 def _transform(T: FloatArray) -> RosTransform:
@@ -157,8 +157,8 @@ def _arm_status(now: answers.State) -> DiagnosticStatus:
     else:
         level, message = WARN, now.why or now.status
     values = {"status": now.status, "stop": now.stop or "", "speed": f"{now.speed:g}"}
-    for number, found in enumerate(now.findings, 1):
-        values[f"finding {number}"] = found.text
+    for number, finding in enumerate(now.findings, 1):
+        values[f"finding {number}"] = finding.text
     if now.arm is not None:
         values |= {"mode": now.arm.mode, "note": now.arm.note}
     return _status("katana450: arm", level, message, values)
@@ -224,9 +224,9 @@ class Subscriptions:
         name = names.resolved(op.topic)
         known = names.PUBLISHED.get(name)
         if known is None:
-            of = "is only for commands" if name in names.COMMANDED else "does not exist"
+            reason = "is only for commands" if name in names.COMMANDED else "does not exist"
             raise InputError(
-                f"The topic {op.topic} {of}. The topics are {', '.join(names.PUBLISHED)}."
+                f"The topic {op.topic} {reason}. The topics are {', '.join(names.PUBLISHED)}."
             )
         if op.type and not names.is_type(op.type, known):
             raise InputError(f"The messages of {op.topic} are {known}, not {op.type}.")
@@ -261,8 +261,8 @@ class Subscriptions:
         """Return the topic that has been due longest, and the time until the next one [s]."""
         if not self._due:
             return None, None
-        topic, at = min(self._due.items(), key=lambda each: each[1])
-        left = at - self._clock()
+        topic, due = min(self._due.items(), key=lambda entry: entry[1])
+        left = due - self._clock()
         if left > 0.0:
             return None, left if math.isfinite(left) else None
         return topic, 0.0
@@ -283,4 +283,4 @@ class Subscriptions:
     def delay(self, seconds: float) -> None:
         """Make nothing due for ``seconds`` [s]."""
         earliest = self._clock() + seconds
-        self._due = {topic: max(at, earliest) for topic, at in self._due.items()}
+        self._due = {topic: max(due, earliest) for topic, due in self._due.items()}

@@ -36,20 +36,20 @@ def call(service: str, raw: msgspec.Raw, description: Callable[[], str]) -> dict
 
     ``description`` returns the robot's description. Raises InputError for invalid arguments.
     """
-    given = read(raw, Arguments, f"a call of {service}")
+    arguments = read(raw, Arguments, f"a call of {service}")
     match service.removeprefix(ROSAPI):
         case "topics":
             return {"topics": list(TOPICS), "types": list(TOPICS.values())}
         case "topics_for_type":
-            return {"topics": _of_type(TOPICS, given.type)}
+            return {"topics": _of_type(TOPICS, arguments.type)}
         case "topic_type":
-            return {"type": TOPICS.get(given.topic, "")}
+            return {"type": TOPICS.get(arguments.topic, "")}
         case "services":
             return {"services": list(SERVICES)}
         case "services_for_type":
-            return {"services": _of_type(SERVICES, given.type)}
+            return {"services": _of_type(SERVICES, arguments.type)}
         case "service_type":
-            return {"type": SERVICES.get(given.service, "")}
+            return {"type": SERVICES.get(arguments.service, "")}
         case "action_servers":
             return {"action_servers": list(ACTIONS)}
         case "nodes":
@@ -57,19 +57,19 @@ def call(service: str, raw: msgspec.Raw, description: Callable[[], str]) -> dict
         case "get_time":
             return {"time": time_of(time.time())}
         case "get_param":
-            return {"value": _parameter(given, description)}
+            return {"value": _parameter(arguments, description)}
     raise AssertionError(f"{service} is listed but not implemented.")
 
 
 def _of_type(known: Mapping[str, str], kind: str) -> list[str]:
-    return [name for name, each in known.items() if is_type(kind, each)]
+    return [name for name, known_kind in known.items() if is_type(kind, known_kind)]
 
 
-def _parameter(given: Arguments, description: Callable[[], str]) -> str:
+def _parameter(arguments: Arguments, description: Callable[[], str]) -> str:
     """Return the value of the parameter as JSON text. Raises InputError if it is unknown."""
-    if given.name.rpartition(":")[2].lstrip("/") == "robot_description":
+    if arguments.name.rpartition(":")[2].lstrip("/") == "robot_description":
         return json.dumps(description())
-    default = given.default or given.default_value
+    default = arguments.default or arguments.default_value
     if default:
         return default
-    raise InputError(f"There is no parameter {given.name[:80]!r}, only robot_description.")
+    raise InputError(f"There is no parameter {arguments.name[:80]!r}, only robot_description.")

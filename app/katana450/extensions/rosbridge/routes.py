@@ -74,10 +74,10 @@ class RobotPackage(NamedTuple):
         package = PurePosixPath(name).stem
         with zipfile.ZipFile(io.BytesIO(content)) as packed:
             files = {
-                each.removeprefix(f"{package}/"): packed.read(each) for each in packed.namelist()
+                path.removeprefix(f"{package}/"): packed.read(path) for path in packed.namelist()
             }
-        text = next(files[each] for each in files if each.endswith(".urdf")).decode()
-        meshes = {each: data for each, data in files.items() if each.startswith("meshes/")}
+        text = next(files[path] for path in files if path.endswith(".urdf")).decode()
+        meshes = {path: data for path, data in files.items() if path.startswith("meshes/")}
         return cls(text, f"package://{package}/", meshes, key)
 
     def at(self, origin: str) -> str:
@@ -162,7 +162,7 @@ class RosRoutes:
                 # Without an identity the websocket is refused below.
                 text = "" if who is None else await self._text(origin)
             except ValueError:
-                known = " or ".join(each.value for each in Units)
+                known = " or ".join(choice.value for choice in Units)
                 await _refuse(socket, BAD_REQUEST_CLOSE_CODE, f"`{UNITS}` must be {known}.")
                 return
             except RobotDescriptionError as error:
@@ -181,10 +181,10 @@ class RosRoutes:
         if not secrets.compare_digest(key, self._description.key.encode()):
             raise HTTPException(404)
         try:
-            found = await asyncio.to_thread(self._description.read)
+            package = await asyncio.to_thread(self._description.read)
         except RobotDescriptionError as error:
             raise HTTPException(404, str(error)) from error
-        content = found.files.get(request.path_params["path"])
+        content = package.files.get(request.path_params["path"])
         if content is None:
             raise HTTPException(404)
         suffix = PurePosixPath(request.path_params["path"]).suffix.lower()

@@ -122,20 +122,20 @@ def joint_rates(jog: JointJog, joints: Sequence[str], units: Units) -> FloatArra
             "velocities. Send one velocity for each joint."
         )
     check_joints(jog.joint_names, joints)
-    given = dict(zip(jog.joint_names, jog.velocities, strict=True))
+    velocities = dict(zip(jog.joint_names, jog.velocities, strict=True))
     limit = 1.0 if units is Units.UNITLESS else MAX_ANGULAR_RATE
-    for name, value in given.items():
+    for name, value in velocities.items():
         _check_range(value, limit, f"The velocity of {name}", units, "rad/s")
     factor = JOINT_SCALE if units is Units.UNITLESS else 1.0
-    return np.array([factor * given.get(name, 0.0) for name in joints])
+    return np.array([factor * velocities.get(name, 0.0) for name in joints])
 
 
-def check_joints(given: Sequence[str], joints: Sequence[str]) -> None:
-    """Raise InputError unless ``given`` are different ones of ``joints``."""
-    unknown = [name for name in given if name not in joints]
+def check_joints(names: Sequence[str], joints: Sequence[str]) -> None:
+    """Raise InputError unless ``names`` are different ones of ``joints``."""
+    unknown = [name for name in names if name not in joints]
     if unknown:
         raise InputError(f"There is no joint {unknown[0]!r}. The joints are {', '.join(joints)}.")
-    if len(set(given)) != len(given):
+    if len(set(names)) != len(names):
         raise InputError("A joint is named twice.")
 
 
@@ -144,20 +144,20 @@ def rotation_of(frame: str, frames: Mapping[str, FloatArray], root: str) -> Floa
 
     Raises InputError for an unknown frame.
     """
-    found = frames.get(frame or root)
-    if found is None:
+    rotation = frames.get(frame or root)
+    if rotation is None:
         raise InputError(f"There is no frame {frame!r}. The frames are {', '.join(frames)}.")
-    return found
+    return rotation
 
 
 def _scaled(
-    given: Vector3, units: Units, scale: float, maximum: float, part: str, unit: str
+    vector: Vector3, units: Units, scale: float, maximum: float, part: str, unit: str
 ) -> FloatArray:
     limit = 1.0 if units is Units.UNITLESS else maximum
-    for axis, value in (("x", given.x), ("y", given.y), ("z", given.z)):
+    for axis, value in (("x", vector.x), ("y", vector.y), ("z", vector.z)):
         _check_range(value, limit, f"`{part}.{axis}`", units, unit)
     factor = scale if units is Units.UNITLESS else 1.0
-    return factor * np.array([given.x, given.y, given.z])
+    return factor * np.array([vector.x, vector.y, vector.z])
 
 
 def _check_range(value: float, limit: float, what: str, units: Units, unit: str) -> None:
@@ -209,8 +209,8 @@ class ServoStream:
         check_fresh(message.header, time.time())
         arm = self._hub.present()
         state, mounted = arm.state, arm.arm
-        found = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
-        R = rotation_of(message.header.frame_id, found, arm.robot.links[0].name)
+        rotations = frames(arm.robot, arm.robot.joint_values(state.q, state.gripper))
+        R = rotation_of(message.header.frame_id, rotations, arm.robot.links[0].name)
         pitched = None
         if mounted.kinematics_to(state.tool).freedoms == 5:
             pitched = pitched_frame(mounted.chain_to(state.tool), state.q)

@@ -42,13 +42,13 @@ def mass(scene_object: SceneObject, state: State, masses: Mapping[str, float]) -
 
     ``masses``: known masses [kg] by name; another object has DENSITY.
     """
-    found = masses.get(scene_object.name)
-    if found is None:
+    known = masses.get(scene_object.name)
+    if known is None:
         density = VESSEL_DENSITY if is_vessel(scene_object) else DENSITY
-        found = density * body_of(scene_object).volume
+        known = density * body_of(scene_object).volume
     poured = state.poured
     water = None if poured is None else poured.water.vessel(scene_object.name)
-    return found + WATER_DENSITY * FEMTOLITRE * water.kept if water else found
+    return known + WATER_DENSITY * FEMTOLITRE * water.kept if water else known
 
 
 def acceleration(

@@ -84,7 +84,7 @@ class Pad:
     @cached_property
     def middles(self) -> FloatArray:
         """(16, 8, 3) middle of each taxel in the frame of the link [m]."""
-        sums = [self.summed(self.areas * each) for each in self.points.T]
+        sums = [self.summed(self.areas * coordinate) for coordinate in self.points.T]
         return np.stack(sums, axis=-1) / self.taxel_areas[..., None]
 
     def summed(self, values: FloatArray) -> FloatArray:
@@ -129,11 +129,11 @@ def surface_pad(
         begin += ends[-1]
     return Pad(
         finger,
-        frozen(np.concatenate([each.reshape(-1, 3) for each in points])),
-        frozen(np.concatenate([each.reshape(-1, 3) for each in normals])),
-        frozen(np.concatenate([each.ravel() for each in areas])),
-        np.concatenate([each.ravel() for each in taxels]),
-        frozen(np.concatenate([each.reshape(-1, 2) for each in places])),
+        frozen(np.concatenate([array.reshape(-1, 3) for array in points])),
+        frozen(np.concatenate([array.reshape(-1, 3) for array in normals])),
+        frozen(np.concatenate([array.ravel() for array in areas])),
+        np.concatenate([array.ravel() for array in taxels]),
+        frozen(np.concatenate([array.reshape(-1, 2) for array in places])),
         begin,
         width,
     )
@@ -171,14 +171,14 @@ def pressed(
 
     ``numbers``: (n,) the points to which the depths belong, if the others are not pressed.
     """
-    at = slice(None) if numbers is None else numbers
-    forces = pressure_at(depth) * pad.areas[at]
+    selection = slice(None) if numbers is None else numbers
+    forces = pressure_at(depth) * pad.areas[selection]
     force = float(forces.sum())
-    taxels = np.bincount(pad.taxels[at], weights=forces, minlength=ROWS * COLUMNS)
+    taxels = np.bincount(pad.taxels[selection], weights=forces, minlength=ROWS * COLUMNS)
     taxels = taxels.reshape(ROWS, COLUMNS)
     centre = None
     if force > 0.0:
-        along, across = (forces @ pad.places[at] / force).tolist()
+        along, across = (forces @ pad.places[selection] / force).tolist()
         centre = (along, across)
     return PadPressure(
         pad.finger,

@@ -81,9 +81,9 @@ class _PatchedPad:
     def __init__(self, context: FolderContext, pad: Pad) -> None:
         """Add the patches of ``pad``, hidden."""
         robot = context.robot
-        link = next(each for each in robot.links if each.name == pad.finger)
-        path = "/".join(node_name(each.name) for each in robot.path_to(link))
-        normals = np.stack([pad.summed(each) for each in pad.normals.T], axis=-1)
+        link = next(candidate for candidate in robot.links if candidate.name == pad.finger)
+        path = "/".join(node_name(ancestor.name) for ancestor in robot.path_to(link))
+        normals = np.stack([pad.summed(coordinate) for coordinate in pad.normals.T], axis=-1)
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
         across = np.array((0.0, 0.0, 1.0))
         turns = np.stack(
@@ -147,4 +147,6 @@ class _PatchedPad:
 def pressure_colours(pressure: FloatArray) -> FloatArray:
     """Return the colours (n, 3), from 0 to 255, of pressures (n,) [Pa]."""
     place = np.clip(pressure / FULL_PRESSURE, 0.0, 1.0) * (len(COLOURS) - 1)
-    return np.stack([np.interp(place, np.arange(len(COLOURS)), each) for each in COLOURS.T], axis=1)
+    return np.stack(
+        [np.interp(place, np.arange(len(COLOURS)), channel) for channel in COLOURS.T], axis=1
+    )

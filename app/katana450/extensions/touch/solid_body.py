@@ -41,14 +41,14 @@ class SolidBody:
 
         It is negative outside: there it is the distance to the farthest of the planes.
         """
-        found = np.full(len(points), np.inf)
+        depth = np.full(len(points), np.inf)
         if len(self.normals):
-            found = (self.heights - points @ self.normals.T).min(axis=1)
+            depth = (self.heights - points @ self.normals.T).min(axis=1)
         if self.cylinder is not None:
-            found = np.minimum(found, self.cylinder - np.hypot(points[:, 0], points[:, 1]))
+            depth = np.minimum(depth, self.cylinder - np.hypot(points[:, 0], points[:, 1]))
         if self.ball is not None:
-            found = np.minimum(found, self.ball - np.sqrt(np.einsum("ij,ij->i", points, points)))
-        return found
+            depth = np.minimum(depth, self.ball - np.sqrt(np.einsum("ij,ij->i", points, points)))
+        return depth
 
 
 def body_of(scene_object: SceneObject) -> SolidBody:

@@ -83,10 +83,10 @@ class _Points(NamedTuple):
     normals: FloatArray
     areas: FloatArray
 
-    def only(self, kept: npt.NDArray[np.bool_]) -> _Points:
-        """Return those of the points for which ``kept`` (n,) is true."""
+    def only(self, selection: npt.NDArray[np.bool_]) -> _Points:
+        """Return those of the points for which ``selection`` (n,) is true."""
         numbers, points, normals, areas = self
-        return _Points(numbers[kept], points[kept], normals[kept], areas[kept])
+        return _Points(numbers[selection], points[selection], normals[selection], areas[selection])
 
 
 class SqueezedBody:
@@ -130,7 +130,7 @@ class SqueezedBody:
         self._near = [self._reachable(pad, T) for pad, T in zip(pads, fingers(grip), strict=True)]
         self._gap = self._shift = 0.0
         self._greatest = MAX_SQUEEZE
-        self.on_pads = all(len(each.points) > 0 for each in self._near)
+        self.on_pads = all(len(group.points) > 0 for group in self._near)
         if self.on_pads:
             self._shift, self._gap = self._centred()
             self.on_pads = self._gap <= MAX_GAP
@@ -169,14 +169,14 @@ class SqueezedBody:
 
         ``shift``: along the closing direction, from the first pad to the second [m].
         """
-        found = []
+        depths = []
         for near, T_palm_finger in zip(
             self._near, self._fingers(self._grip - squeeze), strict=True
         ):
             T = self._T_body_palm @ T_palm_finger
             points = near.points @ T[:3, :3].T + (T[:3, 3] - shift * self._along)
-            found.append(self._body.depth(points) + self._gap)
-        return found
+            depths.append(self._body.depth(points) + self._gap)
+        return depths
 
     def _centred(self) -> tuple[float, float]:
         """Return the shift [m] with the same gap to both fingers where they stopped, and the gap.
@@ -232,7 +232,7 @@ class SqueezedBody:
             return high, shift
         for _ in range(SEARCH_STEPS):
             # A round contact grows as the power 3/2, so this power of the force is nearly a line.
-            below, above, between = (each**POWER for each in (low_force, high_force, wanted))
+            below, above, between = (newtons**POWER for newtons in (low_force, high_force, wanted))
             middle = low + (high - low) * (between - below) / (above - below)
             force, shift, _ = self._forces(middle, shift)
             if abs(force - wanted) <= FORCE_TOLERANCE:

@@ -127,7 +127,9 @@ class TouchModel:
         moved = held.T.copy()
         moved[:3, 3] += T[:3, :3].T @ step
         slid = replace(held, T=frozen(moved))
-        objects = tuple(slid if each is held else each for each in state.objects)
+        objects = tuple(
+            slid if scene_object is held else scene_object for scene_object in state.objects
+        )
         body = self._held(replace(state, objects=objects))
         return slid if body is not None and body.on_pads else None
 
@@ -168,11 +170,11 @@ class TouchModel:
                 f"not {force:g} N."
             )
         wanted = body.squeeze_for(force)
-        found = body.squeezed(wanted).force
-        if found < 0.99 * force:
+        squeezed = body.squeezed(wanted).force
+        if squeezed < 0.99 * force:
             raise InputError(
-                f"The pads press on {state.held.name} with at most {found:.1f} N, not {force:g} N: "
-                "they touch too little of it."
+                f"The pads press on {state.held.name} with at most {squeezed:.1f} N, not "
+                f"{force:g} N: they touch too little of it."
             )
         return wanted
 

@@ -72,8 +72,8 @@ def _is_package(folder: Path) -> bool:
 
 def _manifest_name(folder: Path) -> str | None:
     with suppress(OSError):
-        found = MANIFEST_NAME.search((folder / MANIFEST).read_bytes())
-        return found and found[1].decode()
+        match = MANIFEST_NAME.search((folder / MANIFEST).read_bytes())
+        return match and match[1].decode()
     return None
 
 

@@ -165,7 +165,7 @@ class Expansion:
         cause, line = chain[-1], None
         if isinstance(cause, ExpatError):
             what, line = f"its XML is broken ({ErrorString(cause.code)})", cause.lineno
-        elif any(isinstance(each, RecursionError) for each in chain):
+        elif any(isinstance(error, RecursionError) for error in chain):
             what = ENDLESS
         elif isinstance(cause, _FaultError):
             what = str(cause)
@@ -179,12 +179,12 @@ class Expansion:
             self._at_fault = what.rpartition("xacro:")[2]
         stack = [*xacro.filestack, *(macro.history[-1][-1] for macro in xacro.macrostack)]
         # An included file that could not be opened can be left on the stack.
-        file = next((Path(each) for each in reversed(stack) if os.path.isfile(each)), self._path)
+        file = next((Path(entry) for entry in reversed(stack) if os.path.isfile(entry)), self._path)
         if line is None and self._at_fault:
-            for each in (*reversed(stack), *xacro.all_includes):
-                line = _line(Path(each), self._at_fault)
+            for entry in (*reversed(stack), *xacro.all_includes):
+                line = _line(Path(entry), self._at_fault)
                 if line is not None:
-                    file = Path(each)
+                    file = Path(entry)
                     break
         other = None if file == self._path else _shown(str(file))
         return {"what": _shown(what), "file": other, "line": line}
@@ -192,7 +192,7 @@ class Expansion:
 
 def _shown(text: str) -> str:
     """Return the first MAX_WHAT characters of ``text``, each other than printable as "?"."""
-    return "".join(each if each.isprintable() else "?" for each in text[:MAX_WHAT])
+    return "".join(character if character.isprintable() else "?" for character in text[:MAX_WHAT])
 
 
 def _reason(error: Exception) -> str:
@@ -224,7 +224,7 @@ def main(path: Path, arguments: Mapping[str, str]) -> None:
     """
     limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
     guard = FileGuard(path)
-    for name in [each for each in os.environ if not each.startswith(READABLE)]:
+    for name in [variable for variable in os.environ if not variable.startswith(READABLE)]:
         del os.environ[name]
     # The messages of the file are dropped; standard error tells why this program did not start.
     with Path(os.devnull).open("w") as null, redirect_stderr(null):
@@ -237,4 +237,4 @@ def main(path: Path, arguments: Mapping[str, str]) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), dict(each.split(":=", 1) for each in sys.argv[2:]))
+    main(Path(sys.argv[1]), dict(argument.split(":=", 1) for argument in sys.argv[2:]))
