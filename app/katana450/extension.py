@@ -74,6 +74,28 @@ class TickSender(Protocol):
         """End after what waits, or after a short time."""
 
 
+class ServerLog:
+    """The event log of a server, seen from the process that starts the others. This one keeps none.
+
+    No method waits for a disk, except ``close``.
+    """
+
+    @property
+    def description(self) -> tuple[str, ...]:
+        """Lines for the terminal on where the log is."""
+        return ()
+
+    def attach(self, pipe: Connection) -> None:
+        """Write the records that another process sends by ``pipe``."""
+        pipe.close()
+
+    def restart(self, process: str, status: int | None) -> None:
+        """Record that ``process`` ended with ``status``, and is started again."""
+
+    def close(self, *, requested: bool) -> None:
+        """Record the end of the server, and write what waits. ``requested``: by a signal."""
+
+
 @dataclass(frozen=True)
 class ServerFacts:
     """Description of a server for each process of it, used each time the process is started.

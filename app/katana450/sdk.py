@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from katana450.extension import Extension as Extension
     from katana450.extension import ExtraProcess as ExtraProcess
     from katana450.extension import ServerFacts as ServerFacts
+    from katana450.extension import ServerLog as ServerLog
     from katana450.extension import TickSender as TickSender
     from katana450.extensions.programs.building.plan_state import PlanState as PlanState
     from katana450.extensions.programs.building.step import Step as Step
@@ -49,9 +50,9 @@ if TYPE_CHECKING:
     from katana450.server.api import program_requests as program_requests
     from katana450.server.api import requests as requests
     from katana450.server.service.arm_handle import ArmHandle as ArmHandle
+    from katana450.server.service.arm_handle import Nodes as Nodes
     from katana450.server.service.hub import Hub as Hub
     from katana450.server.service.identity import Identity as Identity
-    from katana450.server.service.nodes import Nodes as Nodes
     from katana450.server.service.participants import Participant as Participant
     from katana450.server.service.runner import RequestHandler as RequestHandler
     from katana450.server.service.runner import Runner as Runner

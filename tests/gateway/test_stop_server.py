@@ -16,12 +16,12 @@ import pytest
 from katana450.arm.control.lease import Role
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
-from katana450.server.service.stop_path import StopPath
-from katana450.server.web import stop_monitor, stop_server
+from katana450.server.service import stop_path
+from katana450.server.service.stop_path import StopPath, watch_stop_path
+from katana450.server.web import stop_server
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.authenticator import LOOPBACK_NAMES, Address, Authenticator
-from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.server.web.stop_server import BURST, StopServer
 from tests.gateway.client import HOUR
 
@@ -247,6 +247,6 @@ async def problem_with(answer: bytes, arm_age: float) -> str:
 def test_port_serves_stop_only_if_it_reaches_the_arm(
     monkeypatch: pytest.MonkeyPatch, answer: bytes, arm_age: float, serves: bool
 ) -> None:
-    monkeypatch.setattr(stop_monitor, "CHECK_EVERY", 0.01)
+    monkeypatch.setattr(stop_path, "CHECK_EVERY", 0.01)
     problem = asyncio.run(problem_with(answer, arm_age))
     assert bool(problem) != serves

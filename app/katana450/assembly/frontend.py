@@ -17,9 +17,8 @@ from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
 from katana450.extension import ServerFacts, provided, results
-from katana450.server.service.arm_handle import ArmHandle
+from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
-from katana450.server.service.nodes import Nodes
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
 from katana450.server.view.view import View, ViewOptions

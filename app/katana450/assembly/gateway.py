@@ -40,6 +40,7 @@ from katana450.server.service.heartbeats import keep_alive
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of
+from katana450.server.service.stop_path import watch_stop_path
 from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
@@ -48,7 +49,6 @@ from katana450.server.viser_bridge.viser_server import open_server
 from katana450.server.web import control_socket
 from katana450.server.web.admission import Admission
 from katana450.server.web.bodies import refusal
-from katana450.server.web.stop_monitor import watch_stop_path
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)

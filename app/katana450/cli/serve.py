@@ -26,7 +26,7 @@ from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
 from katana450.errors import ConfigurationError
-from katana450.extension import ExtraProcess, ServerFacts, results
+from katana450.extension import ExtraProcess, ServerFacts, ServerLog, results
 from katana450.platform_support import (
     claim_file,
     create_file,
@@ -35,7 +35,6 @@ from katana450.platform_support import (
     pipe_address,
     stop_signals,
 )
-from katana450.server.service.server_log import ServerLog
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
 from katana450.settings import FIXED, Settings
 

@@ -25,11 +25,11 @@ from katana450.server.view.display_options import LogProblem
 from katana450.server.view.paint import PaintNodes, Tint
 from katana450.server.view.panel_folder import DRIVE, SCENE, AddFolders, PanelTabs
 from katana450.server.view.readout import style
-from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.view import ViewOptions
 from katana450.server.view.view_updater import READOUT_INTERVAL, ViewUpdater
+from katana450.server.viser_bridge.themes import set_up_room
 
 GESTURES: dict[str, cmd.Command] = {"Home": cmd.Home(), "Hold": cmd.Hold()}
 

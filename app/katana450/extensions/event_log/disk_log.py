@@ -19,10 +19,10 @@ from typing import Any
 
 from katana450.arm.runtime.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
+from katana450.extension import ServerLog
 from katana450.extensions.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, LogFile
 from katana450.extensions.event_log.records import Record, record
 from katana450.platform_support import state_folder
-from katana450.server.service.server_log import ServerLog
 
 log = logging.getLogger(__name__)
 

@@ -24,12 +24,12 @@ from katana450.extensions.progress import progress
 from katana450.extensions.water.nodes import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
-from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
+from katana450.server.viser_bridge.themes import set_up_room
 from katana450.server.viser_bridge.viser_server import close_server, open_server
 
 

@@ -34,7 +34,7 @@ from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
-from katana450.server.service.nodes import Nodes
+from katana450.server.service.arm_handle import Nodes
 
 
 class Type(Enum):

@@ -31,8 +31,7 @@ from katana450.extensions.media.scene import (
     lit,
     unit,
 )
-from katana450.server.view.room import FILL, FLOOR_AT, KEY, RIM
-from katana450.server.viser_bridge.themes import Theme
+from katana450.server.viser_bridge.themes import FILL, FLOOR_AT, KEY, RIM, Theme
 from katana450.srgb import to_light, to_srgb
 
 CELLS = ((0.05, 0.6), (0.25, 1.0))

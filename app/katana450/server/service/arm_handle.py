@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future
 
 from katana450.arm.control import commands as cmd
@@ -30,7 +31,7 @@ from katana450.errors import InputError
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.statics import holding_torques
-from katana450.server.service.nodes import Nodes
+from katana450.server.api import answers, requests
 
 
 class ArmHandle:
@@ -180,3 +181,30 @@ class ArmHandle:
     def age(self) -> float:
         """Time since the arm's process last proved that its control loop runs [s]."""
         return self._front_end.age
+
+
+class Nodes(ABC):
+    """Nodes of a robot and its environment by name, and the poses of its links."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+
+    def links(self, state: State) -> answers.Links:
+        """Return the poses of all links."""
+        frames = self._robot.frames(self._values(state))
+        return answers.Links(links=[answers.Link(name=n, T=T.tolist()) for n, T in frames.items()])
+
+    def _values(self, state: State) -> Mapping[str, float]:
+        return self._robot.joint_values(state.q, state.gripper)
+
+    @abstractmethod
+    def world(self, state: State) -> answers.World:
+        """Return all nodes with their present values."""
+
+    @abstractmethod
+    def read(self, state: State, fields: Iterable[requests.FieldName]) -> tuple[answers.Value, ...]:
+        """Return the present values of the fields. Raises InputError for an unknown name."""
+
+    @abstractmethod
+    def command(self, state: State, settings: Iterable[requests.FieldSetting]) -> cmd.Command:
+        """Return the command that sets all fields. Raises InputError if one cannot be set."""

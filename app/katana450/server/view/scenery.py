@@ -13,9 +13,9 @@ from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.layer import LayerContext, ViewLayer
-from katana450.server.view.room import set_up_room
 from katana450.server.view.scene import ArmNodes
 from katana450.server.view.scene_objects import SceneObjectNodes
+from katana450.server.viser_bridge.themes import set_up_room
 
 SHADE = 0.35
 """Darkness (0 to 1) of shadows on the table."""
