@@ -48,29 +48,6 @@ class BufferView(msgspec.Struct, rename="camel"):
     byte_stride: Annotated[int, msgspec.Meta(ge=1, le=252)] | None = None
 
 
-class SparsePlaces(msgspec.Struct, rename="camel"):
-    """The places of the numbers that a sparse accessor replaces."""
-
-    buffer_view: Natural
-    component_type: int
-    byte_offset: Natural = 0
-
-
-class SparseValues(msgspec.Struct, rename="camel"):
-    """The numbers that a sparse accessor has at these places."""
-
-    buffer_view: Natural
-    byte_offset: Natural = 0
-
-
-class Sparse(msgspec.Struct):
-    """The numbers in which an accessor differs from its buffer view, or from 0 without one."""
-
-    count: Natural
-    indices: SparsePlaces
-    values: SparseValues
-
-
 class Accessor(msgspec.Struct, rename="camel"):
     """An array of numbers in a buffer view."""
 
@@ -80,7 +57,7 @@ class Accessor(msgspec.Struct, rename="camel"):
     buffer_view: Natural | None = None
     byte_offset: Natural = 0
     normalized: bool = False
-    sparse: Sparse | None = None
+    sparse: Any = None
 
 
 class DracoPart(msgspec.Struct, rename="camel"):
@@ -230,9 +207,6 @@ COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 512
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """Number of components of each accessor type."""
 
-MAX_ROWS = 600_000
-"""Maximum number of rows of an accessor that no buffer holds."""
-
 
 class Buffers:
     """The numbers of a decoded file. A buffer is read when it is needed."""
@@ -264,15 +238,13 @@ class Buffers:
         if kind is None or columns == 0 or (width is not None and columns != width):
             raise self.broken(f"accessor {number} has a wrong type")
         what = f"accessor {number}"
+        if accessor.sparse is not None:
+            raise InputError(f"{self._name} has sparse numbers, which are not read: save it dense.")
         if accessor.buffer_view is None:
-            if accessor.count > MAX_ROWS:
-                raise self.broken(f"{what} has {accessor.count} rows, but no buffer")
-            rows = np.zeros((accessor.count, columns), kind)
-        else:
-            rows = self._part(
-                accessor.buffer_view, accessor.byte_offset, accessor.count, columns, kind, what
-            )
-        return rows if accessor.sparse is None else self._replaced(rows, accessor, what)
+            raise self.broken(f"{what} has no buffer")
+        return self._part(
+            accessor.buffer_view, accessor.byte_offset, accessor.count, columns, kind, what
+        )
 
     def draco(self, part: DracoPart) -> tuple[dict[str, npt.NDArray[Any]], npt.NDArray[Any]]:
         """Return the attributes of a compressed primitive by their names, and its triangles."""
@@ -292,23 +264,6 @@ class Buffers:
     def broken(self, what: str) -> InputError:
         """Return the error of a file that contradicts itself."""
         return InputError(f"{self._name} is corrupt: {what}.")
-
-    def _replaced(self, rows: npt.NDArray[Any], accessor: Accessor, what: str) -> npt.NDArray[Any]:
-        """Return ``rows`` with the values of a sparse accessor in their places."""
-        sparse = accessor.sparse
-        assert sparse is not None
-        kind = COMPONENTS.get(sparse.indices.component_type, "")
-        if kind not in ("u1", "<u2", "<u4"):
-            raise self.broken(f"{what} has sparse indices of a wrong type")
-        view, offset = sparse.indices.buffer_view, sparse.indices.byte_offset
-        places = self._part(view, offset, sparse.count, 1, kind, what).ravel()
-        view, offset = sparse.values.buffer_view, sparse.values.byte_offset
-        values = self._part(view, offset, sparse.count, rows.shape[1], rows.dtype.str, what)
-        if len(places) and int(places.max()) >= len(rows):
-            raise self.broken(f"{what} has a sparse index beyond its end")
-        rows = rows.copy()
-        rows[places] = values
-        return rows
 
     def _part(
         self, number: int, offset: int, count: int, columns: int, kind: str, what: str
