@@ -18,8 +18,8 @@ from katana450.arm.control.plans import path_to, plan_along, plan_to
 from katana450.arm.control.session import TOOL_SPEED, Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import BlockedError, InputError
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc, ToolLine
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.kinematics.branch import branch_of

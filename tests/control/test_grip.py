@@ -19,8 +19,8 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import ToolLine
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.solver import inverse

@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.control.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
-from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.planning.curve_path import PosePath
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run, step
 from katana450.extensions.programs.script.script import parse

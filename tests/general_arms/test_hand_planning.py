@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.programs.building.plan_state import PlanState
-from katana450.extensions.programs.planning.arm_plane import ArmPlane
+from katana450.extensions.programs.planning.hand_frames import ArmPlane
 from katana450.extensions.programs.planning.hand_planning import HandPlanning
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.kinematics.chain import Chain

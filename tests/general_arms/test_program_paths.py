@@ -11,7 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import Angles
-from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.planning.curve_path import PosePath
 from katana450.extensions.recording.codec import Codec, json_form, json_text
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.batch import forward_batch

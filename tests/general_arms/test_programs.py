@@ -10,7 +10,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.extensions.programs.building.plan_state import UntimedPath
 from katana450.extensions.programs.language.step_target import StepTarget
-from katana450.extensions.programs.planning.pose_path import PosePath
+from katana450.extensions.programs.planning.curve_path import PosePath
 from katana450.extensions.programs.steps.moves import Home, Joints, Move, Nudge, Via
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.batch import forward_batch

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm import ArmModel
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc, ToolLine, ToolLines
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.tool import ToolTarget

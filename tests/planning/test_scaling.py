@@ -13,8 +13,8 @@ from ruckig import InputParameter, Ruckig, Trajectory
 
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import ToolLines
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
 from katana450.maths.planning.scaling import Bounds, Scaling, motion_after, rest_to_rest

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import InputError
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import (
     Linear,
     Swing,
@@ -22,7 +23,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolScrew,
 )
 from katana450.extensions.programs.planning.roomiest_pitch import roomiest
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

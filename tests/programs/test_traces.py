@@ -13,8 +13,8 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.plans import plan_along
 from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.programs.server.traces import (
     BAD_COLOUR,
     GOOD_COLOUR,

@@ -29,6 +29,7 @@ from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.stop_cause import pressed
 from katana450.arm.robot.props import load_props, water_environment
+from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
     Linear,
@@ -40,7 +41,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolTurn,
     TurnedCurve,
 )
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.recording.codec import (
     Codec,
     form_of,

@@ -15,8 +15,7 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.planning.pose_path import PosePath
-from katana450.extensions.programs.planning.tool_path import ToolPath
+from katana450.extensions.programs.planning.curve_path import PosePath, ToolPath
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.script.measures import motion_measures, water_measures

@@ -27,6 +27,7 @@ from katana450.arm.control.commands import Command
 from katana450.arm.control.solid import Solid
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
+from katana450.extensions.programs.planning.curve_path import PosePath, ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
     Linear,
@@ -39,8 +40,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolTurn,
     TurnedCurve,
 )
-from katana450.extensions.programs.planning.pose_path import PosePath
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath
 from katana450.extensions.recording.former_forms import CLASSES, FORMER, command_form, upgraded
 from katana450.extensions.recording.forms import (

@@ -10,9 +10,9 @@ import numpy as np
 
 from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.building.plan_state import PlanState
+from katana450.extensions.programs.planning.curve_path import LostPathError
 from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.extensions.programs.planning.out_of_reach import farthest, near_points
-from katana450.extensions.programs.planning.pose_path import LostPathError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import ToolTarget

@@ -27,8 +27,13 @@ from katana450.extensions.programs.planning.approach import (
     symmetry,
     widths,
 )
-from katana450.extensions.programs.planning.arm_plane import PLANAR_AXES, ROLLING_AXES, ArmPlane
-from katana450.extensions.programs.planning.grasp_frame import GraspFrame, grasp_frame
+from katana450.extensions.programs.planning.hand_frames import (
+    PLANAR_AXES,
+    ROLLING_AXES,
+    ArmPlane,
+    GraspFrame,
+    grasp_frame,
+)
 from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -20,14 +20,13 @@ from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.language.step_target import Angles
+from katana450.extensions.programs.planning.curve_path import CurveSearch, LostPathError, ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
     ToolScrew,
     TurnedCurve,
     screw_points,
 )
-from katana450.extensions.programs.planning.pose_path import CurveSearch, LostPathError
-from katana450.extensions.programs.planning.tool_path import ToolPath
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of

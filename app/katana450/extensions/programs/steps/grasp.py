@@ -15,9 +15,8 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers, UseTool
-from katana450.extensions.programs.building.carry import APPROACHES
 from katana450.extensions.programs.building.conditions import Held
-from katana450.extensions.programs.building.finger_planning import with_fingers
+from katana450.extensions.programs.building.hand_motions import APPROACHES, with_fingers
 from katana450.extensions.programs.building.plan_state import GraspInfo, PlanState
 from katana450.extensions.programs.building.step import Conditional, Step
 from katana450.extensions.programs.language.kinds import Object, angle, choice, millimetres

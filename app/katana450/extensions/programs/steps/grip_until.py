@@ -10,7 +10,7 @@ from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
-from katana450.extensions.programs.building.finger_planning import with_fingers
+from katana450.extensions.programs.building.hand_motions import with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.kinds import ObjectName, number

@@ -15,8 +15,7 @@ from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.arm.control.support import check_carried, is_over, surface_below
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
-from katana450.extensions.programs.building.carry import APPROACHES, carry
-from katana450.extensions.programs.building.finger_planning import with_fingers
+from katana450.extensions.programs.building.hand_motions import APPROACHES, carry, with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Declared

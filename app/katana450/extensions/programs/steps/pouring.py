@@ -15,10 +15,17 @@ from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import Action, SetSpeed, Wait
-from katana450.extensions.programs.building.carry import carry
+from katana450.extensions.programs.building.hand_motions import carry
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.building.vessel_turn import VesselTurn, turns_over
+from katana450.extensions.programs.building.vessel_turn import (
+    RatedTilt,
+    RatePlan,
+    VesselTurn,
+    film_after,
+    tilt_for,
+    turns_over,
+)
 from katana450.extensions.programs.language import kinds
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.expression import PLAIN
@@ -26,12 +33,6 @@ from katana450.extensions.programs.language.kinds import NAME, ObjectName, numbe
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import YamlValue
 from katana450.extensions.programs.planning.curves import Curve
-from katana450.extensions.programs.planning.pour_tilt import (
-    RatedTilt,
-    RatePlan,
-    film_after,
-    tilt_for,
-)
 from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
 

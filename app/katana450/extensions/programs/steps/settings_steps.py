@@ -17,7 +17,7 @@ from katana450.extensions.programs.building.actions import (
     Wait,
 )
 from katana450.extensions.programs.building.conditions import CONDITION, Condition
-from katana450.extensions.programs.building.finger_planning import finger_unit, with_fingers
+from katana450.extensions.programs.building.hand_motions import finger_unit, with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Kind

@@ -1,8 +1,13 @@
-"""Planning of finger motions by the session's own rules, so that a run does what was planned."""
+"""Motions of the fingers, and of the hand to an object and with it.
+
+The session's own rules move the fingers, so that a run does what was planned.
+"""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from katana450.arm.control.commands import Gripper
 from katana450.arm.control.messages import part
@@ -10,6 +15,10 @@ from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.building.plan_state import TICK, PlanState
+from katana450.extensions.programs.planning.approach import UP
+from katana450.extensions.programs.planning.curves import Curve, arc_between, line_between
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.planning.plan import JOIN_TOLERANCE
 
 
 def with_fingers(plan: PlanState, position: float) -> State:
@@ -51,3 +60,32 @@ def _obstacle(plan: PlanState, state: State) -> str:
     if obstacle in names:
         remedy = f"Leave more room beside {part(obstacle)}, or come from another side."
     return f"{part(finger)} would meet {part(obstacle)}. {remedy}"
+
+
+APPROACHES = (0.09, 0.07, 0.055, 0.045, 0.035)
+"""[m] Distances of approach and retreat of the open fingers, tried from the farthest."""
+
+
+def carry(plan: PlanState, to: ToolTarget, name: str) -> PlanState:
+    """Return ``plan`` with the way of the tool to ``to``: vertically, about axis 1, then radially.
+
+    The tool keeps its present orientation up to the last part. An object that is held upright stays
+    upright unless ``to`` has another orientation.
+    """
+    at, hand = plan.target, plan.hand
+    here = math.atan2(at.position[1], at.position[0])
+    there = math.atan2(to.position[1], to.position[0])
+    radius = math.hypot(at.position[0], at.position[1])
+    z = float(to.position[2])
+    raised = at.moved(at.position * (1, 1, 0) + UP * max(z, at.position[2]))
+    turn = hand.way_round(here, there)
+    beside = np.array((radius * math.cos(there), radius * math.sin(there), raised.position[2]))
+    over = hand.turned(raised, beside, turn)
+    curves: list[Curve] = []
+    if (raised.position != at.position).any():
+        curves.append(line_between(at, raised))
+    if abs(turn) > JOIN_TOLERANCE:
+        curves.append(arc_between(np.zeros(3), UP, turn, 0.0, raised, over))
+    if max(over.apart(to)) > JOIN_TOLERANCE:
+        curves.append(line_between(over, to))
+    return plan.lead(curves, name) if curves else plan
