@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
@@ -61,7 +60,7 @@ def seen(chain: Chain, q: FloatArray) -> Seen:
 
 
 def name_of(chain: Chain, q: FloatArray) -> list[str]:
-    return BranchSolver(kinematics_of(chain)).branch_of(q).split("-")
+    return str(DrivenTool(chain).branch_of(q)).split("-")
 
 
 def postures(chain: Chain, seed: int) -> FloatArray:
@@ -251,10 +250,8 @@ def test_solution_of_each_branch_looks_as_its_name_says(name: str) -> None:
     chain = ARMS[name]
     solver = kinematics_of(chain)
     assert isinstance(solver, ClosedForm | SevenAxes)
-    branches = BranchSolver(solver)
-    assert len(set(branches.names)) == len(branches.names) == (4 if chain.n == 4 else 8)
-    swivel = branches.swivel
-    joints = tuple(k for k in range(chain.n) if k != swivel)
+    assert len(set(solver.branches)) == len(solver.branches) == (4 if chain.n == 4 else 8)
+    joints = tuple(k for k in range(chain.n) if k != solver.swivel)
     words = BranchWords(chain, joints, solver.is_reversed)
     for q in postures(chain, 10)[:10]:
         for each in solver.inverse(forward(chain, q), q):

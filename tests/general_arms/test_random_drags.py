@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state import State
-from katana450.extensions.general_arms.branch_solver import near_turns
 from katana450.extensions.general_arms.descent import NEAR
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
+from katana450.extensions.general_arms.general_kinematics import near_turns
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -61,15 +61,14 @@ def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -
 
     Four axes turn the pose with axis 1, and seven keep their swivel.
     """
-    branches, chain = tool._branches, tool.chain
-    if isinstance(branches.solver, SevenAxes):
-        swivel = q[[branches.solver.swivel]]
-        found = branches.solver.at_swivels(place.T, swivel)[0][branches.names.index(branch)]
+    solver, chain = tool._solver, tool.chain
+    if isinstance(solver, SevenAxes):
+        found = solver.at_its_swivel(place.T[None], q)[0, solver.branches.index(branch)]
         return near_turns(chain, found, q) if np.isfinite(found).all() else None
     for _ in range(SETTLINGS if chain.n < 6 else 1):
         pose = np.array(place.T)
         pose[:3, :3] = tool._pan(q) @ pose[:3, :3]
-        found = branches.on_branch(pose, branch, q)
+        found = solver.on_branch(pose, branch, q)
         if found is None:
             return None
         q = found

@@ -15,6 +15,7 @@ from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
+from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.parallel_axes import (
     LOOSE,
@@ -101,7 +102,7 @@ def form_of(links: DHLinks) -> Form | str:
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedForm:
+class ClosedForm(GeneralKinematics):
     """Inverse kinematics of one chain in closed form: all branches of every pose.
 
     Attributes:
@@ -110,7 +111,6 @@ class ClosedForm:
         is_reversed: whether it is that of the chain seen from the tool.
     """
 
-    chain: Chain
     form: Form
     is_reversed: bool = False
 
@@ -132,6 +132,15 @@ class ClosedForm:
     def method(self) -> str:
         """The method in words."""
         return self.form.method
+
+    @property
+    def is_exact(self) -> bool:
+        """True for six axes."""
+        return self.chain.n == 6
+
+    def postures(self, T: FloatArray, near: FloatArray) -> FloatArray:
+        """Return `solve` with the angles of ``near`` where the pose leaves them free."""
+        return np.array(self.solve(T, near.tolist()))
 
     @cached_property
     def branches(self) -> tuple[str, ...]:

@@ -22,9 +22,12 @@ from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf
 from katana450.caching import cached_property
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.extensions.general_arms.descent import WALL, Descent, Regularity
+from katana450.extensions.general_arms.general_kinematics import (
+    GeneralKinematics,
+    in_order_for_people,
+)
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.nearest import losses_of, nearest_posture, projected
 from katana450.extensions.general_arms.numerical import Numerical
@@ -158,36 +161,38 @@ class DrivenTool:
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = SIX_PRIORITIES
 
     @cached_property
-    def _branches(self) -> BranchSolver:
-        return BranchSolver(kinematics_of(self.chain))
+    def _solver(self) -> GeneralKinematics:
+        solver = kinematics_of(self.chain)
+        assert isinstance(solver, GeneralKinematics)
+        return solver
 
     @cached_property
     def _tracker(self) -> PoseTracker:
         search = Numerical(self.chain, links_of(self.chain, exact=False))
-        regularity = Regularity(self.chain.n, self._branches.swivel)
-        return PoseTracker(Descent(search, regularity), self._branches)
+        regularity = Regularity(self.chain.n, self._solver.swivel)
+        return PoseTracker(Descent(search, regularity), self._solver)
 
     @property
     def method(self) -> str:
         """The method in words."""
-        return self._branches.solver.method
+        return self._solver.method
 
     @property
     def branches(self) -> tuple[AnyBranch, ...]:
         """The names of the branches, those of usual postures first."""
-        return self._branches.shown
+        return in_order_for_people(self._solver.branches)
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each branch; see `Kinematics.inverse`."""
-        return self._branches.solver.inverse(T, q_hint)
+        return self._solver.inverse(T, q_hint)
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return joint angles (N, branches, n) [rad]; see `Kinematics.inverse_batch`."""
-        return self._branches.solver.inverse_batch(T)
+        return self._solver.inverse_batch(T)
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the name of the branch of `q` (n,) [rad]."""
-        return self._branches.branch_of(q)
+        return self._solver.branch_of(q)
 
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the pose of the tool at `q` (n,) [rad]."""
@@ -218,12 +223,11 @@ class DrivenTool:
     def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, see `PoseTracker`."""
         branch = str(state.branch)
-        found = self._tracker.track(state.goal, target, since, branch, state.priority)
-        best = self._projected(found.q, target, branch, state.priority)
-        if found.since is not None or found.beyond_gap is None:
-            return Tracked(best, since=found.since)
-        ahead = self._projected(found.beyond_gap, target, branch, state.priority)
-        return Tracked(best, beyond_gap=ahead)
+
+        def projected(q: FloatArray) -> Projection:
+            return self._projected(q, target, branch, state.priority)
+
+        return self._tracker.track(state.goal, target, since, branch, state.priority, projected)
 
     def _projected(
         self, q: FloatArray, target: ToolTarget, branch: str, priority: Priority
@@ -277,7 +281,7 @@ class DrivenTool:
         its limits are those that do so.
         """
         best = min(found, key=lambda each: (each.branch != branch, *_misses(each, state.priority)))
-        closed = self._branches.on_branch(T, str(branch), state.goal)
+        closed = self._solver.on_branch(T, str(branch), state.goal)
         if best.branch == branch or closed is None:
             return best
         slack = tolerances.LIMIT_SLACK
@@ -288,7 +292,7 @@ class DrivenTool:
 
     def _starts(self, state: State, T: FloatArray, branch: AnyBranch) -> list[FloatArray]:
         """Return postures (n,) [rad] from which the one nearest to `T` (4, 4) is searched."""
-        closed = self._branches.on_branch(T, str(branch), state.goal)
+        closed = self._solver.on_branch(T, str(branch), state.goal)
         if closed is None:
             closed = nearest_posture(kinematics_of(self.chain), T, q_hint=state.goal).q
         starts = [self.chain.clamp(closed)]
@@ -341,7 +345,7 @@ class DrivenTool:
         Of more than six axes the swivel is locked, or the joints without which the others move the
         tool best.
         """
-        swivel = self._branches.swivel
+        swivel = self._solver.swivel
         found = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
         while len(found.free) > 6:
             rest = [replace(found, locked=(*found.locked, k)) for k in found.free]

@@ -23,11 +23,11 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.caching import cached_property
+from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import inverse_one_by_one
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turns
@@ -145,7 +145,7 @@ class SearchState(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Numerical:
+class Numerical(GeneralKinematics):
     """Numerical inverse kinematics of one chain; the module's text describes the method.
 
     Attributes:
@@ -155,7 +155,6 @@ class Numerical:
         weight: weight of the position beside the orientation.
     """
 
-    chain: Chain
     links: DHLinks
     why: str = ""
     weight: float = 1.0

@@ -10,20 +10,28 @@ The goal stays on its branch and never leaps; a pose that only a leap would reac
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from katana450 import tolerances
-from katana450.extensions.general_arms.branch_solver import BranchSolver
 from katana450.extensions.general_arms.descent import NEAR, WALL, Angles, Descent
+from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import DRAG_STRIDE, HOP, MAX_PATH_LENGTH, MIN_LEAP_GAIN
+from katana450.maths.kinematics.tracker import (
+    DRAG_STRIDE,
+    HOP,
+    MAX_PATH_LENGTH,
+    MIN_LEAP_GAIN,
+    Tracked,
+)
 
 MAX_EFFORT: Final = 20
 """Maximum effort of one call, in looks at a posture. The next call continues."""
@@ -45,27 +53,11 @@ EXACT: Final = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Pursued:
-    """The end of one call.
-
-    Attributes:
-        q: joint angles of the goal (n,) [rad].
-        since: the place of the path from which the next call continues; None at the end of the
-            path.
-        beyond_gap: joint angles (n,) [rad] nearer to the target that only a leap would reach.
-    """
-
-    q: FloatArray
-    since: ToolTarget | None = None
-    beyond_gap: FloatArray | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class PoseTracker:
     """The tracker of one arm. Its methods are pure."""
 
     descent: Descent
-    branches: BranchSolver
+    branches: GeneralKinematics
 
     @property
     def chain(self) -> Chain:
@@ -73,9 +65,18 @@ class PoseTracker:
         return self.descent.search.chain
 
     def track(
-        self, q: FloatArray, target: ToolTarget, since: ToolTarget, branch: str, priority: Priority
-    ) -> Pursued:
-        """Return the goal moved on from `q` (n,) [rad] on ``branch`` towards ``target``."""
+        self,
+        q: FloatArray,
+        target: ToolTarget,
+        since: ToolTarget,
+        branch: str,
+        priority: Priority,
+        projected: Callable[[FloatArray], Projection],
+    ) -> Tracked:
+        """Return the goal moved on from `q` (n,) [rad] on ``branch`` towards ``target``.
+
+        ``projected`` returns the projection of ``target`` that joint angles give.
+        """
         here, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
         distance, angle = since.apart(target)
         count = max(1, math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH)))
@@ -87,10 +88,11 @@ class PoseTracker:
                 kept = self._with_its_swivel(before, stop, branch)
                 here, ended = (here, False) if kept is None else (kept, True)
             if not ended or (effort <= 0 and number < count):
-                return Pursued(np.array(here), since=stop if ended else place)
+                return Tracked(projected(np.array(here)), since=stop if ended else place)
             place = stop
-        found = np.array(here)
-        return Pursued(found, beyond_gap=self._beyond(found, target, branch, priority))
+        goal = np.array(here)
+        beyond = self._beyond(goal, target, branch, priority)
+        return Tracked(projected(goal), None if beyond is None else projected(beyond))
 
     def _advanced(
         self,
@@ -136,15 +138,22 @@ class PoseTracker:
         On the way every posture is inside the limits, clear of the edge, and a hop from the last.
         """
         here = np.array(q)
-        if not self._takes(stop, self.branches.at_its_swivel(stop.T[None], branch, here)[0]):
+        number = self.branches.branches.index(branch)
+
+        def on_branch(places: Sequence[ToolTarget]) -> FloatArray:
+            T = np.array([place.T for place in places])
+            postures = self.branches.at_its_swivel(T, here)
+            assert postures is not None
+            return postures[:, number]
+
+        if not self._takes(stop, on_branch([stop])[0]):
             return None
         start = ToolTarget.of(forward(self.chain, here))
         places = [
             *(start.towards(stop, k / SWIVEL_SAMPLES) for k in range(1, SWIVEL_SAMPLES)),
             stop,
         ]
-        found = self.branches.at_its_swivel(np.array([each.T for each in places]), branch, here)
-        steps = np.diff(found, axis=0, prepend=here[None])
+        steps = np.diff(on_branch(places), axis=0, prepend=here[None])
         steps -= math.tau * np.round(steps / math.tau)
         postures = here + np.cumsum(steps, axis=0)
         leads = np.abs(steps).max() <= HOP and all(map(self._takes, places, postures))

@@ -28,6 +28,7 @@ from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS
+from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.spherical_wrist import (
@@ -88,7 +89,7 @@ def _locks_first(links: DHLinks) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class SevenAxes:
+class SevenAxes(GeneralKinematics):
     """Inverse kinematics of seven axes with the joint ``locked`` as parameter.
 
     Attributes:
@@ -98,7 +99,6 @@ class SevenAxes:
         is_reversed: whether `links` are seen from the tool.
     """
 
-    chain: Chain
     links: DHLinks
     locked: int
     is_reversed: bool
@@ -171,6 +171,14 @@ class SevenAxes:
             for place, angle in zip(places, angles, strict=True):
                 q[:, k, place] = angle - links.shift[place]
         return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
+
+    def postures(self, T: FloatArray, near: FloatArray) -> FloatArray:
+        """Return `best` with ``near`` as the hint."""
+        return self.best(T, near)
+
+    def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray:
+        """Return `at_swivels` with the swivel of ``near`` for each of the poses."""
+        return self.at_swivels(T, np.full(len(T), near[self.swivel]))
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.

@@ -1,0 +1,104 @@
+"""The interface of the kinematics of arms outside the five-axis family, with their branches."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450 import tolerances
+from katana450.extensions.general_arms.branch_words import SECOND
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.solution import Solutions
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralKinematics(ABC):
+    """The `Kinematics` of one chain that also tell its branches apart."""
+
+    chain: Chain
+
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """The method in words."""
+
+    @property
+    @abstractmethod
+    def branches(self) -> tuple[str, ...]:
+        """The names of the branches, in the order of the solutions."""
+
+    @abstractmethod
+    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
+        """Return a posture for each branch; see `Kinematics.inverse`."""
+
+    @abstractmethod
+    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
+        """Return joint angles (N, branches, n) [rad]; see `Kinematics.inverse_batch`."""
+
+    @property
+    def swivel(self) -> int | None:
+        """Index of the joint that is the parameter of seven axes; None without one."""
+        return None
+
+    @property
+    def is_exact(self) -> bool:
+        """True if each branch has one posture for every pose, in closed form."""
+        return False
+
+    def postures(self, T: FloatArray, near: FloatArray) -> FloatArray | None:  # noqa: ARG002
+        """Return the posture (k, n) [rad] of each branch for the pose `T` (4, 4), near ``near``.
+
+        None without a closed form. A posture may miss the pose, and be beyond the limits; its
+        angles are not numbers where the branch has none.
+        """
+        return None
+
+    def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray | None:
+        """Return `postures` (N, k, n) for poses (N, 4, 4), with the swivel of ``near`` (n,)."""
+        postures = [posture for pose in T if (posture := self.postures(pose, near)) is not None]
+        return np.array(postures) if postures else None
+
+    def branch_of(self, q: FloatArray) -> str:
+        """Return the name of the branch of the joint angles `q` (n,) [rad]."""
+        postures = self.at_its_swivel(forward(self.chain, q)[None], q)
+        if postures is None:
+            return self.branches[0]
+        turns = postures[0] - q
+        turns -= math.tau * np.round(turns / math.tau)
+        return self.branches[int(np.nan_to_num(np.abs(turns), nan=math.inf).max(axis=1).argmin())]
+
+    def on_branch(self, T: FloatArray, branch: str, near: FloatArray) -> FloatArray | None:
+        """Return the joint angles (n,) [rad] of ``branch`` for the pose `T` (4, 4), near ``near``.
+
+        Each angle is in the turn nearest to ``near`` that is inside its limits. None for an arm
+        without a closed form. The posture may miss the pose, and be beyond the limits.
+        """
+        postures = self.postures(T, near)
+        if postures is None:
+            return None
+        q = postures[self.branches.index(branch)]
+        return near_turns(self.chain, q, near) if np.isfinite(q).all() else None
+
+
+def in_order_for_people(branches: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of branches with those of usual postures first."""
+    second = {name: [word in SECOND for word in name.split("-")] for name in branches}
+    return tuple(sorted(branches, key=second.__getitem__))
+
+
+def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:
+    """Return `q` (n,) [rad], each angle in the turn nearest to ``near`` inside its limits."""
+    q = q + math.tau * np.round((near - q) / math.tau)
+    slack = tolerances.LIMIT_SLACK
+    for turn in (math.tau, -math.tau):
+        outside = (q < chain.lower - slack) | (q > chain.upper + slack)
+        other = q + turn
+        fits = outside & (other >= chain.lower - slack) & (other <= chain.upper + slack)
+        q = np.where(fits, other, q)
+    return q
