@@ -28,7 +28,7 @@ from katana450.extensions.importers.scene_file import (
     written,
 )
 from katana450.extensions.importers.shape_file import Up
-from katana450.extensions.programs.script.scene_draft import MeshFile, Scene, parsed
+from katana450.extensions.programs.script.script_scene import MeshFile, Scene, parsed
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 

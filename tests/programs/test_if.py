@@ -14,7 +14,7 @@ from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.timeline import Timeline, moments
+from katana450.extensions.programs.run.simulation import Timeline, moments
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import current_step, page, steps_of
 from tests.programs.conftest import TICK, Stage

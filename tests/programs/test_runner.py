@@ -18,7 +18,7 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.timeline import Timeline
+from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import steps_of
 from katana450.maths.kinematics.forward import forward

@@ -10,7 +10,7 @@ import pytest
 
 from katana450.arm.control.state import ActiveStop
 from katana450.extensions.programs.run.program import Program, compiled
-from katana450.extensions.programs.run.timeline import Moment, Timeline, moments
+from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
 from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.water.units import MILLILITRE

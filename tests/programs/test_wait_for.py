@@ -14,7 +14,7 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.run.timeline import Timeline, moments
+from katana450.extensions.programs.run.simulation import Timeline, moments
 from katana450.extensions.programs.script.script import parse
 from tests.programs.conftest import TICK, Stage
 

@@ -20,7 +20,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import Program, compiled
-from katana450.extensions.programs.run.timeline import Timeline
+from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import Scripts

@@ -22,6 +22,7 @@ from katana450.client.files import LostError
 from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
 from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.run.compiler import ConditionalJump
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import (
@@ -30,7 +31,6 @@ from katana450.extensions.programs.run.simulation import (
     ready,
     run_by_clock,
 )
-from katana450.extensions.programs.run.task_list import ConditionalJump
 from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun

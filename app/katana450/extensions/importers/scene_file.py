@@ -32,16 +32,16 @@ from katana450.extensions.importers.shape_file import Format, Up
 from katana450.extensions.objects.scenes import free_name
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
-from katana450.extensions.programs.script.scene_draft import (
+from katana450.extensions.programs.script.script import is_script, parse
+from katana450.extensions.programs.script.script_files import files_in
+from katana450.extensions.programs.script.script_scene import (
     VERSION,
     MeshFile,
     Scene,
     SceneDraft,
+    check_scene,
     parsed,
 )
-from katana450.extensions.programs.script.script import is_script, parse
-from katana450.extensions.programs.script.script_files import files_in
-from katana450.extensions.programs.script.script_scene import check_scene
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import ML

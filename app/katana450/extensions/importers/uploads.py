@@ -22,7 +22,7 @@ from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import StoredScene, read_scene_zip, scene_zip
 from katana450.extensions.importers.shape_file import LONGEST_NAME, Format
 from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
-from katana450.extensions.programs.script.scene_draft import Scene
+from katana450.extensions.programs.script.script_scene import Scene
 from katana450.maths.planning.checkpoint import checked_by
 from katana450.maths.water.units import MILLILITRE, ML
 from katana450.server.api import answers

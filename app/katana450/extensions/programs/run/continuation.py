@@ -16,10 +16,10 @@ from katana450.extensions.programs.building.plan_state import (
     PlanState,
     UntimedPath,
 )
+from katana450.extensions.programs.run.compiler import ConditionalJump
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.situation import Situation
-from katana450.extensions.programs.run.task_list import ConditionalJump
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.plan import Plan

@@ -19,8 +19,7 @@ from katana450.extensions.programs.building.step import (
     numbered,
 )
 from katana450.extensions.programs.language.step_target import ScriptFrame
-from katana450.extensions.programs.run.compiler import Compiler, Report
-from katana450.extensions.programs.run.task_list import ConditionalJump
+from katana450.extensions.programs.run.compiler import Compiler, ConditionalJump, Report
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.steps.settings_steps import WaitUntil
 from katana450.maths.geometry.arrays import FloatArray

@@ -15,9 +15,9 @@ from katana450.extensions.programs.building.actions import (
     SetSpeed,
     expected_time,
 )
+from katana450.extensions.programs.run.compiler import ConditionalJump
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.task_list import ConditionalJump
-from katana450.extensions.programs.steps.grip_until import CloseUntil
+from katana450.extensions.programs.steps.settings_steps import CloseUntil
 from katana450.server.api.answers import Progress
 
 FULL_SPEED = SetSpeed(1.0)

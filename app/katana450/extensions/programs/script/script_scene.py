@@ -1,31 +1,297 @@
-"""The scene that a script needs, and its differences from the present one."""
+"""Scenes in scripts and files: objects, meshes, and what differs from the present scene."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.scene_objects import (
+    MAX_COORDINATE,
+    MAX_OBJECTS,
+    MAX_SCALE,
+    MIN_SCALE,
+    SceneObject,
+    Shape,
+)
 from katana450.arm.control.session import Session
+from katana450.arm.control.solid import MIN_OPACITY, Colour, ObjectAppearance, Solid
 from katana450.arm.control.state import State
 from katana450.errors import InputError
+from katana450.extensions.programs.language import kinds
 from katana450.extensions.programs.language.attached_files import attached_file, is_file_name
-from katana450.extensions.programs.language.declaration import Kind, record
-from katana450.extensions.programs.language.kinds import TEXT, any_of, bound
-from katana450.extensions.programs.language.scope import ScriptContext
-from katana450.extensions.programs.language.source import ScriptError, YamlValue
-from katana450.extensions.programs.script.scene_draft import (
-    OBJECTS,
-    Scene,
-    SceneDraft,
-    SceneEntry,
-    parsed,
+from katana450.extensions.programs.language.declaration import ALONE, Declared, Kind, record
+from katana450.extensions.programs.language.kinds import (
+    TEXT,
+    any_of,
+    bound,
+    choice,
+    degrees,
+    list_of,
+    listed,
+    millimetres,
+    number,
+    volume,
 )
+from katana450.extensions.programs.language.scope import ScriptContext
+from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue, read
+from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE, ML
+
+VERSION = 1
+"""Version of the format."""
+
+UNITS = ("mm", "cm", "in", "m")
+"""Units of a mesh file."""
+
+COLOUR = re.compile(r"#[0-9a-f]{6}")
+"""Pattern of a colour, in lower case."""
+
+MAX_WRITTEN_SIZE = 4000.0
+"""[mm] Maximum size in a text."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The scene objects, the water, and the posture of the arm.
+
+    Attributes:
+        objects: the objects; the fingers hold none of them.
+        water: volume of the water in the cup [m^3]; None for no water.
+        joints: (n,) posture of the arm [rad]; None if not given.
+    """
+
+    objects: tuple[SceneObject, ...]
+    water: float | None = None
+    joints: FloatArray | None = None
+
+
+def _digest(value: YamlValue, _context: ScriptContext) -> str:
+    if not re.fullmatch(r"[0-9a-f]{64}", str(value.held)):
+        raise value.wrong("A SHA-256 must have 64 digits from 0 to f.")
+    return str(value.held)
+
+
+def _colour(value: YamlValue, _context: ScriptContext) -> Colour:
+    word = str(value.held).lower()
+    if not COLOUR.fullmatch(word):
+        raise value.wrong(f'A colour must be like "#94a3b8", in quotes, not {value}.')
+    red, green, blue = bytes.fromhex(word[1:])
+    return red, green, blue
+
+
+def _pose(value: YamlValue, _context: ScriptContext) -> FloatArray:
+    """Read the pose (4, 4) [m] of six numbers."""
+    if value.kind != "list" or len(value.items) != 6:
+        raise value.wrong("A pose must be six numbers: x, y, z in mm, roll, pitch, yaw in degrees.")
+    lengths = [POSE_LENGTH(each) for each in value.items[:3]]
+    angles = [POSE_ANGLE(each) for each in value.items[3:]]
+    return se3.from_rotation_translation(so3.from_rpy(*angles), lengths)
+
+
+def _flag(value: YamlValue, _context: ScriptContext) -> bool:
+    word = str(value.held).lower()
+    if word not in ("true", "false", "yes", "no"):
+        raise value.wrong(f"Expected true or false, not {value}.")
+    return word in ("true", "yes")
+
+
+FLAG = Kind(_flag, {"type": "boolean"})
+SIZES = listed(millimetres(0.0, MAX_WRITTEN_SIZE), 1, 3)
+# In the frame of the tool, coordinates of a valid place can be larger.
+POSE_LENGTH = millimetres(-2e3 * MAX_COORDINATE, 2e3 * MAX_COORDINATE)
+POSE_ANGLE = degrees(-kinds.MAX_ANGLE, kinds.MAX_ANGLE)
+POSE = Kind(_pose, list_of(any_of("mm or deg", *POSE_LENGTH.schema["anyOf"]), 6, 6))
+
+
+@dataclass(frozen=True)
+class MeshFile(Declared):
+    """A mesh file.
+
+    Attributes:
+        path: path relative to the folder of the scene.
+        unit: unit of its coordinates, such as ``mm``; None to guess it.
+        up: axis that points up, ``y`` or ``z``; None for the default of the file format.
+        sha256: SHA-256 of the file in hexadecimal; None to accept any content.
+    """
+
+    noun = "a mesh"
+
+    path: Annotated[str, TEXT.about("File in the folder of the scene or below").named("file")]
+    unit: Annotated[str | None, choice(*UNITS).about("Unit of the file; guessed unless given")] = (
+        None
+    )
+    up: Annotated[str | None, choice("y", "z").about("Axis that points up")] = None
+    sha256: Annotated[
+        str | None, Kind(_digest, TEXT.schema).about("SHA-256 of the file, which is then checked")
+    ] = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SceneEntry(Declared):
+    """An object.
+
+    Attributes:
+        source: its place in the text, for error messages.
+        mesh: its mesh file; None for other shapes.
+        T: (4, 4) its pose [m] in the base frame, or in the tool frame if it is ``fixed``.
+
+    All others are as in ``SceneObject``.
+    """
+
+    noun = "an object"
+
+    source: YamlValue
+    name: Annotated[str, TEXT.about("Its name")]
+    shape_name: Annotated[
+        str, choice(*(shape.value for shape in Shape)).about("Its shape").named("shape")
+    ]
+    size: Annotated[
+        tuple[float, ...],
+        SIZES.about("mm. box: x, y, z; cylinder, vessel: radius, height; sphere: radius"),
+    ] = ()
+    mesh: Annotated[MeshFile | None, record(MeshFile)] = None
+    T: Annotated[
+        FloatArray,
+        POSE.about("x, y, z in mm, roll, pitch, yaw in deg, in the base frame").named("pose"),
+    ]
+    can_be_held: Annotated[bool, FLAG.about("Whether the fingers may grasp it")] = False
+    scale: Annotated[float, number(MIN_SCALE, MAX_SCALE, about="Factor on its size")] = 1.0
+    colour: Annotated[
+        Colour | None, Kind(_colour, TEXT.schema).about('Like "#94a3b8", in quotes')
+    ] = None
+    opacity: Annotated[float, number(MIN_OPACITY, 1.0, about="1 is opaque")] = 1.0
+    hidden: Annotated[bool, FLAG.about("Whether it is not drawn")] = False
+    attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistakes of a size or a mesh that the shape does not have."""
+        if given.get("shape_name") is None:
+            return
+        shape = Shape(given["shape_name"])
+        numbers, size = shape.numbers, given.get("size")
+        needed, other = ("mesh", "size") if shape is Shape.MESH else ("size", "mesh")
+        if needed not in given:
+            yield "", f"An object needs {needed!r}."
+        if other in given:
+            yield other, f"A {shape.value} has no {other!r}."
+        elif size is not None and len(size) != numbers:
+            yield "size", f"Expected a list of {numbers} values, not of {len(size)}."
+
+    @property
+    def shape(self) -> Shape:
+        """The shape."""
+        return Shape(self.shape_name)
+
+    @property
+    def fixed(self) -> bool:
+        """True if it moves with the hand."""
+        return self.attach == "hand"
+
+    @property
+    def appearance(self) -> ObjectAppearance:
+        """Colour, opacity and visibility."""
+        return ObjectAppearance(self.colour, self.opacity, self.hidden)
+
+
+def _entries(value: YamlValue, context: ScriptContext) -> tuple[SceneEntry, ...]:
+    """Read a list of objects with different names."""
+    entries = ENTRIES(value, context)
+    names: set[str] = set()
+    problems: list[Problem] = []
+    for entry in entries:
+        if entry.name in names:
+            problems += entry.source.wrong(f"There are two objects called {entry.name!r}.").problems
+        names.add(entry.name)
+    if problems:
+        raise ScriptError(tuple(problems))
+    return entries
+
+
+ENTRIES = listed(record(SceneEntry), 0, MAX_OBJECTS)
+OBJECTS = Kind(_entries, ENTRIES.schema).about("The objects")
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDraft(Declared):
+    """A scene as in a scene file.
+
+    Its mesh files are not read yet. The values are as in ``Scene``.
+    """
+
+    noun = "a scene"
+
+    version: Annotated[float, number(1, 1000, about="Version of the format").named("scene")] = (
+        VERSION
+    )
+    joints: Annotated[
+        tuple[float, ...] | None, listed(POSE_ANGLE, 1, 16).about("Posture at the start, deg")
+    ] = None
+    water: Annotated[float | None, volume(0.0, 10_000.0, "Water in the cup, ml")] = None
+    entries: Annotated[tuple[SceneEntry, ...], OBJECTS.named("objects")] = ()
+
+    @classmethod
+    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of another version."""
+        version = given.get("version")
+        if version not in (None, VERSION):
+            yield "version", f"The version must be {VERSION}, not {version:g}."
+
+    def scene(self, solids: Mapping[MeshFile, Solid], T_palm_tool: FloatArray | None) -> Scene:
+        """Return the scene, with the solid of each mesh file from ``solids``.
+
+        ``T_palm_tool``: (4, 4) pose of the default tool in the frame of the palm; None without a
+        hand. Raises ScriptError with all errors and their places in the text.
+        """
+        objects: list[SceneObject] = []
+        problems: list[Problem] = []
+        for entry in self.entries:
+            try:
+                if entry.fixed and T_palm_tool is None:
+                    raise InputError(
+                        "Nothing can be attached to the hand: this arm has no model of a hand. "
+                        "Remove `attach: hand`."
+                    )
+                objects.append(
+                    SceneObject(
+                        entry.name,
+                        entry.shape,
+                        entry.size,
+                        T_palm_tool @ entry.T
+                        if entry.fixed and T_palm_tool is not None
+                        else entry.T,
+                        entry.can_be_held,
+                        solid=None if entry.mesh is None else solids[entry.mesh],
+                        scale=entry.scale,
+                        appearance=entry.appearance,
+                        fixed=entry.fixed,
+                    )
+                )
+            except InputError as error:
+                problems += entry.source.wrong(str(error)).problems
+        if problems:
+            raise ScriptError(tuple(problems))
+        joints = None if self.joints is None else np.array(self.joints)
+        return Scene(tuple(objects), self.water, joints)
+
+
+def parsed(source: str, file: str = "") -> SceneDraft:
+    """Return the text of a scene file as a draft. Raises ScriptError with all its mistakes.
+
+    ``file`` is the name of the file, if a script names it.
+    """
+    value = read(source, "scene", file)
+    if value.kind == "mapping" and all(name.held != "scene" for name, _ in value.fields):
+        raise value.wrong("A scene needs 'scene', the version of its format.")
+    return SceneDraft.read(value, ALONE)
+
 
 SAME_PLACE = 1e-4
 """[m] Distance up to which an object is at the place that a script expects."""

@@ -10,18 +10,16 @@ from katana450.extension import provided
 from katana450.extensions.programs.building.step import STEPS
 from katana450.extensions.programs.steps import (
     grasp,
-    grip_until,
     moves,
     place,
     pouring,
     settings_steps,
-    table,
     tool_moves,
     trajectory,
 )
 
 MODULES = (
-    moves, tool_moves, settings_steps, table, grasp, grip_until, pouring, place,
+    moves, tool_moves, settings_steps, grasp, pouring, place,
     trajectory,
 )  # fmt: skip
 """The modules with steps."""

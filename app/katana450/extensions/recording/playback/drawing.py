@@ -12,7 +12,7 @@ from katana450.arm.control.pouring import CUP
 from katana450.arm.control.session import Session
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.programs.server.ghost_scene import SAME_PLACE, GhostScene
+from katana450.extensions.programs.server.preview import SAME_PLACE, GhostScene
 from katana450.extensions.recording.playback.rows import RecordedMoment, still_flying
 from katana450.server.view.scene import Colour, GhostNodes, Window, node_name
 from katana450.server.viser_bridge.gestures import Gestures
