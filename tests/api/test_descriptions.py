@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -20,6 +18,7 @@ from katana450.extensions.api_description import openapi_json
 from katana450.server.api import answers, requests
 from tests.api.test_documented import EVERY_REQUEST
 from tests.browser.server import RECORDING_APP, AppServer
+from tests.commands import completed
 from tests.exchange.tools import OPENAPI_VALIDATOR, needs_package
 from tests.gateway.client import ask
 from tests.gateway.lines import Lines
@@ -168,12 +167,8 @@ def test_validator_of_openapi_finds_nothing(tmp_path: Path) -> None:
     file = tmp_path / "openapi.json"
     for document, status in ((openapi(), 0), ({**openapi(), "paths": {"x": {"get": 3}}}, 1)):
         file.write_text(json.dumps(document), encoding="utf-8")
-        done = subprocess.run(
+        done = completed(
             [sys.executable, "-m", "openapi_spec_validator", str(file)],
-            env=os.environ | {"PYTHONPATH": str(OPENAPI_VALIDATOR.folder)},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=60.0,
+            env={"PYTHONPATH": str(OPENAPI_VALIDATOR.folder)},
         )
         assert done.returncode == status, done.stdout + done.stderr

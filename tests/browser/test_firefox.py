@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,6 +12,7 @@ from katana450.client import Client, connect
 from katana450.server.api import answers
 from tests.browser.firefox import Firefox, needs_firefox
 from tests.browser.server import SIMULATION_APP, AppServer
+from tests.waiting import until
 
 pytestmark = [needs_firefox, pytest.mark.long]
 
@@ -40,13 +40,6 @@ def firefox(server: AppServer) -> Iterator[Firefox]:
         firefox.open(server.url)
         firefox.wait_until(DRAWN)
         yield firefox
-
-
-def until(seen: Callable[[], Any], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not seen():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def height(arm: Client) -> float:

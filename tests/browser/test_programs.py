@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +17,7 @@ from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, clear_stop, resume, take
 from tests.browser.sizes import PHONE, PORTRAIT
 from tests.gateway.test_programs import wait as wait_progress
+from tests.waiting import state_when
 
 pytestmark = pytest.mark.long
 
@@ -50,20 +51,14 @@ def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
     )
 
 
-def wait(arm: Client, condition: Callable[[answers.State], bool]) -> answers.State:
-    due = time.monotonic() + PLANNED
-    while not condition(state := arm.query(answers.State)):
-        assert time.monotonic() < due, state
-        time.sleep(0.02)
-    return state
-
-
 def test_previewed_plan_shows_one_duration_and_runs_immediately(
     page: ViserPage, arm: Client, artefacts: Path
 ) -> None:
     page.choose("Script", "Pour")
     page.click_button("Preview")
-    state = wait(arm, lambda state: state.program is not None and state.program.status == "ready")
+    state = state_when(
+        arm, lambda state: state.program is not None and state.program.status == "ready"
+    )
     assert state.program is not None
     page.wait_until(lambda: ", about" in page.text_of(".k450.program"), "its length")
     duration = re.search(r"about ([\d.]+) s", page.text_of(".k450.program"))
@@ -83,10 +78,10 @@ def test_previewed_plan_shows_one_duration_and_runs_immediately(
     page.keep(artefacts / "planning-sought.png")
     begun = time.monotonic()
     page.click_button("Run")
-    wait(arm, lambda state: state.program is not None and state.program.status == "running")
+    state_when(arm, lambda state: state.program is not None and state.program.status == "running")
     assert time.monotonic() - begun < 2.0
     page.press_in_bar("STOP")
-    wait(arm, lambda state: state.stopped is not None and not state.moving)
+    state_when(arm, lambda state: state.stopped is not None and not state.moving)
     page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
 
@@ -113,7 +108,7 @@ def test_pause_during_planning_lasts_until_resume(
     assert after.q == before.q
     page.press_in_bar("Resume")
     until(page, r"Square: .*, step \d+ of \d+.*", 5.0)
-    wait(arm, lambda state: state.moving)
+    state_when(arm, lambda state: state.moving)
     page.keep(artefacts / "planning-running.png")
     # The same controls change the pace of the program.
     page.press_in_bar("Pause")
@@ -121,11 +116,11 @@ def test_pause_during_planning_lasts_until_resume(
     resume(page)
     until(page, r"Square: .*", 5.0)
     page.page.get_by_role("slider", name="Speed in percent").fill("30")
-    wait(arm, lambda state: state.speed == 0.3)
+    state_when(arm, lambda state: state.speed == 0.3)
     assert page.page.inner_text("#speed output") == "30 %"
     assert not page.page.locator("#toast.shown").is_visible()
     page.press_in_bar("STOP")
-    wait(arm, lambda state: state.stopped is not None and not state.moving)
+    state_when(arm, lambda state: state.stopped is not None and not state.moving)
     page.press_in_bar("Clear stop")
     until(page, "On target", 5.0)
 

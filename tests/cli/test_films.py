@@ -15,6 +15,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image
 
 from katana450.cli.main import main
+from tests.commands import completed
 
 pytestmark = pytest.mark.long
 
@@ -35,9 +36,7 @@ def test_a_film_of_a_motion(tmp_path: Path) -> None:
     path = tmp_path / "m.mp4"
     words = ("--trajectory", str(tmp_path / "m.csv"), "--size", "160x100", "--fps", "10")
     subprocess.run(command("render", "--out", str(path), *words), cwd=ROOT, check=True, timeout=120)
-    output = subprocess.run(
-        [get_ffmpeg_exe(), "-i", str(path)], capture_output=True, text=True, check=False
-    ).stderr
+    output = completed([get_ffmpeg_exe(), "-i", str(path)]).stderr
     assert "160x100" in output
     assert "10 fps" in output
     # From 0 to 0.5 s, with both ends.

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from tests.browser.server import free_port
+from tests.commands import completed
 
 KATANA450 = str(Path(sys.executable).parent / "katana450")
 SCRIPT = "steps:\n  - gripper: open\n"
@@ -15,14 +16,7 @@ SCRIPT = "steps:\n  - gripper: open\n"
 def run(folder: Path, url: str) -> subprocess.CompletedProcess[str]:
     script = folder / "script.yaml"
     script.write_text(SCRIPT, encoding="utf-8")
-    return subprocess.run(
-        [KATANA450, "run", script.name, "--url", url],
-        capture_output=True,
-        text=True,
-        cwd=folder,
-        timeout=90,
-        check=False,
-    )
+    return completed([KATANA450, "run", script.name, "--url", url], cwd=folder, seconds=90)
 
 
 def test_server_is_started_beside_an_app_py_of_the_user(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from katana450.client import Client, connect
 from katana450.server.api import answers
 from tests.browser.server import AppServer
 from tests.gateway.test_programs import wait
+from tests.waiting import until
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo-terminals")
 
@@ -95,13 +96,6 @@ def script(tmp_path: Path) -> Path:
     path = tmp_path / "three.yaml"
     path.write_text(SCRIPT, encoding="utf-8")
     return path
-
-
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
-    due = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < due
-        time.sleep(0.02)
 
 
 def test_terminal_pauses_slows_and_continues(

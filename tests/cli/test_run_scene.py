@@ -12,6 +12,7 @@ import pytest
 
 from katana450.cli.main import main
 from tests.browser.server import AppServer, free_port
+from tests.commands import completed
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -49,14 +50,7 @@ def post(tmp_path: Path) -> Path:
 
 
 def run(*options: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "katana450", "run", *map(str, options)],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=120.0,
-        check=False,
-    )
+    return completed([sys.executable, "-m", "katana450", "run", *map(str, options)], seconds=120.0)
 
 
 def test_line_through_an_object_of_the_scene_is_refused(

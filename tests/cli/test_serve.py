@@ -15,19 +15,13 @@ import pytest
 
 from katana450.cli.main import main
 from tests.browser.server import AppServer, ServerError, free_port
+from tests.commands import completed
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def serve(*options: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "katana450", "serve", *options],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=False,
-    )
+    return completed([sys.executable, "-m", "katana450", "serve", *options])
 
 
 @pytest.fixture(scope="module")
@@ -143,14 +137,7 @@ def test_the_command_prints_its_version_and_its_commands(
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other limits")
 def test_too_low_limit_of_the_system_is_reported() -> None:
     command = [sys.executable, "-m", "katana450", "serve", "--port", str(free_port())]
-    done = subprocess.run(
-        ["sh", "-c", 'ulimit -n 20; exec "$0" "$@"', *command],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=60,
-        check=False,
-    )
+    done = completed(["sh", "-c", 'ulimit -n 20; exec "$0" "$@"', *command])
     assert done.returncode == 1
     assert "Only 20 files can be open at once" in done.stderr
     assert "ulimit" in done.stderr

@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shlex
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -24,6 +23,7 @@ from katana450.server.api import requests
 from katana450.server.api.program_requests import Program, Steer
 from katana450.server.api.requests import RequestDecoder
 from tests.browser.server import ROOT, AppServer
+from tests.commands import output
 from tests.docs.code_blocks import CodeBlock, code_block, code_blocks
 from tests.recording.sessions import drag, record_session
 
@@ -129,15 +129,7 @@ def own(command: str) -> str:
 
 def run(command: str) -> str:
     """Run a shell command and return what it prints; it has to succeed."""
-    done = subprocess.run(
-        ["bash", "-c", f"set -e; {command}"],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=SECONDS,
-    )
-    assert done.returncode == 0, f"{command}\n{done.stderr}"
-    return done.stdout
+    return output(["bash", "-c", f"set -e; {command}"], cwd=Path.cwd(), seconds=SECONDS)
 
 
 def test_every_block_names_a_language_that_is_checked_or_has_a_reason() -> None:

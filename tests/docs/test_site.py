@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import katana450
+from tests.commands import completed
 from tests.docs.code_blocks import DOCUMENTS, FENCE, ROOT
 
 ITEM = re.compile(r"(?:[-*]|\d+\.) ")
@@ -21,14 +21,7 @@ LOADED = re.compile(r'<(?:script|img|iframe|link)\b[^>]*?(?:src|href)="(https?:[
 
 @pytest.fixture(scope="module")
 def site() -> Path:
-    done = subprocess.run(
-        [sys.executable, "-m", "docs.site.build"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=240,
-    )
+    done = completed([sys.executable, "-m", "docs.site.build"], seconds=240)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "WARNING" not in done.stdout + done.stderr
     return ROOT / "build" / "site"

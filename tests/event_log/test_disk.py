@@ -6,7 +6,6 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,15 +17,9 @@ from katana450.extensions.event_log.records import Record, record
 from katana450.server.api import requests
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import CLOSING, numbered, records
+from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such devices")
-
-
-def wait(until: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not until():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def full(folder: Path) -> Path:
@@ -45,11 +38,11 @@ def test_writer_continues_when_a_full_disk_has_room_again(
         writer = DiskLog(folder, 8080)
         for content in numbered(50):
             writer.put(content)
-        wait(lambda: caplog.records)
+        until(lambda: caplog.records)
         (entry,) = caplog.records
         assert "cannot be written: No space left on device" in entry.getMessage()
         device.unlink()
-        wait(lambda: "is written again" in caplog.text)
+        until(lambda: "is written again" in caplog.text)
     writer.close(requested=True, timeout=CLOSING)
     lost, end = records(folder)
     assert (lost["kind"], lost["what"]["count"], end["kind"]) == ("lost", 51, "end")
@@ -71,7 +64,7 @@ def test_lost_records_stand_between_those_before_and_after_them(
     writer = DiskLog(tmp_path, 8080)
     for content in numbered(6):
         writer.put(content)
-    wait(lambda: not room[0])
+    until(lambda: not room[0])
     room[0] = 100
     writer.close(requested=True, timeout=CLOSING)
     start, *early, lost, end = records(tmp_path)
@@ -83,9 +76,9 @@ def test_record_that_cannot_be_written_is_counted(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     writer = DiskLog(tmp_path, 8080)
-    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
+    until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
     writer.put(record("command", object()))
-    wait(lambda: caplog.records)
+    until(lambda: caplog.records)
     writer.close(requested=True, timeout=CLOSING)
     start, lost, end = records(tmp_path)
     assert (lost["what"]["count"], start["kind"], end["kind"]) == (1, "start", "end")
@@ -93,7 +86,7 @@ def test_record_that_cannot_be_written_is_counted(
 
 def test_deleted_log_begins_again(tmp_path: Path) -> None:
     writer = DiskLog(tmp_path, 8080)
-    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
+    until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
     (tmp_path / PRESENT).unlink()
 
     def written() -> bool:
@@ -101,7 +94,7 @@ def test_deleted_log_begins_again(tmp_path: Path) -> None:
         time.sleep(0.1)
         return (tmp_path / PRESENT).exists()
 
-    wait(written)
+    until(written)
     writer.close(requested=True, timeout=CLOSING)
     lost, *_, end = records(tmp_path)
     assert (lost["kind"], end["kind"]) == ("lost", "end")
@@ -111,9 +104,9 @@ def test_second_writer_of_a_folder_waits_for_the_first(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     first = DiskLog(tmp_path, 8080)
-    wait(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
+    until(lambda: (tmp_path / PRESENT).exists() and records(tmp_path))
     second = DiskLog(tmp_path, 8080)
-    wait(lambda: "another server writes there" in caplog.text)
+    until(lambda: "another server writes there" in caplog.text)
     first.close(requested=True, timeout=CLOSING)
     # The place is free now.
     second.close(requested=True, timeout=CLOSING)
@@ -128,7 +121,7 @@ def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
         arm.ask(requests.Stop())
         assert server.output.count("cannot be written") == 1
         device.unlink()
-        wait(lambda: "is written again" in server.output)
+        until(lambda: "is written again" in server.output)
         arm.clear_stop()
     assert {"lost", "clear", "end"} <= {found["kind"] for found in records(folder)}
 

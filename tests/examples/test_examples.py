@@ -19,6 +19,7 @@ from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.script import Script, parse
 from katana450.extensions.programs.script.script_files import script_text
 from tests.browser.server import ROOT, AppServer
+from tests.commands import completed, output
 from tests.programs.conftest import Stage
 
 EXAMPLES = ROOT / "examples"
@@ -29,13 +30,8 @@ SLOW = ("boxes", "grid")
 
 def run(folder: Path, *command: str | Path) -> str:
     """Run a command in ``folder`` and return what it prints; it has to end well and quietly."""
-    done = subprocess.run(
-        [sys.executable, *(str(part) for part in command)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=SECONDS,
+    done = completed(
+        [sys.executable, *(str(part) for part in command)], cwd=folder, seconds=SECONDS
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -83,14 +79,8 @@ def test_arm_of_another_file_is_solved_and_planned(tmp_path: Path) -> None:
 
 def test_other_mechanism_is_refused_in_a_sentence(tmp_path: Path) -> None:
     file = ROOT / "tests" / "exchange" / "gantry.urdf"
-    done = subprocess.run(
-        [sys.executable, str(EXAMPLES / "my_own_arm.py"), str(file)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=SECONDS,
-    )
+    command = [sys.executable, str(EXAMPLES / "my_own_arm.py"), str(file)]
+    done = completed(command, cwd=tmp_path, seconds=SECONDS)
     assert done.returncode == 1
     assert done.stderr.startswith("This is not an arm for katana450: ")
 
@@ -110,15 +100,7 @@ def test_notebook_runs_from_top_to_bottom(tmp_path: Path) -> None:
     notebook.write_bytes((EXAMPLES / "quickstart.ipynb").read_bytes())
     execute = "from nbclient.cli import main; main()"
     command = ["-c", execute, "--timeout", str(SECONDS), "--inplace", str(notebook)]
-    done = subprocess.run(
-        [sys.executable, *command],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=2 * SECONDS,
-    )
-    assert done.returncode == 0, done.stderr
+    output([sys.executable, *command], cwd=tmp_path, seconds=2 * SECONDS)
     executed = notebook.read_text(encoding="utf-8")
     assert "image/png" in executed
     assert "<iframe" in executed

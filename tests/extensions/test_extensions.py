@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import subprocess
 import sys
 import urllib.request
@@ -14,6 +13,7 @@ import pytest
 from katana450.extension import Extension, extensions, load
 from katana450.server.api.fields import ROOT as ROOT_PATH
 from tests.browser.server import AppServer, free_port
+from tests.commands import completed
 from tests.extensions.environments import distribution
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -64,17 +64,8 @@ EXTENSION = Extension(
 
 def katana450(*options: str, folder: Path | None = None, text: str = "") -> str:
     """Return exit status, a space, and the output of a command with its errors."""
-    environment = os.environ | ({} if folder is None else {"PYTHONPATH": str(folder)})
-    done = subprocess.run(
-        [sys.executable, "-m", "katana450", *options],
-        input=text,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        env=environment,
-        timeout=60,
-        check=False,
-    )
+    environment = {} if folder is None else {"PYTHONPATH": str(folder)}
+    done = completed([sys.executable, "-m", "katana450", *options], text=text, env=environment)
     assert "Traceback" not in done.stderr
     return f"{done.returncode} {done.stdout}{done.stderr}"
 

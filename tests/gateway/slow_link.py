@@ -8,7 +8,6 @@ import random
 import socket
 import threading
 from contextlib import suppress
-from types import TracebackType
 from typing import Self
 
 SLICE = 0.02
@@ -49,12 +48,7 @@ class SlowLink:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
 

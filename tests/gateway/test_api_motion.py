@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -34,6 +34,7 @@ from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
+from tests.waiting import state_when
 
 
 def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: MountedArm) -> None:
@@ -344,19 +345,11 @@ def offered(described: DescribedRobot) -> Iterator[Client]:
         yield program
 
 
-def wait_for(program: Client, holds: Callable[[answers.State], bool]) -> answers.State:
-    deadline = time.monotonic() + 60.0
-    while not holds(state := program.query(answers.State)):
-        assert time.monotonic() < deadline, state
-        time.sleep(0.02)
-    return state
-
-
 def held_at_the_gap(program: Client) -> answers.State:
     """Drag from the ready posture to TARGET, and return the state with a detour on offer."""
     program.go(requests.Home())
     program.go(requests.Position(p=np.array(TARGET)))
-    return wait_for(program, lambda state: state.detour is not None)
+    return state_when(program, lambda state: state.detour is not None)
 
 
 def distance(state: answers.State) -> float:

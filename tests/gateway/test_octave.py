@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import subprocess
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.browser.server import ROOT, AppServer
+from tests.commands import completed
 from tests.gateway import octave
 
 
@@ -30,13 +30,7 @@ def output_of(octave_path: str, server: AppServer, script: str) -> dict[str, Any
     found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
     assert found is not None
     command = [octave_path, "--quiet", "--path", str(ROOT / "examples" / "octave")]
-    done = subprocess.run(
-        [*command, "--eval", f"port = {found[1]}; {script}"],
-        capture_output=True,
-        text=True,
-        timeout=90,
-        check=False,
-    )
+    done = completed([*command, "--eval", f"port = {found[1]}; {script}"], seconds=90)
     assert done.returncode == 0, done.stderr
     output: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
     return output

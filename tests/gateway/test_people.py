@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,7 +17,7 @@ from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
-from tests.browser.server import ROOT
+from tests.commands import completed
 from tests.gateway.client import HOUR, Control, page_name
 from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
@@ -193,15 +191,10 @@ def test_command_lists_and_kicks(tmp_path: Path) -> None:
         secret.write_text(f"{site.server.url}/#{boss}\n")
 
         def people(*words: str, token: str = boss) -> tuple[int, str]:
-            environment = os.environ | {"KATANA450_TOKEN": token}
-            done = subprocess.run(
+            environment = {"KATANA450_TOKEN": token}
+            done = completed(
                 [sys.executable, "-m", "katana450", "people", *words, "--url", site.server.url],
-                capture_output=True,
-                text=True,
                 env=environment,
-                cwd=ROOT,
-                timeout=60,
-                check=False,
             )
             assert "Traceback" not in done.stderr
             return done.returncode, done.stdout + done.stderr

@@ -6,7 +6,7 @@ import io
 import json
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.gateway.virtual import VirtualServer
+from tests.waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -88,11 +89,6 @@ def arm(local: VirtualServer, tokens: dict[str, str]) -> Iterator[Client]:
 
 def objects(arm: Client) -> dict[str, answers.SceneObject]:
     return {each.name: each for each in arm.query(answers.Objects).objects}
-
-
-def until(true: Callable[[], bool]) -> None:
-    while not true():
-        time.sleep(0.02)
 
 
 def test_server_starts_with_its_scene_and_objects(arm: Client) -> None:

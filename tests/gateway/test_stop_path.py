@@ -9,7 +9,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 
 import pytest
@@ -21,6 +21,7 @@ from tests.browser.server import APP, AppServer, ServerError
 from tests.gateway.client import ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
 from tests.gateway.test_frozen_arm import under_way
+from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
@@ -41,13 +42,6 @@ def stop(url: str, *, path: str = "/api/v1/stop", **headers: str) -> tuple[int, 
     """Return status and answer of a STOP."""
     status, _, body = ask(f"{url}{path}", data=b"", **headers)
     return status, json.loads(body) if body.startswith(b"{") else {"words": body.decode()}
-
-
-def until(true: Callable[[], bool], seconds: float = 10.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def stop_processes(server: AppServer) -> list[int]:

@@ -17,6 +17,7 @@ from katana450.maths.geometry import se3
 from katana450.server.api import answers, requests
 from tests.gateway.postures import READY, THERE
 from tests.gateway.virtual import VirtualServer
+from tests.waiting import state_when
 
 
 @pytest.fixture
@@ -41,22 +42,12 @@ def moving(
     asked = {"do": "joints", "q": THERE.tolist(), "wait": 30} | request
     asked = {name: value for name, value in asked.items() if value is not None}
     answer = local.loop.create_task(local.posted("a-test-that-posts", **asked))
-    wait_for(watcher, under_way)
+    state_when(watcher, under_way)
     yield lambda: local.run(wait_of(answer))
 
 
 async def wait_of(task: asyncio.Task[Any]) -> Any:
     return await task
-
-
-def wait_for(
-    watcher: Client, true: Callable[[answers.State], bool], seconds: float = 5.0
-) -> answers.State:
-    end = time.monotonic() + seconds
-    while not true(now := watcher.query(answers.State)):
-        assert time.monotonic() < end, now
-        time.sleep(0.02)
-    return now
 
 
 @contextmanager
@@ -78,7 +69,7 @@ def under_way(now: answers.State) -> bool:
 
 def check_nothing_moves_later(watcher: Client) -> None:
     """Check that the arm rests, has dropped its target, and stays where it is."""
-    before = wait_for(watcher, lambda now: not now.moving)
+    before = state_when(watcher, lambda now: not now.moving)
     time.sleep(0.5)
     after = watcher.query(answers.State)
     assert after.q == before.q == after.goal
@@ -161,9 +152,9 @@ def test_closed_connection_stops_the_arm(local: VirtualServer, watcher: Client) 
     body = json.dumps({"do": "joints", "q": THERE.tolist(), "wait": 30}).encode()
     names, leaves = {"X_Name": "Broken", "X_Program": "a-program-that-leaves"}, asyncio.Event()
     sent = local.loop.create_task(local.request("/api/v1/do", body, leaves, **names))
-    wait_for(watcher, under_way)
+    state_when(watcher, under_way)
     leaves.set()
-    stopped = wait_for(watcher, lambda now: now.stopped is not None, 0.1)
+    stopped = state_when(watcher, lambda now: now.stopped is not None, 0.1)
     assert stopped.stopped == "Broken left while the arm moved."
     assert sent.done()
     check_nothing_moves_later(watcher)
@@ -289,8 +280,8 @@ def test_closed_line_stops_the_arm(local: VirtualServer, watcher: Client) -> Non
     slow(watcher)
     with local.speaking("Broken") as rows:
         rows.say(do="joints", q=THERE.tolist(), wait=30)
-        wait_for(watcher, under_way)
-    wait_for(watcher, lambda now: now.stopped == "Broken left while the arm moved.", 1.0)
+        state_when(watcher, under_way)
+    state_when(watcher, lambda now: now.stopped == "Broken left while the arm moved.", 1.0)
     watcher.clear_stop()
 
 

@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask
 from tests.gateway.postures import FAR
 from tests.gateway.test_frozen_arm import process_state
+from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="finds the server's processes as Linux lists them"
@@ -52,15 +53,6 @@ def server() -> Iterator[AppServer]:
 
 PATIENT = 90.0
 """[s] Timeout for a new process on a machine that others keep busy."""
-
-
-def until(true: Callable[[], bool], seconds: float) -> float:
-    """Wait until ``true`` returns True; return the time that it took [s]."""
-    began = time.monotonic()
-    while not true():
-        assert time.monotonic() - began < seconds
-        time.sleep(0.02)
-    return time.monotonic() - began
 
 
 def look(server: AppServer) -> dict[str, Any]:

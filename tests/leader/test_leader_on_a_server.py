@@ -6,7 +6,7 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from katana450.extensions.leader.joint_map import JointMap
 from katana450.extensions.leader.layout import SO101
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
+from tests.waiting import until
 
 pytest.importorskip("pty", reason="Windows has no pseudo-terminals")
 from tests.cli.test_run_control import Terminal
@@ -81,13 +82,6 @@ def at_terminal(command: list[str]) -> Iterator[Terminal]:
         yield shown
     finally:
         shown.close()
-
-
-def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
-    due = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < due
-        time.sleep(0.02)
 
 
 def posture(watcher: Client, tmp_path: Path, angles: tuple[float, ...]) -> np.ndarray:

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.commands import output
+
 ROOT = Path(__file__).resolve().parents[2]
 BROKEN = "raise SystemExit('a file of the user was run')\n"
 LOCKED = re.compile(r"^([a-z0-9][a-z0-9._-]*)==([^ ;\\]+)", re.MULTILINE)
@@ -18,15 +20,11 @@ LOCKED = re.compile(r"^([a-z0-9][a-z0-9._-]*)==([^ ;\\]+)", re.MULTILINE)
 
 def build(target: str, source: Path, out: Path) -> Path:
     """Build the ``target`` ``wheel`` or ``sdist`` of the folder ``source`` in ``out``."""
-    done = subprocess.run(
+    output(
         [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(out)],
         cwd=source,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
+        seconds=120,
     )
-    assert done.returncode == 0, done.stderr
     (built,) = out.glob("*.whl" if target == "wheel" else "*.tar.gz")
     return built
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 import trimesh
 
 from katana450.extras import PACKAGES
+from tests.commands import completed
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.test_library_formats import dae, threemf
 
@@ -59,9 +59,7 @@ ROBOT = """<robot name="parts"><link name="base">
 def run(folder: Path, *command: str | Path, seconds: float = 120.0, status: int = 0) -> str:
     """Return the output of ``command``, started in ``folder``; the errors if it has a status."""
     words = [str(part) for part in command]
-    done = subprocess.run(
-        words, cwd=folder, capture_output=True, text=True, check=False, timeout=seconds
-    )
+    done = completed(words, cwd=folder, seconds=seconds)
     assert done.returncode == status, done.stderr
     return done.stderr if status else done.stdout
 

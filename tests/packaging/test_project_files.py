@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
 import pytest
 import yaml
+
+from tests.commands import output
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,10 +35,7 @@ def test_file_keeps_its_schema(schema: str) -> None:
     files = [str(file) for file in ROOT.glob(SCHEMAS[schema])]
     assert files
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}"]
-    done = subprocess.run(
-        [*command, *files], capture_output=True, text=True, check=False, timeout=60
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
+    output([*command, *files])
 
 
 def test_workflows_call_targets_of_make() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -17,6 +16,7 @@ import pytest
 from katana450.client import connect
 from katana450.server.api import answers
 from tests.browser.server import AppServer
+from tests.commands import completed, output
 from tests.packaging.conftest import ROOT, build
 
 
@@ -26,15 +26,9 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
     home = tmp_path_factory.mktemp("tool")
     folders = {"UV_TOOL_DIR": str(home / "tools"), "UV_TOOL_BIN_DIR": str(home / "bin")}
     uv = [sys.executable, "-m", "uv", "tool", "install", "--quiet", "--python", sys.executable]
-    done = subprocess.run(
-        [*uv, "--constraints", str(ROOT / "requirements.lock"), str(ROOT)],
-        env=os.environ | folders,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
+    output(
+        [*uv, "--constraints", str(ROOT / "requirements.lock"), str(ROOT)], env=folders, seconds=600
     )
-    assert done.returncode == 0, done.stderr
     found = shutil.which("katana450", path=home / "bin")
     assert found is not None
     return Path(found)
@@ -42,15 +36,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.long
 def test_tool_computes_and_serves(command: Path, tmp_path: Path) -> None:
-    done = subprocess.run(
-        [str(command), "fk"],
-        input='{"q": [0, 0, 0, 0, 0]}\n',
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = completed([str(command), "fk"], cwd=tmp_path, text='{"q": [0, 0, 0, 0, 0]}\n')
     assert done.returncode == 0, done.stderr
     assert '"T": [[1.0, ' in done.stdout
     with AppServer([str(command), "serve", "--port", "{port}"], folder=tmp_path) as server:

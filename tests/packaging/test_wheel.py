@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
 
 from tests.browser.server import AppServer
+from tests.commands import output
 from tests.packaging.conftest import BROKEN
 
 LINE = '{"q": [0, 0, 0, 0, 0]}\n'
@@ -25,18 +24,7 @@ def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
 
 
 def run(folder: Path, *command: str | Path, text: str = "") -> str:
-    done = subprocess.run(
-        [str(part) for part in command],
-        cwd=folder,
-        input=text,
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": "."},
-        check=False,
-        timeout=60,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return output([str(part) for part in command], cwd=folder, text=text, env={"PYTHONPATH": "."})
 
 
 def test_wheel_holds_one_package_with_its_data(wheel: Path) -> None:

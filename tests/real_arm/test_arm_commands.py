@@ -25,7 +25,8 @@ from katana450.extensions.real_arm.link.tcp import TcpTransport
 from katana450.server.api import answers
 from katana450.server.api.answers import MeasuredArm
 from tests.browser.server import APP, AppServer, free_port
-from tests.real_arm.emulated import ROOT, TIMEOUT, emulator
+from tests.commands import completed
+from tests.real_arm.emulated import TIMEOUT, emulator
 
 KATANA450 = (sys.executable, "-m", "katana450")
 
@@ -39,15 +40,7 @@ def server() -> Iterator[EmulatorServer]:
 
 
 def katana450(*options: str, text: str = "") -> subprocess.CompletedProcess[str]:
-    done = subprocess.run(
-        [*KATANA450, *options],
-        input=text,
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=TIMEOUT,
-        check=False,
-    )
+    done = completed([*KATANA450, *options], text=text, seconds=TIMEOUT)
     assert "Traceback" not in done.stderr
     return done
 

@@ -14,7 +14,7 @@ import pytest
 
 from katana450.cli.main import main
 from tests.browser.server import RECORDING_APP, AppServer
-from tests.real_arm.emulated import ROOT
+from tests.commands import completed
 
 SCRIPT = """
 name: Short line
@@ -38,14 +38,7 @@ def script(tmp_path: Path) -> Path:
 
 
 def command_done(*options: str, seconds: float = 120.0) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "katana450", *options],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=seconds,
-        check=False,
-    )
+    return completed([sys.executable, "-m", "katana450", *options], seconds=seconds)
 
 
 def report_in(folder: Path) -> dict[str, Any]:

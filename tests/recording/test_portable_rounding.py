@@ -19,6 +19,7 @@ from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.messages import COMMANDS
 from katana450.portable_rounding import portable_rounding, rounds_portably
+from tests.commands import completed
 from tests.conftest import LONG
 
 TICKS = 3000 if LONG else 300
@@ -89,13 +90,10 @@ def test_recording_names_its_rounding(path: Path) -> None:
 def test_simulation_is_identical_on_other_processors(
     path: Path, environment: dict[str, str]
 ) -> None:
-    done = subprocess.run(
+    done = completed(
         [sys.executable, "-P", "-m", "katana450", "record", "verify", str(path)],
-        env=os.environ | environment,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
+        env=environment,
+        seconds=600,
     )
     with RecordingFile.open(path) as file:
         ticks = file.counts()[COMMANDS]
@@ -163,13 +161,10 @@ def test_simulation_is_identical_in_other_pythons(
             ["pip", "install", "--python", python, "--requirement", str(LOCK)],
         ):
             subprocess.run([str(uv), "--quiet", *command], check=True, timeout=600)
-    done = subprocess.run(
+    done = completed(
         [python, "-P", "-m", "katana450", "record", "verify", str(path)],
-        env=os.environ | {"PYTHONPATH": str(ROOT / "app")},
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
+        env={"PYTHONPATH": str(ROOT / "app")},
+        seconds=600,
     )
     assert "identical to the bit over" in done.stdout, done.stdout + done.stderr
     assert done.returncode == 0

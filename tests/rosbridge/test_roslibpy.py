@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 from tests.browser.server import AppServer
+from tests.commands import completed
 from tests.exchange.tools import ROSLIBPY, needs_package
 from tests.rosbridge.ros_client import cleared
 
@@ -23,13 +22,10 @@ CLIENT = Path(__file__).with_name("roslibpy_client.py")
 @pytest.mark.parametrize("transport", ["twisted", "asyncio"])
 def test_roslibpy_drives_the_arm(server: AppServer, transport: str) -> None:
     folder = str(ROSLIBPY.folder)
-    done = subprocess.run(
+    done = completed(
         [sys.executable, CLIENT, server.url.replace("http", "ws") + "/rosbridge?name=roslibpy"],
-        env=os.environ | {"PYTHONPATH": folder, "ROSLIBPY_TRANSPORT": transport},
-        capture_output=True,
-        text=True,
-        timeout=90.0,
-        check=False,
+        env={"PYTHONPATH": folder, "ROSLIBPY_TRANSPORT": transport},
+        seconds=90.0,
     )
     assert done.returncode == 0, done.stderr[-3000:]
     seen = json.loads(done.stdout.strip().splitlines()[-1])

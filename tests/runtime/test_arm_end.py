@@ -35,6 +35,7 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.assembly.running_arm import RunningArm
 from katana450.errors import InputError
 from katana450.settings import Settings
+from tests.waiting import until
 
 SILENCE = 0.3
 
@@ -74,13 +75,6 @@ def ends(arm: ArmModel, session: Session) -> Iterator[Ends]:
     yield ends
     ends.arm_end.close()
     ends.loop.stop()
-
-
-def until(true: Callable[[], bool], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def clear_stop(front: FrontEnd) -> int:

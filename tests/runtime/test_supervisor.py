@@ -25,6 +25,7 @@ from katana450.assembly.supervisor import (
     child_spec,
 )
 from katana450.errors import ConfigurationError
+from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of Linux and macOS")
 
@@ -105,13 +106,6 @@ class Running:
         self._stopping.set()
         self._thread.join()
         self.supervisor.stop()
-
-
-def until(true: Callable[[], bool], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
