@@ -67,9 +67,9 @@ def _begin(arm: Client, options: Namespace) -> None:
     """Run the script that was sent, from a step and with breakpoints if ``options`` say so."""
     if options.pause_before:
         arm.ask(Breakpoints(steps=options.pause_before))
-    at, unattended = options.from_step, options.unattended
-    arm.ask(Steer(order=ProgramOrder.RUN, unattended=unattended, at=at))
-    if at is not None:
+    first_step, unattended = options.from_step, options.unattended
+    arm.ask(Steer(order=ProgramOrder.RUN, unattended=unattended, at=first_step))
+    if first_step is not None:
         _planned_program(arm)
 
 

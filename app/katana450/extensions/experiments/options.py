@@ -157,7 +157,7 @@ def _step(text: str) -> int:
 
 
 def _steps(text: str) -> tuple[int, ...]:
-    return tuple(_step(each) for each in text.split(","))
+    return tuple(_step(number) for number in text.split(","))
 
 
 def _number(text: str) -> float:

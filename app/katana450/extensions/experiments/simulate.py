@@ -122,10 +122,10 @@ def simulate(script: Script, options: Namespace) -> Simulated:
             )
         except MissingExtraError as error:
             print(f"The report has figures, but no pictures of the arm. {error}")
-    found = Simulated(exit_status(report, later=not options.headless), report, pictures)
+    simulated = Simulated(exit_status(report, later=not options.headless), report, pictures)
     if options.report is not None:
-        found.write(options.report)
-    return found
+        simulated.write(options.report)
+    return simulated
 
 
 def exit_status(report: Report, *, later: bool = False) -> int:
@@ -188,7 +188,9 @@ def _print_tasks(program: Program) -> None:
 def _labels(program: Program) -> dict[int, list[str]]:
     """Return what begins at the tasks of a program with alternatives."""
     labels: dict[int, list[str]] = {}
-    before = Counter(each for number in range(len(program.tasks)) for each in program.next(number))
+    before = Counter(
+        index for number in range(len(program.tasks)) for index in program.next(number)
+    )
     for task in program.tasks:
         action = task.action
         if isinstance(action, ConditionalJump):

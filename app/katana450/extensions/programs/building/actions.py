@@ -139,7 +139,7 @@ class PutObject(Action):
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
         """Return whether an object has the requested pose."""
-        return any(np.array_equal(each.T, self.scene_object.T) for each in state.objects)
+        return any(np.array_equal(other.T, self.scene_object.T) for other in state.objects)
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,8 @@ class Held(Condition):
 
     def holds(self, state: State) -> bool:
         """Return whether the fingers hold the object."""
-        found = named(state.objects, self.name)
-        return found is not None and found.held
+        scene_object = named(state.objects, self.name)
+        return scene_object is not None and scene_object.held
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +133,10 @@ class Placed(Condition):
 
     def holds(self, state: State) -> bool:
         """Return whether the object stands there; an object in the hand stands nowhere."""
-        found = named(state.objects, self.name)
-        if found is None or found.carried:
+        scene_object = named(state.objects, self.name)
+        if scene_object is None or scene_object.carried:
             return False
-        return bool(np.linalg.norm(found.T[:3, 3] - self.at) <= self.within)
+        return bool(np.linalg.norm(scene_object.T[:3, 3] - self.at) <= self.within)
 
 
 @dataclass(frozen=True)
@@ -299,8 +299,8 @@ class ToolPlace(Condition):
         p = forward(self.arm.chain_to(state.tool), state.q)[:3, 3]
         if self.in_base:
             p = self.T_base_shoulder[:3, :3] @ p + self.T_base_shoulder[:3, 3]
-        at = dict(zip(XYZ, p.tolist(), strict=True))
-        return all(bounds.has(at[name]) for name, bounds in self.bounds.items())
+        coordinates = dict(zip(XYZ, p.tolist(), strict=True))
+        return all(bounds.has(coordinates[name]) for name, bounds in self.bounds.items())
 
 
 @dataclass(frozen=True)

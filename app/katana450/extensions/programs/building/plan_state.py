@@ -241,13 +241,13 @@ class PlanState:
         """
         planning = self.planning
         paths: list[Path] = []
-        made: dict[int, Path] = {}
+        path_by_curve: dict[int, Path] = {}
         q = self.q
         for curve in curves:
-            path = made.get(id(curve))
+            path = path_by_curve.get(id(curve))
             if path is None or float(np.abs(path.start - q).max()) > JOIN_TOLERANCE:
                 path = planning.path(q, curve, planning.branches(q)[0])
-                made[id(curve)] = path
+                path_by_curve[id(curve)] = path
             paths.append(path)
             q = path.end
         return self.follow(paths, name, tool_speed)
@@ -308,12 +308,12 @@ class PlanState:
     def after(self, command: Command, ticks: int) -> State:
         """Return the state ``ticks`` after ``command``, or at rest, as the session computes it."""
         session, state = self.plan_context.session, self.state
-        given: tuple[Command, ...] = (command,)
+        commands: tuple[Command, ...] = (command,)
         for _ in range(ticks):
             checkpoint()
-            state = session.step(state, given, state.t + TICK)
+            state = session.step(state, commands, state.t + TICK)
             state = session.observe(state, state.setpoint, state.gripper_setpoint)
-            given = ()
+            commands = ()
             if not state.moving:
                 break
         return state

@@ -72,7 +72,7 @@ class LocatedStep(NamedTuple):
         step = self.step
         if isinstance(step, Conditional):
             then, otherwise = (
-                tuple(each.called_at(line, file) for each in steps)
+                tuple(inner.called_at(line, file) for inner in steps)
                 for steps in (step.then, step.otherwise)
             )
             step = Conditional(step.condition, then, otherwise)
@@ -82,10 +82,10 @@ class LocatedStep(NamedTuple):
 def count(steps: Iterable[LocatedStep]) -> int:
     """Return the number of ``steps``, with those of all alternatives."""
     return sum(
-        1 + count(each.step.then) + count(each.step.otherwise)
-        if isinstance(each.step, Conditional)
+        1 + count(located.step.then) + count(located.step.otherwise)
+        if isinstance(located.step, Conditional)
         else 1
-        for each in steps
+        for located in steps
     )
 
 

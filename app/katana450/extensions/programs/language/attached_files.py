@@ -132,9 +132,11 @@ def attached(text: str, opened: Callable[[str], str]) -> str:
     parts: list[str] = []
     end = 0
     for node in _names(text, ""):
-        found = _opened(node, "", opened, texts)
-        if found:
-            inner = ", ".join(f"{_quoted(name)}: {_quoted(each)}" for name, each in found.items())
+        texts_by_name = _opened(node, "", opened, texts)
+        if texts_by_name:
+            inner = ", ".join(
+                f"{_quoted(name)}: {_quoted(content)}" for name, content in texts_by_name.items()
+            )
             parts += [text[end : node.start_mark.index], f"{{{inner}}}"]
             end = node.end_mark.index
     return "".join((*parts, text[end:]))
@@ -161,24 +163,24 @@ def _opened(
     They are added to ``texts``.
     """
     line, column = node.start_mark.line + 1, node.start_mark.column + 1
-    at = YamlValue(line, column, str(node.value), "text", file=file)
+    place = YamlValue(line, column, str(node.value), "text", file=file)
     suffix = CSV if str(node.value).endswith(CSV) else YAML
-    name = _checked_name(at, suffix)
+    name = _checked_name(place, suffix)
     if name in texts:
         return {}
     if len(texts) >= MAX_FILES:
-        raise at.wrong(f"A script names at most {MAX_FILES} files.")
+        raise place.wrong(f"A script names at most {MAX_FILES} files.")
     try:
         text = opened(name)
     except InputError as error:
-        raise at.wrong(str(error)) from error
+        raise place.wrong(str(error)) from error
     if len(text) > MAX_BYTES:
-        raise at.wrong(f"{name} has more than {MAX_BYTES // 1024} KB.")
+        raise place.wrong(f"{name} has more than {MAX_BYTES // 1024} KB.")
     texts[name] = text
-    found = {name: text}
+    texts_by_name = {name: text}
     for inner in _names(text, name) if suffix == YAML else ():
-        found |= _opened(inner, name, opened, texts)
-    return found
+        texts_by_name |= _opened(inner, name, opened, texts)
+    return texts_by_name
 
 
 def _names(text: str, file: str) -> Iterator[Any]:
@@ -186,7 +188,7 @@ def _names(text: str, file: str) -> Iterator[Any]:
     root = _root(text, file)
     for key, value in () if root is None else root.value:
         if key.value == INCLUDE and isinstance(value, yaml.SequenceNode):
-            yield from (each for each in value.value if _is_name(each))
+            yield from (node for node in value.value if _is_name(node))
         elif key.value in (INCLUDE, SCENE) and _is_name(value):
             yield value
         elif key.value in (DEFINE, STEPS):
@@ -223,7 +225,10 @@ def _root(text: str, file: str) -> Any:
 
 def _quoted(text: str) -> str:
     """Return ``text`` in quotes, on one line, as YAML reads it."""
-    shown = (each if " " <= each <= "~" and each not in '"\\' else _escape(each) for each in text)
+    shown = (
+        character if " " <= character <= "~" and character not in '"\\' else _escape(character)
+        for character in text
+    )
     return f'"{"".join(shown)}"'
 
 

@@ -187,25 +187,25 @@ class Declared:
             assert isinstance(kind, Kind)
             return cls(**{cls.short: kind(value, context)}, **own)
         fields = Fields(value, cls.noun)
-        given: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for name, part in parts.items():
             if isinstance(part.kind, Group):
-                given[name] = part.kind.take(fields, context)
+                values[name] = part.kind.take(fields, context)
             elif fields.has(field := part.kind.field or name) or part.default is REQUIRED:
-                given[name] = fields.need(field, part.kind.within(context), None)
+                values[name] = fields.need(field, part.kind.within(context), None)
         if cls.needs and not any(map(fields.has, cls.needs)):
             *before, last = (f"`{name}`" for name in cls.needs)
             fields.refuse(f"{cls.noun.capitalize()} needs {', '.join(before)} or {last}.")
         if cls.excludes and all(map(fields.has, cls.excludes)):
             one, other = cls.excludes
             fields.refuse(f"{cls.noun.capitalize()} takes `{one}` or `{other}`, not both.", other)
-        for name, problem in cls.mistakes(given):
+        for name, problem in cls.mistakes(values):
             fields.refuse(problem, name)
         fields.done()
-        return cls(**given, **own)
+        return cls(**values, **own)
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:  # noqa: ARG003
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:  # noqa: ARG003
         """Yield field and text of each mistake in ``given`` that no field has by itself.
 
         The field is "" for the whole mapping. ``given`` has the attributes that the mapping gives,

@@ -67,16 +67,16 @@ def evaluate(text: str, names: Mapping[str, Quantity]) -> Quantity:
         raise ExpressionError(f"an expression has at most {MAX_LENGTH} characters")
     try:
         tree = ast.parse(WITH_UNIT.sub(r"_\2(\1)", text.strip()), mode="eval")
-        found = _value(tree.body, names)
+        quantity = _value(tree.body, names)
     except (SyntaxError, RecursionError, MemoryError) as error:
         raise ExpressionError(f"{text!r} is not an expression") from error
     except (ArithmeticError, ValueError) as error:
         if isinstance(error, ExpressionError):
             raise
         raise ExpressionError(f"{text!r} has no value: {error}") from error
-    if not math.isfinite(found.value):
+    if not math.isfinite(quantity.value):
         raise ExpressionError(f"{text!r} has no finite value")
-    return found
+    return quantity
 
 
 def _value(node: ast.expr, names: Mapping[str, Quantity]) -> Quantity:
@@ -97,8 +97,10 @@ def _value(node: ast.expr, names: Mapping[str, Quantity]) -> Quantity:
                 raise UnknownNameError(f"there is no value {ast.unparse(node)!r}")
             return names[f"{name}.{part}"]
         case ast.UnaryOp(op=ast.USub() | ast.UAdd() as op, operand=inner):
-            found = _value(inner, names)
-            return Quantity(-found.value if isinstance(op, ast.USub) else found.value, found.kind)
+            quantity = _value(inner, names)
+            return Quantity(
+                -quantity.value if isinstance(op, ast.USub) else quantity.value, quantity.kind
+            )
         case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
             return OPERATORS[type(op)](_value(left, names), _value(right, names))
         case ast.Call(
@@ -107,7 +109,7 @@ def _value(node: ast.expr, names: Mapping[str, Quantity]) -> Quantity:
             scale, kind = UNITS[name[1:]]
             return Quantity(scale * number, kind)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-            return _call(name, [_value(each, names) for each in arguments])
+            return _call(name, [_value(argument, names) for argument in arguments])
     raise ExpressionError("only numbers, names, + - * / % ** and functions are allowed")
 
 
@@ -170,11 +172,11 @@ FUNCTIONS = (*OF_ANGLE, *TO_ANGLE, *KEEPING, *OF_MANY, "sqrt", "atan2")
 def _call(name: str, values: list[Quantity]) -> Quantity:
     if name not in FUNCTIONS:
         raise UnknownNameError(f"there is no function {name!r}; there are {', '.join(FUNCTIONS)}")
-    numbers = [each.value for each in values]
+    numbers = [quantity.value for quantity in values]
     if name in OF_MANY and values:
         kind = values[0]
-        for each in values[1:]:
-            kind = Quantity(0.0, _common(kind, each))
+        for quantity in values[1:]:
+            kind = Quantity(0.0, _common(kind, quantity))
         return Quantity(OF_MANY[name](*numbers) if len(numbers) > 1 else numbers[0], kind.kind)
     if name == "atan2" and len(values) == 2:
         _common(*values)

@@ -73,9 +73,9 @@ def mapping(about: str, required: str, properties: Mapping[str, Schema]) -> Sche
     }
 
 
-def list_of(each: Schema, low: int, high: int) -> Schema:
+def list_of(schema: Schema, low: int, high: int) -> Schema:
     """Return a list of ``low`` to ``high`` values like ``each``."""
-    return {"type": "array", "items": each, "minItems": low, "maxItems": high}
+    return {"type": "array", "items": schema, "minItems": low, "maxItems": high}
 
 
 def number(
@@ -89,7 +89,7 @@ def number(
 
     ``about`` describes it if its unit does not; ``convert`` gives its value in the code.
     """
-    of = f" {unit}" if unit else ""
+    suffix = f" {unit}" if unit else ""
 
     def read(value: YamlValue, _context: ScriptContext) -> float:
         # YAML takes a number such as 1e-3 for a text.
@@ -97,12 +97,14 @@ def number(
         amount = value.number if is_number else None
         if amount is None or not math.isfinite(amount):
             why = f": {value.why}." if value.why else "."
-            raise value.wrong(f"Expected a number from {low:g} to {high:g}{of}, not {value}{why}")
+            raise value.wrong(
+                f"Expected a number from {low:g} to {high:g}{suffix}, not {value}{why}"
+            )
         if value.unit != PLAIN and value.unit not in QUANTITIES.get(unit, ()):
             wanted = f"a number in {unit}" if unit else "a number without a unit"
             raise value.wrong(f"Expected {wanted}, not {with_article(value.unit)}: {value}.")
         if not low <= amount <= high:
-            raise value.wrong(f"{amount:g} is not between {low:g} and {high:g}{of}.")
+            raise value.wrong(f"{amount:g} is not between {low:g} and {high:g}{suffix}.")
         return convert(amount)
 
     bounds = {"type": "number", "minimum": low, "maximum": high}
@@ -269,13 +271,13 @@ def one_of(kinds: Mapping[str, Kind[T]]) -> Group[T | None]:
     """Return the group of exactly one of the fields ``kinds``; None after a mistake."""
 
     def take(fields: Fields, context: ScriptContext) -> T | None:
-        given = [
+        names = [
             fields.take(name, kind.within(context), None)
             for name, kind in kinds.items()
             if fields.has(name)
         ]
-        if len(given) == 1:
-            return given[0]
+        if len(names) == 1:
+            return names[0]
         fields.refuse(f"{fields.what.capitalize()} needs exactly one of {', '.join(kinds)}.")
         return None
 

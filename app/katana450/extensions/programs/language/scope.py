@@ -88,10 +88,10 @@ class Scope:
             # Errors are reported where the name is used.
             return replace(self.values[name], line=value.line, column=value.column, file=value.file)
         try:
-            found = evaluate(text, self.numbers)
+            quantity = evaluate(text, self.numbers)
         except ExpressionError as error:
             return replace(value, why=str(error))
-        return replace(value, kind="number", number=found.value, unit=found.kind)
+        return replace(value, kind="number", number=quantity.value, unit=quantity.kind)
 
 
 @dataclass(frozen=True)

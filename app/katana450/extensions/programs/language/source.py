@@ -79,7 +79,7 @@ class ScriptError(InputError):
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         self.problems = tuple(
-            sorted(problems, key=lambda each: (each.file, each.line, each.column))
+            sorted(problems, key=lambda mistake: (mistake.file, mistake.line, mistake.column))
         )
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
@@ -186,7 +186,7 @@ def _value(node: yaml.Node, file: str) -> YamlValue:
         fields = tuple((_value(key, file), _value(value, file)) for key, value in node.value)
         return YamlValue(line, column, fields, "mapping", file=file)
     if isinstance(node, yaml.SequenceNode):
-        items = tuple(_value(each, file) for each in node.value)
+        items = tuple(_value(item, file) for item in node.value)
         return YamlValue(line, column, items, "list", file=file)
     if node.tag == NULL:
         return YamlValue(line, column, None, "nothing", file=file)

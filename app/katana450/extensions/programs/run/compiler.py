@@ -149,22 +149,22 @@ class _TaskList:
     def _add_choice(self, step: PlannedChoice, exits: Sequence[_Exit]) -> Sequence[_Exit]:
         jump = ConditionalJump(step.condition, step.predicted, 0, 0)
         name = f"if {step.condition.awaited}"
-        at = self.add(Task(step.number, step.located.script_line, name, jump), exits)
-        then = self.add_steps(step.then, (_Exit(at, THEN),))
-        return (*then, *self.add_steps(step.otherwise, (_Exit(at, OTHERWISE),)))
+        index = self.add(Task(step.number, step.located.script_line, name, jump), exits)
+        then = self.add_steps(step.then, (_Exit(index, THEN),))
+        return (*then, *self.add_steps(step.otherwise, (_Exit(index, OTHERWISE),)))
 
     def linked(self) -> tuple[Task, ...]:
         """Return the tasks with the indices of those that follow."""
-        found = []
+        tasks = []
         for number, task in enumerate(self.tasks):
             action = task.action
             if isinstance(action, ConditionalJump):
                 then, otherwise = (self.next[_Exit(number, end)] for end in (THEN, OTHERWISE))
-                found.append(replace(task, action=replace(action, then=then, otherwise=otherwise)))
+                tasks.append(replace(task, action=replace(action, then=then, otherwise=otherwise)))
             else:
                 after = self.next[_Exit(number, AFTER)]
-                found.append(task if after == number + 1 else replace(task, after=after))
-        return tuple(found)
+                tasks.append(task if after == number + 1 else replace(task, after=after))
+        return tuple(tasks)
 
 
 def task_list(steps: PlannedSteps, timed: TimedActions) -> tuple[Task, ...]:
@@ -172,9 +172,9 @@ def task_list(steps: PlannedSteps, timed: TimedActions) -> tuple[Task, ...]:
 
     A task leads only to later ones. The number of tasks stands for the end.
     """
-    found = _TaskList(steps[0].number, timed)
-    found.join(found.add_steps(steps, (_Exit(0, AFTER),)))
-    return found.linked()
+    tasks = _TaskList(steps[0].number, timed)
+    tasks.join(tasks.add_steps(steps, (_Exit(0, AFTER),)))
+    return tasks.linked()
 
 
 FINDING, TIMING = "finding paths", "timing paths"
@@ -325,8 +325,8 @@ class Compiler:
         if isinstance(located.step, Conditional):
             rest = steps[index + 1 : end]
             return self._choice(plan, number, located, located.step, rest, copies)
-        ahead = [step.located.step for step in steps[index + 1 :]]
-        after = self._step(replace(plan, ahead=ahead, actions=()), located, located.step)
+        next_steps = [step.located.step for step in steps[index + 1 :]]
+        after = self._step(replace(plan, ahead=next_steps, actions=()), located, located.step)
         return PlannedStep(number, located, after.actions), (after,)
 
     def _choice(
@@ -416,10 +416,10 @@ def _refusal(plan: PlanState, refused: Problem, reasons: Set[Problem]) -> Script
     """
     text = refused.text
     pitches_tried = dict.fromkeys(approach.pitch for approach in plan.given_up)
-    tried = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
+    angles = [f"{angle:.0f}" for angle in np.degrees(list(pitches_tried))]
     at_step = [reason for reason in reasons if reason.line == refused.line]
-    if len(tried) > 1 and len(at_step) > 1:
-        pitches = ", ".join(tried[:-1]) + f" and {tried[-1]}"
+    if len(angles) > 1 and len(at_step) > 1:
+        pitches = ", ".join(angles[:-1]) + f" and {angles[-1]}"
         text += f" No other pitch of the grasp helps: tried {pitches} deg."
     return ScriptError((replace(refused, text=text),))
 
@@ -430,8 +430,8 @@ def _at(located: LocatedStep, error: InputError) -> ScriptError:
 
 def _situation(plan: PlanState) -> tuple[object, ...]:
     """Return a hashable key of everything on which the plans of a step depend."""
-    taken = None if plan.taken is None else plan.taken.at.position.tobytes()
-    return Situation.of(plan.state).key, taken, plan.given_up
+    grasp = None if plan.taken is None else plan.taken.at.position.tobytes()
+    return Situation.of(plan.state).key, grasp, plan.given_up
 
 
 def _different(ends: Iterable[PlanState]) -> tuple[PlanState, ...]:

@@ -98,7 +98,9 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
         q = action.plan.q(tau)
         action = replace(action, tau=tau)
     # The list of steps takes the name of a step from its first task.
-    step = [each.name for each in program.tasks if each.number == task.number][-1].partition(":")[0]
+    step = [
+        changed_task.name for changed_task in program.tasks if changed_task.number == task.number
+    ][-1].partition(":")[0]
     added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
     if interruption.situation.tool not in ("", state.tool):
         tool = UseTool(interruption.situation.tool)
@@ -109,7 +111,7 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
     changed_tasks = (
         *program.tasks[: run.number], replace(task, action=action), *program.tasks[run.number + 1 :]
     )  # fmt: skip
-    moved = [_moved(each, run.number, len(added)) for each in changed_tasks]
+    moved = [_moved(changed_task, run.number, len(added)) for changed_task in changed_tasks]
     tasks = (*moved[: run.number], *added, *moved[run.number :])
     return replace(program, start=state.setpoint, tasks=tasks, first=run.number)
 
@@ -136,7 +138,7 @@ def _nearest(plan: Plan, tau: float, q: FloatArray) -> float:
     best = tau
     for _ in range(REFINEMENTS):
         places = np.linspace(low, high, SAMPLES)
-        apart = [float(np.abs(plan.q(each) - q).max()) for each in places.tolist()]
+        apart = [float(np.abs(plan.q(place) - q).max()) for place in places.tolist()]
         number = _first_nearest(np.array(apart))
         best = float(places[number])
         low, high = float(places[max(number - 1, 0)]), float(places[min(number + 1, SAMPLES - 1)])

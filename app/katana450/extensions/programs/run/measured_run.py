@@ -107,7 +107,7 @@ class MeasuredRun:
     @cached_property
     def values(self) -> dict[str, float | None]:
         """Each measure of the measured arm by its name in ``measures.MEASURES``."""
-        errors = [each.error for each in self.deviations]
+        errors = [deviation.error for deviation in self.deviations]
         off = 1e3 * np.concatenate(errors) if errors else np.empty(0)
         lag = self.lag
         return {
@@ -122,12 +122,12 @@ class MeasuredRun:
     def tool_errors(self) -> FloatArray:
         """Distances (N,) of the measured tool from where it should have been [m]."""
         tools = np.array(self.tools)
-        found = np.empty(len(tools))
+        errors = np.empty(len(tools))
         for tool in set(self.tools):
             rows, chain = tools == tool, self.arm.chain_to(tool)
             ends = [forward_batch(chain, q[rows])[:, :3, 3] for q in (self.q, self.due)]
-            found[rows] = np.linalg.norm(ends[0] - ends[1], axis=1)
-        return found
+            errors[rows] = np.linalg.norm(ends[0] - ends[1], axis=1)
+        return errors
 
     @cached_property
     def lag(self) -> float | None:
@@ -142,12 +142,14 @@ class MeasuredRun:
         def error(lag: float) -> float:
             columns = zip(self.q.T, q.T, strict=True)
             sent = self.t - lag
-            return sum(float((own - np.interp(sent, t, of)).var()) for own, of in columns)
+            return sum(
+                float((own - np.interp(sent, t, setpoints)).var()) for own, setpoints in columns
+            )
 
         coarse = min(np.arange(0.0, MAX_LAG + 0.5 * COARSE, COARSE).tolist(), key=error)
         near = np.arange(-COARSE, COARSE + 0.5 * FINE, FINE) + coarse
-        found: float = min(near[near > -0.5 * FINE].tolist(), key=error)
-        return found
+        best_lag: float = min(near[near > -0.5 * FINE].tolist(), key=error)
+        return best_lag
 
     @cached_property
     def setpoints(self) -> tuple[FloatArray, FloatArray]:
@@ -170,15 +172,15 @@ class MeasuredRun:
         on = [path_of(state) for state in self.states]
         t = np.array([state.t for state in self.states])
         sent = np.searchsorted(t, self.t - (self.lag or 0.0), side="right") - 1
-        found: list[Deviation] = []
+        deviations: list[Deviation] = []
         for path in {id(path): path for path in on if path is not None}.values():
-            ticks = [number for number, each in enumerate(on) if each is path]
+            ticks = [number for number, other in enumerate(on) if other is path]
             rows = np.flatnonzero(np.isin(sent, ticks))
             if not rows.size:
                 continue
             measured = forward_batch(path.chain, self.q[rows])[:, :3, 3]
             commanded = commanded_errors(path, [self.states[number] for number in ticks])
-            found.append(
+            deviations.append(
                 Deviation(
                     path,
                     self.t[rows],
@@ -188,7 +190,7 @@ class MeasuredRun:
                     commanded,
                 )
             )
-        return tuple(found)
+        return tuple(deviations)
 
 
 def path_of(state: State) -> CurvePath | None:
@@ -217,10 +219,12 @@ def nearest_points(path: CurvePath, points: FloatArray) -> FloatArray:
     sigma = places[apart.argmin(axis=1)]
     best: FloatArray = coarse[apart.argmin(axis=1)]
     for _ in range(REFINEMENTS):
-        found, tangent = point_derivatives(path, sigma)[:2]
+        curve_points, tangent = point_derivatives(path, sigma)[:2]
         length = np.maximum((tangent**2).sum(axis=1), 1e-30)
-        sigma = np.clip(sigma + ((points - found) * tangent).sum(axis=1) / length, 0.0, 1.0)
-        found = point_derivatives(path, sigma)[0]
-        nearer = np.linalg.norm(points - found, axis=1) < np.linalg.norm(points - best, axis=1)
-        best = np.where(nearer[:, None], found, best)
+        sigma = np.clip(sigma + ((points - curve_points) * tangent).sum(axis=1) / length, 0.0, 1.0)
+        curve_points = point_derivatives(path, sigma)[0]
+        nearer = np.linalg.norm(points - curve_points, axis=1) < np.linalg.norm(
+            points - best, axis=1
+        )
+        best = np.where(nearer[:, None], curve_points, best)
     return best

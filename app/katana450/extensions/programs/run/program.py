@@ -133,19 +133,19 @@ class Program:
     @property
     def predicted(self) -> tuple[int, ...]:
         """The tasks that are executed if all is as predicted, in their order."""
-        return tuple(each.number for each in self.schedule)
+        return tuple(task.number for task in self.schedule)
 
     @cached_property
     def schedule(self) -> tuple[ExpectedTask, ...]:
         """The predicted tasks in their order, with their expected times."""
-        found: list[ExpectedTask] = []
+        schedule: list[ExpectedTask] = []
         number, elapsed, speed = self.first, 0.0, self.speed
         while number < len(self.tasks):
             action = self.tasks[number].action
             if isinstance(action, SetSpeed):
                 speed = action.scale(self.speed)
             begin, elapsed = elapsed, elapsed + expected_time(action, speed)
-            found.append(ExpectedTask(number, begin, elapsed, speed))
+            schedule.append(ExpectedTask(number, begin, elapsed, speed))
             if isinstance(action, ConditionalJump):
                 holds = action.predicted
                 if isinstance(action.condition, ProgramTime):
@@ -153,7 +153,7 @@ class Program:
                 number = action.then if holds else action.otherwise
             else:
                 number = self.next(number)[0]
-        return tuple(found)
+        return tuple(schedule)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -172,8 +172,8 @@ def _check_slip(state: State) -> None:
 
 def _met(state: State) -> str:
     """Return the two parts that would collide."""
-    met = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
-    return " and ".join(map(part, met[0])) if met and met[0] else "something"
+    pairs = [finding.parts for finding in state.findings if finding.reason is Reason.CONTACT]
+    return " and ".join(map(part, pairs[0])) if pairs and pairs[0] else "something"
 
 
 def stopped(run: Run, why: str) -> tuple[Run, tuple[cmd.Command, ...]]:

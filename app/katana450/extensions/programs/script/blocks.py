@@ -215,11 +215,11 @@ class Call(StepBlock):
         return tuple(step.called_at(name.line, name.file) for step in steps)
 
 
-def _called(definition: Definition, given: Pairs) -> tuple[LocatedStep, ...]:
+def _called(definition: Definition, values: Pairs) -> tuple[LocatedStep, ...]:
     """Return the steps of ``definition`` with the arguments ``given``."""
     known = [str(name.held) for name, _ in definition.parameters]
-    arguments = {str(name.held): value for name, value in given}
-    for name, _ in given:
+    arguments = {str(name.held): value for name, value in values}
+    for name, _ in values:
         if name.held not in known:
             raise name.wrong(f"There is no parameter {name}{or_known(str(name.held), known)}")
     scope = definition.context.scope
@@ -270,13 +270,13 @@ def with_definitions(value: YamlValue, context: ScriptContext) -> ScriptContext:
     fields = Fields(value, "the definitions")
     for name in [str(name.held) for name, _ in value.fields]:
 
-        def definition(inner: YamlValue, context: ScriptContext = context) -> Definition:
+        def read_definition(inner: YamlValue, context: ScriptContext = context) -> Definition:
             defined = DEFINED(inner, context)
-            found = Definition(defined.steps, defined.parameters, context)
-            _called(found, ())
-            return found
+            definition = Definition(defined.steps, defined.parameters, context)
+            _called(definition, ())
+            return definition
 
-        known = fields.take(name, definition, None)
+        known = fields.take(name, read_definition, None)
         if known is not None:
             context = replace(context, definitions={**context.definitions, name: known})
     fields.done()

@@ -130,7 +130,7 @@ def motion_measures(
     room = np.minimum(q - limits.lower, limits.upper - q)
     singular = [singular_values(chain, row)[-1] for chain, row in zip(chains, q, strict=True)]
     rows = zip(tools, q, qd, strict=True)
-    speeds = [arm.kinematics_to(tool).tool_speed(*each) for tool, *each in rows]
+    speeds = [arm.kinematics_to(tool).tool_speed(*posture) for tool, *posture in rows]
     return {
         "smallest_singular_value": float(min(singular)),
         "margin_to_limits_deg": float(np.degrees(room.min())),
@@ -141,10 +141,10 @@ def motion_measures(
 
 def water_measures(end: MotionWithWater) -> dict[str, float]:
     """Return the measures of the water at the end of a run, by their names."""
-    found = score(end.water, end.course)
+    end_score = score(end.water, end.course)
     return {
-        "emptied_percent": found.emptied_percent,
-        "emptied_ml": found.in_basin_ml,
-        "spilled_ml": found.spilled_ml,
-        "cup_peak_jerk_m_s3": found.peak_jerk,
+        "emptied_percent": end_score.emptied_percent,
+        "emptied_ml": end_score.in_basin_ml,
+        "spilled_ml": end_score.spilled_ml,
+        "cup_peak_jerk_m_s3": end_score.peak_jerk,
     }

@@ -54,11 +54,11 @@ class Scripts:
     @property
     def paths(self) -> Mapping[str, Path]:
         """Paths of the scripts by name; those of the folder come first and have precedence."""
-        found = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
+        paths = {_shown(path): path for path in sorted(LIBRARY.glob(f"*{ENDING}"))}
         if self._folder is not None:
             own = sorted(self._folder.glob(f"*{ENDING}"))[:MAX_SCRIPTS]
-            found = {**{path.stem: path for path in own}, **found}
-        return found
+            paths = {**{path.stem: path for path in own}, **paths}
+        return paths
 
     def offered(self, arm: ArmModel | None) -> tuple[str, ...]:
         """Return the names of the scripts of the folder, and of those of the library for ``arm``.
@@ -127,10 +127,10 @@ def files_in(folder: Path) -> Callable[[str], str]:
     root = folder.resolve()
 
     def opened(name: str) -> str:
-        found = (root / name).resolve()
-        if not found.is_relative_to(root):
+        path = (root / name).resolve()
+        if not path.is_relative_to(root):
             raise InputError(f"{name} is not in the folder of the script.")
-        return _text_of(found)
+        return _text_of(path)
 
     return opened
 

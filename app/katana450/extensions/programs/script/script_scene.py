@@ -90,8 +90,8 @@ def _pose(value: YamlValue, _context: ScriptContext) -> FloatArray:
     """Read the pose (4, 4) [m] of six numbers."""
     if value.kind != "list" or len(value.items) != 6:
         raise value.wrong("A pose must be six numbers: x, y, z in mm, roll, pitch, yaw in degrees.")
-    lengths = [POSE_LENGTH(each) for each in value.items[:3]]
-    angles = [POSE_ANGLE(each) for each in value.items[3:]]
+    lengths = [POSE_LENGTH(item) for item in value.items[:3]]
+    angles = [POSE_ANGLE(item) for item in value.items[3:]]
     return se3.from_rotation_translation(so3.from_rpy(*angles), lengths)
 
 
@@ -171,16 +171,16 @@ class SceneEntry(Declared):
     attach: Annotated[str, choice("hand", "world").about("hand: it moves with the hand")] = "world"
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistakes of a size or a mesh that the shape does not have."""
-        if given.get("shape_name") is None:
+        if values.get("shape_name") is None:
             return
-        shape = Shape(given["shape_name"])
-        numbers, size = shape.numbers, given.get("size")
+        shape = Shape(values["shape_name"])
+        numbers, size = shape.numbers, values.get("size")
         needed, other = ("mesh", "size") if shape is Shape.MESH else ("size", "mesh")
-        if needed not in given:
+        if needed not in values:
             yield "", f"An object needs {needed!r}."
-        if other in given:
+        if other in values:
             yield other, f"A {shape.value} has no {other!r}."
         elif size is not None and len(size) != numbers:
             yield "size", f"Expected a list of {numbers} values, not of {len(size)}."
@@ -238,9 +238,9 @@ class SceneDraft(Declared):
     entries: Annotated[tuple[SceneEntry, ...], OBJECTS.named("objects")] = ()
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of another version."""
-        version = given.get("version")
+        version = values.get("version")
         if version not in (None, VERSION):
             yield "version", f"The version must be {VERSION}, not {version:g}."
 
@@ -349,14 +349,14 @@ class ScriptScene:
 
     def _difference(self, session: Session, state: State) -> str:
         """Return a clause that names the first difference of ``state`` from this scene."""
-        present = {each.name: each for each in state.objects}
+        present = {scene_object.name: scene_object for scene_object in state.objects}
         T_palm_tool = _T_palm_tool(session)
         for entry in self.draft.entries:
             if entry.name not in present:
                 return f"there is no {entry.name}"
-            found = _object_difference(entry, present[entry.name], T_palm_tool)
-            if found:
-                return found
+            difference = _object_difference(entry, present[entry.name], T_palm_tool)
+            if difference:
+                return difference
         expected = {entry.name for entry in self.draft.entries}
         for name in present:
             if name not in expected:
@@ -418,28 +418,28 @@ def check_scene(session: Session, scene: Scene) -> None:
         chain = session.arm.chain
         if not chain.within_limits(chain.check_q(scene.joints)):
             raise InputError("The joints lie outside the limits of this arm.")
-    if scene.water is not None and all(each.name != CUP for each in scene.objects):
+    if scene.water is not None and all(scene_object.name != CUP for scene_object in scene.objects):
         raise InputError("There is water, but no cup.")
     session.check(cmd.ReplaceScene(scene.objects, scene.water))
 
 
 def _object_difference(
-    entry: SceneEntry, found: SceneObject, T_palm_tool: FloatArray | None
+    entry: SceneEntry, present: SceneObject, T_palm_tool: FloatArray | None
 ) -> str:
     """Return a clause that names how ``found`` differs from ``entry``; "" for not at all."""
-    same_size = entry.shape is Shape.MESH or np.allclose(entry.size, found.size, rtol=1e-6)
-    if entry.shape is not found.shape or not same_size:
+    same_size = entry.shape is Shape.MESH or np.allclose(entry.size, present.size, rtol=1e-6)
+    if entry.shape is not present.shape or not same_size:
         return f"{entry.name} has another shape or size"
-    if abs(entry.scale - found.scale) > 1e-6 * entry.scale:
-        return f"{entry.name} has the scale {found.scale:g}, not {entry.scale:g}"
-    if found.held or entry.fixed is not found.fixed:
-        return f"{entry.name} is {'' if found.carried else 'not '}in the hand"
-    if entry.can_be_held is not found.can_be_held:
-        return f"{entry.name} can{'' if found.can_be_held else 'not'} be held"
+    if abs(entry.scale - present.scale) > 1e-6 * entry.scale:
+        return f"{entry.name} has the scale {present.scale:g}, not {entry.scale:g}"
+    if present.held or entry.fixed is not present.fixed:
+        return f"{entry.name} is {'' if present.carried else 'not '}in the hand"
+    if entry.can_be_held is not present.can_be_held:
+        return f"{entry.name} can{'' if present.can_be_held else 'not'} be held"
     T = entry.T if T_palm_tool is None or not entry.fixed else T_palm_tool @ entry.T
-    if float(np.linalg.norm(T[:3, 3] - found.T[:3, 3])) > SAME_PLACE:
-        return f"{entry.name} is at {_point(found.T)}, not at {_point(T)}"
-    if float(np.abs(T[:3, :3] - found.T[:3, :3]).max()) > SAME_TURN:
+    if float(np.linalg.norm(T[:3, 3] - present.T[:3, 3])) > SAME_PLACE:
+        return f"{entry.name} is at {_point(present.T)}, not at {_point(T)}"
+    if float(np.abs(T[:3, :3] - present.T[:3, :3]).max()) > SAME_TURN:
         return f"{entry.name} is turned"
     return ""
 

@@ -58,7 +58,7 @@ def taught(script: Script) -> TaughtScript | None:
     steps, times = _once(script.steps)
     poses: list[TaughtPose] = []
     speed = 1.0
-    for step in (each.step for each in steps):
+    for step in (located.step for located in steps):
         last = poses[-1] if poses else None
         match step:
             case Speed(value=value):
@@ -82,9 +82,11 @@ def taught(script: Script) -> TaughtScript | None:
 
 def _once(steps: Sequence[LocatedStep]) -> tuple[Sequence[LocatedStep], int]:
     """Return the steps of a ``repeat`` around the whole script once, and their repetitions."""
-    times = sum(each.step is steps[0].step for each in steps)
+    times = sum(other.step is steps[0].step for other in steps)
     once = steps[: len(steps) // times]
-    repeated = all(each.step is once[number % len(once)].step for number, each in enumerate(steps))
+    repeated = all(
+        other.step is once[number % len(once)].step for number, other in enumerate(steps)
+    )
     return (once, times) if repeated and len(steps) == times * len(once) else (steps, 1)
 
 

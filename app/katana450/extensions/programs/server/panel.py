@@ -343,9 +343,9 @@ def _page(progress: Progress | None) -> str:
         elif progress.status == "planning":
             lines.append("The whole script is planned before the arm moves. This may take a while.")
             if progress.steps:
-                at = f"Step {progress.step} of {progress.steps}: {escape(progress.task)}"
+                step_text = f"Step {progress.step} of {progress.steps}: {escape(progress.task)}"
                 lines.append(
-                    f"{at}, {progress.fraction:.0%}"
+                    f"{step_text}, {progress.fraction:.0%}"
                     f"<progress value='{progress.fraction:.2f}'></progress>"
                 )
         elif progress.status == "ready":

@@ -65,7 +65,7 @@ class GhostScene:
 
     def show(self, session: Session, start: State, state: State) -> None:
         """Show what differs in ``state`` from ``start``, both of ``session``."""
-        now = {each.name: each for each in start.objects}
+        now = {start_object.name: start_object for start_object in start.objects}
         moved = []
         for scene_object in state.objects:
             T = session.environment.pose(scene_object, state.x)
@@ -131,7 +131,7 @@ def _amounts(poured: MotionWithWater | None) -> tuple[int, ...]:
     """Return the water in the basin and in the vessels [fl]."""
     if poured is None:
         return (0, 0)
-    return poured.water.basin, *(each.volume for each in poured.water.vessels)
+    return poured.water.basin, *(vessel.volume for vessel in poured.water.vessels)
 
 
 log = logging.getLogger(__name__)
@@ -308,8 +308,13 @@ class _Shown:
     def held(self) -> list[SceneObject]:
         """The objects that are held at some time, each once."""
         states = (moment.state for moment in self.moments)
-        found = {each.name: each for state in states for each in state.objects if each.held}
-        return list(found.values())
+        objects = {
+            scene_object.name: scene_object
+            for state in states
+            for scene_object in state.objects
+            if scene_object.held
+        }
+        return list(objects.values())
 
     def at(self, t: float) -> State | None:
         """Return the simulated state at ``t`` [s]; None if it is not known."""
@@ -351,11 +356,11 @@ class GhostSweep:
     def show(self, timeline: Timeline) -> None:
         """Show postures of ``timeline``, evenly spaced in time from start to end."""
         placed = [
-            self._robot.frames(self._robot.joint_values(*each))
-            for each in timeline.postures(GHOSTS)
+            self._robot.frames(self._robot.joint_values(*posture))
+            for posture in timeline.postures(GHOSTS)
         ]
         for name, node in self._nodes:
-            poses = np.array([each[name] for each in placed])
+            poses = np.array([posture[name] for posture in placed])
             wxyzs = np.array([so3.to_quaternion(T[:3, :3]) for T in poses], dtype=np.float32)
             arrange(node, wxyzs, np.ascontiguousarray(poses[:, :3, 3], dtype=np.float32))
         self._root.visible = True

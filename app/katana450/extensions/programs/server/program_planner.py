@@ -167,9 +167,10 @@ class Planning:
         if self.cancelled is not None:
             raise CancelledError(self.cancelled)
         if self._clock() - self._began > MAX_PLANNING_TIME:
-            at = "" if self.stage is None else f" (at step {self.stage.step})"
+            step = "" if self.stage is None else f" (at step {self.stage.step})"
             raise CancelledError(
-                f"Planning takes longer than {MAX_PLANNING_TIME:g} s{at}. Make the script shorter."
+                f"Planning takes longer than {MAX_PLANNING_TIME:g} s{step}. "
+                "Make the script shorter."
             )
 
 

@@ -104,8 +104,8 @@ class ProgramRunner(Runner):
         match request:
             case requests.Program(text=text, more=more, speed=speed):
                 self.script(participant, text, more=more, speed=speed)
-            case requests.Steer(order=order, unattended=unattended, at=at):
-                ticket = self.steer(participant, order, unattended=unattended, at=at)
+            case requests.Steer(order=order, unattended=unattended, at=step):
+                ticket = self.steer(participant, order, unattended=unattended, step=step)
                 return answers.Done(ticket=ticket, outcome=None if ticket else ACCEPTED)
             case requests.Breakpoints(steps=steps):
                 self.set_breakpoints(participant, steps)
@@ -137,7 +137,7 @@ class ProgramRunner(Runner):
         order: ProgramOrder,
         *,
         unattended: bool = False,
-        at: int | None = None,
+        step: int | None = None,
     ) -> int | None:
         """Carry out ``order`` for the program; see ``requests.Steer``. Raises LeaseError.
 
@@ -147,25 +147,25 @@ class ProgramRunner(Runner):
         Returns the ticket of the command that the arm was given now; None for none.
         """
         check_may_drive(participant.person)
-        plans = order is ProgramOrder.CONTINUE or at is not None
+        plans = order is ProgramOrder.CONTINUE or step is not None
         begins = order in PLANNED_ORDERS and (plans or not self.running)
         if unattended and not begins:
             raise LeaseError("Only `run`, `step` and `continue` begin an unattended program.")
-        if at is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
+        if step is not None and order not in (ProgramOrder.RUN, ProgramOrder.STEP):
             raise LeaseError("Only `run` and `step` begin at a step.")
         self._owner.check_unattended(unattended=unattended)
         planning = self.planner.planning
         if planning is not None and (planning.busy or self.planner.will_run):
             self._owner.check_may_steer(participant.person)
-            if at is not None:
-                planning.cancel(f"{participant.person.name} runs it from step {at}.")
-                self._plan_part(participant, order, at, unattended=unattended)
+            if step is not None:
+                planning.cancel(f"{participant.person.name} runs it from step {step}.")
+                self._plan_part(participant, order, step, unattended=unattended)
                 return None
             ticket = self.planner.steer(participant, order)
             self._owner.unattended = self._owner.unattended or unattended
             return ticket
         if plans:
-            self._plan_part(participant, order, at, unattended=unattended)
+            self._plan_part(participant, order, step, unattended=unattended)
             return None
         if begins:
             return self._begin(participant, order, unattended=unattended)
@@ -231,8 +231,8 @@ class ProgramRunner(Runner):
         if self._runs_as is None or self._run is None or program is None:
             return
         if not self._runs_as.drives:
-            taken = "The lease was taken from the program."
-            self._leave_with(runner.ended(self._run, Phase.STOPPED, taken))
+            reason = "The lease was taken from the program."
+            self._leave_with(runner.ended(self._run, Phase.STOPPED, reason))
             return
         owner = self._owner.participant
         if (why := hub.halted) is not None:
@@ -262,16 +262,16 @@ class ProgramRunner(Runner):
             return None
         program, run = planning.program, self._run
         if program is None or run is None or arm is None or planning.refused is not None:
-            found = planning.progress(owner.person.name)
+            progress = planning.progress(owner.person.name)
         else:
             allowed = 1.0 if self._runs_as is None else self._runs_as.allowed
-            found = runner.progress(program, run, arm.state, owner.person.name, allowed)
+            progress = runner.progress(program, run, arm.state, owner.person.name, allowed)
         began = self._owner.began
         return msgspec.structs.replace(
-            found,
+            progress,
             unattended=self._owner.unattended and self.running,
             began=None if began is None else began.isoformat(timespec="seconds"),
-            breakpoints=tuple(sorted(each + 1 for each in self.planner.breakpoints)),
+            breakpoints=tuple(sorted(index + 1 for index in self.planner.breakpoints)),
             can_continue=not self.running and self.planner.may_continue(self._interruption),
         )
 
@@ -311,27 +311,34 @@ class ProgramRunner(Runner):
             planning.refused = str(error)
 
     def _plan_part(
-        self, participant: Participant, order: ProgramOrder, at: int | None, *, unattended: bool
+        self,
+        participant: Participant,
+        order: ProgramOrder,
+        step: int | None,
+        *,
+        unattended: bool,
     ) -> None:
         """Plan the program from a step, or from where it ended early, and then run it."""
         planning, interruption = self.planner.planning, self._interruption
         if planning is None:
             raise LeaseError("No program is planned. Send a script first.")
-        if self.running and at is None:
+        if self.running and step is None:
             raise LeaseError("The program is running. `resume` ends a pause.")
-        if at is None and interruption is None:
+        if step is None and interruption is None:
             raise LeaseError("No program was interrupted. Run it from the beginning.")
         self._owner.check_may_steer(participant.person)
         self.hub.gate.check_not_stopped()
         if self.running:
             if self.hub.present().state.moving:
                 raise LeaseError("The arm is moving. Pause it first, and choose the step at rest.")
-            self._end(f"{participant.person.name} went to step {at}.")
+            self._end(f"{participant.person.name} went to step {step}.")
         self.planner.check_free(participant)
-        if at is None and interruption is not None:
+        if step is None and interruption is not None:
             self.planner.plan_rest(participant, interruption, planning)
         else:
-            self.planner.plan(participant, planning.text, planning.speed, first_step=(at or 1) - 1)
+            self.planner.plan(
+                participant, planning.text, planning.speed, first_step=(step or 1) - 1
+            )
         self._run, self.planner.then, self._owner.unattended = None, order, unattended
 
     def _begin(

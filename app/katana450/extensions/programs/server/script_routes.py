@@ -73,10 +73,10 @@ class ScriptRoutes:
 
         def read(text: str) -> Response:
             try:
-                found = taught(parse(text))
+                poses = taught(parse(text))
             except ScriptError as error:
                 return _json({"problems": error.problems, "taught": None})
-            return _json({"problems": (), "taught": found})
+            return _json({"problems": (), "taught": poses})
 
         return await self._with_text(request, read)
 
@@ -132,5 +132,5 @@ def _schema_json() -> bytes:
     return msgspec.json.encode(script_schema())
 
 
-def _json(found: Any) -> Response:
-    return Response(msgspec.json.encode(found), media_type="application/json")
+def _json(content: Any) -> Response:
+    return Response(msgspec.json.encode(content), media_type="application/json")

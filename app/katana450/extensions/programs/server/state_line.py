@@ -122,8 +122,8 @@ def duration(seconds: float) -> str:
 
 def _unattended(program: Progress) -> str:
     """Return a sentence on who started an unattended program, and when."""
-    at = "" if program.began is None else f" at {program.began[11:16]} UTC"
-    return f"Unattended: started by {program.by}{at}."
+    start_time = "" if program.began is None else f" at {program.began[11:16]} UTC"
+    return f"Unattended: started by {program.by}{start_time}."
 
 
 def orders(program: Progress | None, *, may_begin: bool) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
     """Return the steps of ``program`` in their order, with those of all alternatives."""
     names: dict[int, str] = {}
     seconds = [0.0] * program.steps
-    times = {each.number: each.end - each.begin for each in program.schedule}
+    times = {task.number: task.end - task.begin for task in program.schedule}
     expected = {program.tasks[number].number for number in times}
     last: dict[int, int] = {}
     # The first task belongs to no step; it sets the speed.
@@ -59,12 +59,12 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
 
 def _words(program: Program) -> list[str]:
     """Return ``then`` or ``else`` for each step of an alternative, and "" for all others."""
-    found = [""] * program.steps
+    words = [""] * program.steps
     # Inner alternatives come after the outer ones.
     for number, otherwise, end in program.alternatives:
-        found[number + 1 : otherwise] = ["then"] * (otherwise - number - 1)
-        found[otherwise:end] = ["else"] * (end - otherwise)
-    return found
+        words[number + 1 : otherwise] = ["then"] * (otherwise - number - 1)
+        words[otherwise:end] = ["else"] * (end - otherwise)
+    return words
 
 
 def current_step(

@@ -88,7 +88,7 @@ class Traces:
             return
         point = forward(path.chain, state.q)[:3, 3]
         sigma = following.segment.scaling.pace(following.local).sigma
-        desired = np.array([each.c0 for each in path.curve.at(Jet.variable(sigma))[:3]])
+        desired = np.array([coordinate.c0 for coordinate in path.curve.at(Jet.variable(sigma))[:3]])
         in_base = self._in_base(point)
         if not self._points or float(np.abs(in_base - self._points[-1]).max()) > 0.0:
             self._points.append(in_base)
@@ -100,7 +100,9 @@ class Traces:
     def _begin(self, plan: Plan) -> None:
         """Draw the tool paths of ``plan``. A plan without any keeps the last path and trace."""
         self._plan = plan
-        paths = [self._lines(each) for each in plan.segments if isinstance(each.path, CurvePath)]
+        paths = [
+            self._lines(segment) for segment in plan.segments if isinstance(segment.path, CurvePath)
+        ]
         if not paths:
             return
         self._points, self._errors, self._shown = [], [], 0

@@ -42,8 +42,8 @@ class RelativeMove(Declared):
     def joints(self, plan: PlanState) -> FloatArray:
         """Return the joints (n,) [rad] at its end. Raises InputError if it cannot be reached."""
         by = plan.direction(self.by, in_base=self.in_base)
-        there = plan.target_at(StepTarget(angles=self.angles, in_base=self.in_base))
-        return plan.joints_of(there.moved(frozen(there.position + by)), self.branch)
+        end = plan.target_at(StepTarget(angles=self.angles, in_base=self.in_base))
+        return plan.joints_of(end.moved(frozen(end.position + by)), self.branch)
 
 
 def _destination(value: YamlValue, context: ScriptContext) -> StepTarget | RelativeMove:

@@ -62,10 +62,10 @@ class PlaceHeld(Step, word="place"):
     in_base: bool = False
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of two heights."""
-        at = given.get("at")
-        if at is not None and "on" in given and not math.isnan(at.z):
+        spot = values.get("at")
+        if spot is not None and "on" in values and not math.isnan(spot.z):
             yield "", "Give either `on` or the height z, which follows from `on`."
 
     def build(self, plan: PlanState) -> PlanState:
@@ -82,25 +82,25 @@ class PlaceHeld(Step, word="place"):
 
     def _spot(self, plan: PlanState, held: SceneObject) -> FloatArray:
         """Return the place (3,) [m] of the underside in the base frame. Raises InputError."""
-        at = np.zeros(3)
+        place = np.zeros(3)
         if self.on:
-            at = plan.scene_object(self.on).T[:3, 3]
+            place = plan.scene_object(self.on).T[:3, 3]
         if self.at is not None:
             T = np.eye(4) if self.in_base else plan.plan_context.T_base_shoulder
-            at = T[:3, :3] @ np.nan_to_num((self.at.x, self.at.y, self.at.z)) + T[:3, 3]
+            place = T[:3, :3] @ np.nan_to_num((self.at.x, self.at.y, self.at.z)) + T[:3, 3]
         if self.at is None or math.isnan(self.at.z):
-            high = _standing(held, np.array((at[0], at[1], MAX_COORDINATE)))
-            at = np.array((at[0], at[1], surface_below(_objects_around(plan), high)))
-        standing = _standing(held, at)
+            high = _standing(held, np.array((place[0], place[1], MAX_COORDINATE)))
+            place = np.array((place[0], place[1], surface_below(_objects_around(plan), high)))
+        standing = _standing(held, place)
         if self.on:
             below = plan.scene_object(self.on)
-            if abs(surface_below([below], standing) - at[2]) > RELEASE_HEIGHT or at[2] <= 0.0:
+            if abs(surface_below([below], standing) - place[2]) > RELEASE_HEIGHT or place[2] <= 0.0:
                 raise InputError(
                     f"{self.on} cannot carry {held.name} there: its top must be level, and the "
                     f"middle of {held.name} over it."
                 )
         _check_support(plan, standing)
-        return at
+        return place
 
 
 @dataclass(frozen=True)
@@ -111,13 +111,13 @@ class SetDown(Step, word="set_down"):
 
     def build(self, plan: PlanState) -> PlanState:
         """Plan the motions. Raises InputError if nothing is held, or there is no room."""
-        taken = plan.taken
-        if plan.state.grip is None or taken is None:
+        grasp = plan.taken
+        if plan.state.grip is None or grasp is None:
             raise InputError("The hand holds no object that this program grasped.")
-        at = taken.at
-        above = at.moved(at.position * (1, 1, 0) + plan.target.position * UP)
+        target = grasp.at
+        above = target.moved(target.position * (1, 1, 0) + plan.target.position * UP)
         plan = carry(plan, above, "back")
-        low = at.moved(at.position + RELEASE_HEIGHT * UP)
+        low = target.moved(target.position + RELEASE_HEIGHT * UP)
         return let_go(plan.lead([line_between(above, low)], "set down"))
 
 
@@ -138,9 +138,9 @@ class Release(Step, word="release"):
 
 def held_object(plan: PlanState, step: str) -> SceneObject:
     """Return the object between the fingers. Raises InputError with the remedy if there is none."""
-    for each in plan.state.objects:
-        if each.held:
-            return each
+    for scene_object in plan.state.objects:
+        if scene_object.held:
+            return scene_object
     raise InputError(f"The hand holds nothing to {step}. `pick` an object first.")
 
 
@@ -161,10 +161,10 @@ def check_fall(plan: PlanState, held: SceneObject) -> None:
 def _check_support(plan: PlanState, standing: SceneObject) -> None:
     """Raise InputError if nothing carries the object ``standing``, or an open vessel would."""
     objects = _objects_around(plan)
-    for each in objects:
-        if (is_vessel(each) or each.name == BASIN) and is_over(standing, each):
+    for other in objects:
+        if (is_vessel(other) or other.name == BASIN) and is_over(standing, other):
             raise InputError(
-                f"{each.name} is open at its top and cannot carry {standing.name}. Choose a place "
+                f"{other.name} is open at its top and cannot carry {standing.name}. Choose a place "
                 "beside it."
             )
     check_carried(plan.plan_context.session.environment.table, objects, standing)
@@ -172,18 +172,18 @@ def _check_support(plan: PlanState, standing: SceneObject) -> None:
 
 def _objects_around(plan: PlanState) -> list[SceneObject]:
     """Return the objects that the hand does not carry."""
-    return [each for each in plan.state.objects if not each.carried]
+    return [scene_object for scene_object in plan.state.objects if not scene_object.carried]
 
 
 def let_go(plan: PlanState) -> PlanState:
     """Return ``plan`` with the fingers opened and the retreat. Raises InputError without room."""
-    at, q, hand = plan.target, plan.q, plan.hand
+    target, q, hand = plan.target, plan.q, plan.hand
     opened = plan.plan_context.arm.gripper.opened
     plan = plan.with_action("let go", MoveFingers(opened), with_fingers(plan, opened))
 
     def draw_back(plan: PlanState, away: float) -> PlanState:
         end = hand.retreat(q, away)
-        return plan.lead([line_between(at, end)], "draw back")
+        return plan.lead([line_between(target, end)], "draw back")
 
     try:
         return replace(plan.first(APPROACHES, draw_back), taken=None)
@@ -191,9 +191,9 @@ def let_go(plan: PlanState) -> PlanState:
         raise error.after("There is no room to draw back") from error
 
 
-def _standing(held: SceneObject, at: FloatArray) -> SceneObject:
+def _standing(held: SceneObject, place: FloatArray) -> SceneObject:
     """Return the held object upright with its underside at ``at`` (3,) [m] in the base frame."""
-    return replace(held, T=se3.from_rotation_translation(np.eye(3), at), held=False)
+    return replace(held, T=se3.from_rotation_translation(np.eye(3), place), held=False)
 
 
 def _bring(plan: PlanState, held: SceneObject, low: ToolTarget) -> PlanState:
@@ -233,11 +233,11 @@ class Pick(Grasp, word="pick"):
     def build(self, plan: PlanState) -> PlanState:
         """Plan grasp and lifting. Raises InputError if it is not possible."""
         plan = super().build(plan)
-        at = plan.target
+        target = plan.target
 
         def lift(plan: PlanState, height: float) -> PlanState:
-            raised = at.moved(at.position + height * UP)
-            return plan.lead([line_between(at, raised)], f"lift {self.name}")
+            raised = target.moved(target.position + height * UP)
+            return plan.lead([line_between(target, raised)], f"lift {self.name}")
 
         try:
             return plan.first(LIFTS, lift)
@@ -256,10 +256,10 @@ class Stack(Declared):
     in_base: bool = False
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of an object on itself."""
-        if given.get("name") is not None and given["name"] == given.get("on"):
-            yield "", f"{given['name']} cannot stand on itself."
+        if values.get("name") is not None and values["name"] == values.get("on"):
+            yield "", f"{values['name']} cannot stand on itself."
 
     @property
     def steps(self) -> tuple[Step, Step]:

@@ -167,9 +167,9 @@ class Pour(Step, word="pour"):
     ] = None
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of a part that is shaken out."""
-        if "volume" in given and given.get("shake"):
+        if "volume" in values and values.get("shake"):
             yield "shake", "A shaken cup does not keep the rest: leave out `shake` or `ml`."
 
     @property

@@ -231,8 +231,10 @@ class CloseUntil(MoveFingers):
         Raises InputError after the timeout of a motion of the fingers, and if they hold nothing or
         something else than they must.
         """
-        found = self.model.squeeze(state) if super().done(state, waited) else None
-        return found is not None and abs(found.force - self.force) <= FORCE_TOLERANCE * self.force
+        squeeze = self.model.squeeze(state) if super().done(state, waited) else None
+        return (
+            squeeze is not None and abs(squeeze.force - self.force) <= FORCE_TOLERANCE * self.force
+        )
 
     def correction(self, state: State) -> tuple[cmd.Command, ...]:
         """Return the command that gives the force on what the fingers hold; none before they do.

@@ -124,9 +124,9 @@ class Lines(Step, word="lines"):
     feed: Feed = TOOL_SPEED
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of places that are no points."""
-        places = given.get("through") or ()
+        places = values.get("through") or ()
         if any(place.joints is not None or place.branch is not None for place in places):
             yield "", "`lines` takes points only. Use `via` for joint angles and branches."
 
@@ -134,8 +134,8 @@ class Lines(Step, word="lines"):
         """Plan the lines. Raises InputError if the tool cannot follow them."""
         vias, planning = [plan.target], plan.planning
         branch = plan.branches(None)[0]
-        for place_number, each in enumerate(self.through, start=1):
-            vias.append(plan.target_at(each, vias[-1]))
+        for place_number, place in enumerate(self.through, start=1):
+            vias.append(plan.target_at(place, vias[-1]))
             if planning.joints(plan.q, vias[-1], branch) is None:
                 raise InputError(f"Place {place_number}: {plan.unreached(vias[-1], branch)}")
         if self.blend:
@@ -189,9 +189,9 @@ class _Turn(Step):
         """Move to the start of ``arc`` if the arm is not there, then along it."""
         planning = plan.planning
 
-        def path(plan: PlanState, tried: AnyBranch) -> Path:
-            curve = roomiest(planning.chain, tried, arc) if self.is_roomiest else arc
-            return planning.path(plan.q, curve, tried)
+        def path(plan: PlanState, arc_branch: AnyBranch) -> Path:
+            curve = roomiest(planning.chain, arc_branch, arc) if self.is_roomiest else arc
+            return planning.path(plan.q, curve, arc_branch)
 
         tool_path = plan.choose(plan.branches(branch), path)
         plan = plan.move_to(tool_path.start, f"{name}: to its start")
@@ -218,10 +218,10 @@ class _Turn(Step):
                 raise
             first = plan.branches(branch)[0]
             # Eight branches would take long.
-            tried = branch if end.is_pitched else first
+            arc_branch = branch if end.is_pitched else first
 
             def build(target: ToolTarget, fraction: float) -> PlanState:
-                return self.follow(plan, arc(target, fraction), name, tried)
+                return self.follow(plan, arc(target, fraction), name, arc_branch)
 
             remedies = arc_remedies(end, build, size, error)
             raise unfollowed(plan, error, arc(end, 1.0), first, remedies) from error
@@ -266,9 +266,9 @@ class Circle(_Turn, word="circle"):
     branch: Branch = None
 
     @classmethod
-    def mistakes(cls, given: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         """Yield the mistake of a circle without turns."""
-        if given.get("turns") == 0.0:
+        if values.get("turns") == 0.0:
             yield "turns", "`turns` must not be 0."
 
     def build(self, plan: PlanState) -> PlanState:
@@ -278,14 +278,14 @@ class Circle(_Turn, word="circle"):
         out = up - (up @ normal) * normal
         if math.hypot(*out) < LEVEL_TOLERANCE:
             # A level circle has no highest point: start at the point farthest in front.
-            ahead = plan.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
-            out = ahead - (ahead @ normal) * normal
+            front = plan.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
+            out = front - (front @ normal) * normal
         turn = math.tau * self.turns
 
         def arc(end: ToolTarget, fraction: float) -> Curve:
             start = centre + fraction * self.radius / math.hypot(*out) * out
-            there = end.moved(frozen(start))
-            return arc_between(centre, normal, turn, 0.0, there, there)
+            start_target = end.moved(frozen(start))
+            return arc_between(centre, normal, turn, 0.0, start_target, start_target)
 
         size = "radius", 1e3 * self.radius
         return self.follow_or_advise(plan, arc, self.turned(plan), size, self.branch)

@@ -64,13 +64,13 @@ class UntimedTrajectory(UntimedPath):
         gentle = None if self.state.grip is None else CARRY
         bounds = Bounds(self.arm.limits, TOOL_SPEED, gentle)
         fingers = self.state.gripper_setpoint
-        made = timed_plan(
+        timed = timed_plan(
             self.paths, bounds, self.world, fingers, CLEARANCE, timing=recorded_scaling
         )
         (path,) = self.paths
         assert isinstance(path, TrajectoryPath)
-        note = path.slowing(made.duration, bounds.joints.speed)
-        return FollowPlan(made, note=note)
+        note = path.slowing(timed.duration, bounds.joints.speed)
+        return FollowPlan(timed, note=note)
 
 
 TIME = number(0.0, MAX_TIME, "s")
@@ -171,9 +171,9 @@ class FollowTrajectory(Step, word="trajectory"):
         rows = self.file if self.through is None else self.through
         assert rows is not None
         times, postures = frozen(rows[:, 0]), frozen(rows[:, 1:])
-        joints, given = plan.chain.n, postures.shape[1]
-        if given != joints:
-            raise InputError(f"The arm has {joints} joints; a row of this has {given} angles.")
+        joints, columns = plan.chain.n, postures.shape[1]
+        if columns != joints:
+            raise InputError(f"The arm has {joints} joints; a row of this has {columns} angles.")
         path = TrajectoryPath(plan.chain, times, postures)
         plan = plan.move_to(path.start, f"{TRAJECTORY}: approach")
         _check_clear(plan, path)
@@ -189,15 +189,15 @@ def _check_clear(plan: PlanState, path: TrajectoryPath) -> None:
         return
     sweep = Sweep(path)
     room = SweptClearance.about(world, CLEARANCE, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
-    met = sweep.blocked(room, fingers)
-    if met is None:
+    nearest = sweep.blocked(room, fingers)
+    if nearest is None:
         return
-    x = sweep.at(met.sigma, fingers)
+    x = sweep.at(nearest.sigma, fingers)
     worst = room.worst(x)
     raise BlockedError(
-        f"At {path.time(met.sigma):.2f} s of the trajectory, with the tool at {{point}}, {{parts}} "
-        f"would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. Move the "
-        "obstacle, or leave this part out.",
+        f"At {path.time(nearest.sigma):.2f} s of the trajectory, with the tool at {{point}}, "
+        f"{{parts}} would {apart(worst.distance)}, and {1e3 * CLEARANCE:g} mm are required. "
+        "Move the obstacle, or leave this part out.",
         forward(path.chain, x[: path.chain.n])[:3, 3].tolist(),
         parts=worst.parts,
     )
