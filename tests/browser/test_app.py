@@ -120,6 +120,7 @@ def test_the_pitch_ring_turns_the_tool_about_its_point(robot: Robot, artefacts: 
     robot.page.keep(artefacts / "app-pitch.png")
 
 
+@pytest.mark.long
 def test_target_out_of_reach_is_shown_by_ghost_colour_and_sentence(
     robot: Robot, truth: Truth, artefacts: Path
 ) -> None:

@@ -163,6 +163,7 @@ def assert_stop_is_measured(card: Card, program: Client) -> None:
     assert f"{shown[1]} s, {shown[2]} mm, " in page.inner_text("#arm dl")
 
 
+@pytest.mark.long
 def test_arm_that_calibrates_is_not_shown_as_stopped(stack: ExitStack, windows: Windows) -> None:
     card = Card(stack, windows, "--calibration-scale", "1")
     page = card.open()

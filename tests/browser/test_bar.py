@@ -224,6 +224,7 @@ def test_scripts_of_each_document_are_sent_in_one_file_in_their_order() -> None:
     assert [each.encode() for each in inline] == [written["theme.js"]]
 
 
+@pytest.mark.long
 def test_link_signs_in_leaves_no_trace_and_only_then_viser_connects(
     browser: Browser, tmp_path: Path
 ) -> None:

@@ -67,6 +67,7 @@ def toast(page: ViserPage, words: str) -> None:
     page.wait_until(lambda: words in bar(page, "toast"), f"the words {words!r}")
 
 
+@pytest.mark.long
 def test_whole_flow_by_keyboard_alone(
     open_page: OpenPage, recording_server: AppServer, recorded: Path, artefacts: Path
 ) -> None:

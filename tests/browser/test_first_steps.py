@@ -69,6 +69,7 @@ def done(page: ViserPage, label: str) -> bool:
     return "done" in step.inner_text()
 
 
+@pytest.mark.long
 def test_unasked_drag_counts_and_question_mark_opens_the_help(
     visit: ViserPage, server: AppServer
 ) -> None:

@@ -36,6 +36,7 @@ def reset_by_key(page: ViserPage, truth: Truth) -> None:
     truth.wait(stopped=None)
 
 
+@pytest.mark.long
 def test_arm_is_handed_over(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:

@@ -110,6 +110,7 @@ def test_knob_of_a_spectator_springs_back_with_the_reason(
         other.ask(requests.ReleaseLease())
 
 
+@pytest.mark.long
 def test_stop_key_works_on_a_knob(page: ViserPage, truth: Truth) -> None:
     pause = page.page.locator("#instruments .toolbar").get_by_role("button", name="Pause")
     with slowly(page, truth):
@@ -132,6 +133,7 @@ def test_stop_key_works_on_a_knob(page: ViserPage, truth: Truth) -> None:
         clear_stop(page, truth)
 
 
+@pytest.mark.long
 def test_gauges_show_the_values_of_the_server(page: ViserPage, truth: Truth) -> None:
     def shows(name: str) -> float:
         meter = card(page, name).get_by_role("meter").first

@@ -60,6 +60,7 @@ def choose(page: ViserPage, value: str) -> None:
     page.page.locator(f"#jog [name=step][value='{value}'] + span").click()
 
 
+@pytest.mark.long
 def test_pads_and_buttons_move_while_they_are_held(
     sheet: ViserPage, truth: Truth, artefacts: Path
 ) -> None:

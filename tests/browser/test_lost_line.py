@@ -96,6 +96,7 @@ def attentive(windows: Windows) -> Iterator[Attentive]:
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_first_drag_after_a_rest_does_not_stop_on_a_slow_connection(attentive: Attentive) -> None:
     page, truth, line = attentive
     worker = worker_of(page)

@@ -93,6 +93,7 @@ def undo(page: ViserPage, reader: Client, before: set[str]) -> None:
     page.wait_until(lambda: objects(reader).keys() == before, "the objects of before")
 
 
+@pytest.mark.long
 def test_files_are_dropped_on_the_table_and_undone(page: ViserPage, reader: Client) -> None:
     before = set(objects(reader))
     place = (0.45, 0.15, 0.0)

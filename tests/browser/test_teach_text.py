@@ -110,6 +110,7 @@ def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefact
     assert page.locator("#teach-editor pre .bad").count() == 0
 
 
+@pytest.mark.long
 def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
     sheet: ViserPage, truth: Truth, artefacts: Path
 ) -> None:

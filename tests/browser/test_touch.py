@@ -68,6 +68,7 @@ def page(server: AppServer, arm: Client, windows: Windows) -> Iterator[Page]:
         assert page.errors == []
 
 
+@pytest.mark.long
 def test_maps_show_force_and_centre_of_pressure(page: Page, arm: Client) -> None:
     page.click("#instruments-button")
     card = page.locator("#instruments .card[data-id=pads]")

@@ -172,6 +172,7 @@ def test_full_disk_for_the_output_does_not_stop_the_server() -> None:
     assert "Traceback" not in errors
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
 def test_full_disk_for_the_output_of_a_command_is_reported() -> None:
     with Path("/dev/full").open("w") as full:

@@ -85,6 +85,7 @@ def test_other_mechanism_is_refused_in_a_sentence(tmp_path: Path) -> None:
     assert done.stderr.startswith("This is not an arm for katana450: ")
 
 
+@pytest.mark.long
 def test_arm_of_a_server_is_driven(tmp_path: Path) -> None:
     with AppServer() as server:
         said = run(tmp_path, EXAMPLES / "drive_by_api.py", server.url)

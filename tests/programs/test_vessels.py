@@ -63,6 +63,7 @@ def glass_of(state: State) -> float:
     return 0.0 if vessel is None else vessel.kept / MILLILITRE
 
 
+@pytest.mark.long
 def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: Stage) -> None:
     program, start = started(stage, BOTH)
     run, states = stage.play(program, start, most=20_000)
@@ -84,7 +85,7 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
     np.testing.assert_allclose(there.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-6)
 
 
-@pytest.mark.long
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("full", "pour", "size", "pose"),
     [

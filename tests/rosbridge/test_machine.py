@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import time
 
+import pytest
+
 from tests.browser.server import APP, ROOT, AppServer
 from tests.rosbridge.ros_client import FOLLOW, JOINT_JOG, TWIST, ros, trajectory, twist
 
 GANTRY = ROOT / "tests" / "exchange" / "gantry.urdf"
 
 
+@pytest.mark.long
 def test_joints_of_a_mechanism_are_seen_and_jogged() -> None:
     async def act() -> None:
         with AppServer((*APP, "--urdf", str(GANTRY))) as server:
