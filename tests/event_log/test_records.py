@@ -18,9 +18,12 @@ from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
 from katana450.client import connect
-from katana450.extensions.event_log.record_limits import LIMITS
-from katana450.extensions.event_log.record_maker import STREAM_GAP, RecordMaker
-from katana450.extensions.event_log.record_sender import RecordSender
+from katana450.extensions.event_log.record_maker import (
+    LIMITS,
+    STREAM_GAP,
+    RecordMaker,
+    RecordSender,
+)
 from katana450.extensions.event_log.records import (
     MAX_LINE_BYTES,
     MAX_TEXT,

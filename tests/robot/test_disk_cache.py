@@ -24,7 +24,7 @@ from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
 from katana450.extensions.conduit.rings import Floats, poses
 from katana450.extensions.conduit.stretches import stretches_of
-from katana450.extensions.water.nodes import _glossy
+from katana450.extensions.water import _glossy
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.server.view.scene import surface

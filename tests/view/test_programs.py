@@ -28,7 +28,7 @@ from katana450.extensions.programs.server.panel import PanelAccess, ProgramsPane
 from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.server.step_list import ListedStep, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
-from katana450.extensions.water.nodes import WORTH_SHOWING
+from katana450.extensions.water import WORTH_SHOWING
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress

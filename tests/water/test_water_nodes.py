@@ -14,7 +14,7 @@ import pytest
 import viser
 
 from katana450.arm.robot.props import load_props, water_environment
-from katana450.extensions.water.nodes import WORTH_SENDING, WaterNodes
+from katana450.extensions.water import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.puddle import THICKNESS, Puddle

@@ -38,7 +38,7 @@ EXTENSIONS = (
         ),
         serve_options=f"{HERE}.event_log.log_options:add_serve_options",
         server_log=f"{HERE}.event_log.disk_log:disk_log",
-        send_records=f"{HERE}.event_log.record_sender:send_records",
+        send_records=f"{HERE}.event_log.record_maker:send_records",
     ),
     Extension(
         "programs",
@@ -221,7 +221,7 @@ EXTENSIONS = (
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
     Extension("joint_view", joint_view=f"{HERE}.joint_view:MachineView"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
-    Extension("water", view_layer=f"{HERE}.water.nodes:WaterLayer"),
+    Extension("water", view_layer=f"{HERE}.water:WaterLayer"),
     Extension("ellipsoid", view_layer=f"{HERE}.ellipsoid.layer:EllipsoidLayer"),
     Extension("general_arms", find_arm=f"{HERE}.general_arms.driven_tool:driven_arm"),
 )

@@ -1,13 +1,22 @@
-"""Records of the event log, made from notes: who did what, on what grounds, with what outcome.
+"""Records of the event log, made from notes in a thread, and sent to the process that writes them.
 
-Commands that come in streams make one record at the start and one at the end.
+Who did what, on what grounds, with what outcome. Commands that come in streams make one record at
+the start and one at the end. Of the records that one participant can cause, more than a limit are
+counted, so that nobody can quickly fill the log, or displace older records by new ones.
 """
 
 from __future__ import annotations
 
+import logging
+import threading
 import time
-from collections import OrderedDict
+from argparse import Namespace
+from collections import Counter, OrderedDict
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from queue import Empty
 from typing import Any
 
 from katana450.arm.control import commands as cmd
@@ -17,9 +26,10 @@ from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.state import Outcome, Verdict
-from katana450.extensions.event_log.record_limits import RecordLimits
-from katana450.extensions.event_log.records import Record, content_of, text, utc
-from katana450.server.service.recorder import LeaseChange, Note
+from katana450.arm.runtime.clock import MonotonicClock
+from katana450.extensions.event_log.records import Record, content_of, record, text, utc
+from katana450.server.service.recorder import LeaseChange, Note, Recorder
+from katana450.server.web.limits import TokenBucket
 
 STREAM_GAP = 1.0
 """[s] Time without another command after which a stream has ended."""
@@ -29,6 +39,51 @@ MAX_STREAM_SECONDS = 60.0
 
 MAX_TICKETS = 1024
 """Maximum number of commands whose outcome is awaited."""
+
+SUBJECT = ("axis", "name", "trait")
+"""Attributes by which commands of one class belong to different streams."""
+
+StreamKey = tuple[str, str, str, object]
+
+SUMMARY_INTERVAL = 10.0
+"""[s] Time between two summaries of what was not written."""
+
+MAX_ACCOUNTS = 512
+"""Maximum number of accounts; beyond it the oldest ones are counted with all others."""
+
+SESSION = (60.0, 0.2)
+
+LIMITS = {
+    "stop": (30.0, 0.5),
+    "clear": (30.0, 0.5),
+    "lease": (60.0, 0.5),
+    "finding": (200.0, 1.0),
+    "outcome": (200.0, 1.0),
+    "refusal": (20.0, 0.2),
+    **dict.fromkeys(("join", "leave", "rename", "sign-in", "upload"), SESSION),
+}
+"""Records of one participant in a burst, and per second [1/s] afterwards, by kind. A flood of one
+kind leaves the others as they are."""
+
+COMMANDS = (600.0, 2.0)
+"""The same for all other kinds."""
+
+EVERYBODY, EVERYBODY_FACTOR = "everybody", 4.0
+"""Source of the records of all participants together, and their limits in limits of one."""
+
+log = logging.getLogger(__name__)
+
+COLLECTING = 0.02
+"""[s] Minimum time between two turns of the thread, so that a stream wakes it rarely."""
+
+TURN = 0.25
+"""[s] Maximum time between two turns while a stream or a summary is open."""
+
+IDLE_TURN = 1.0
+"""[s] Maximum time between two turns otherwise, after which a problem of the writer is known."""
+
+CLOSE_TIMEOUT = 1.0
+"""[s] Time for the last records at the end of the process."""
 
 
 @dataclass
@@ -43,12 +98,6 @@ class CommandStream:
         """Add the next command."""
         self.last = note
         self.count += 1
-
-
-SUBJECT = ("axis", "name", "trait")
-"""Attributes by which commands of one class belong to different streams."""
-
-StreamKey = tuple[str, str, str, object]
 
 
 class RecordMaker:
@@ -273,3 +322,139 @@ def _transfer(change: LeaseChange, by: Actor) -> tuple[dict[str, Any], str]:
     if new == by.person:
         return {"lease": "taken"}, "an admin may take the lease"
     return {"lease": "handed over"}, "holds the lease"
+
+
+class _Account:
+    """Records of one kind that one participant may cause now, and those that were not written."""
+
+    def __init__(self, kind: str, factor: float, t: float) -> None:
+        burst, rate = LIMITS.get(kind, COMMANDS)
+        self.records = TokenBucket(factor * rate, factor * burst, t)
+        self.since = t
+        self.who: Any = None
+        self.unwritten: Counter[str] = Counter()
+
+    def add(self, unwritten: Counter[str], who: Any, t: float) -> None:
+        """Count records that are not written since ``t`` [s]."""
+        if not self.unwritten:
+            self.since, self.who = t, who
+        self.unwritten += unwritten
+
+    def summary(self, t: float) -> Record:
+        """Return the record of what was not written up to ``t`` [s], and count from zero."""
+        counts, self.unwritten = self.unwritten, Counter()
+        seconds = round(t - self.since, 1)
+        what = {"count": counts.total(), "seconds": seconds, "of": dict(counts.most_common(8))}
+        return {"kind": "more", "what": what, "t": round(t, 3), "who": self.who}
+
+
+class RecordLimits:
+    """Limits by participant and kind, and for all participants by kind."""
+
+    def __init__(self) -> None:
+        self._accounts: OrderedDict[tuple[str, str], _Account] = OrderedDict()
+
+    def admits(self, source: str, record: Record, t: float) -> bool:
+        """Return whether ``record`` of ``source`` is written at ``t`` [s]; count it otherwise."""
+        kind = record["kind"]
+        own, total = self._account(source, kind, t), self._account(EVERYBODY, kind, t)
+        if own.records.take(t) and total.records.take(t):
+            return True
+        own.add(Counter([_label(record)]), record.get("who"), t)
+        return False
+
+    def summaries(self, t: float, *, all_now: bool = False) -> list[Record]:
+        """Return the summaries that are due at ``t`` [s], or all of them."""
+        return [
+            account.summary(t)
+            for account in self._accounts.values()
+            if account.unwritten and (all_now or t - account.since >= SUMMARY_INTERVAL)
+        ]
+
+    @property
+    def counts(self) -> bool:
+        """True if a summary will be due."""
+        return any(account.unwritten for account in self._accounts.values())
+
+    def _account(self, source: str, kind: str, t: float) -> _Account:
+        """Return an account, as the newest one."""
+        factor = EVERYBODY_FACTOR if source == EVERYBODY else 1.0
+        account = self._accounts.pop((source, kind), None) or _Account(kind, factor, t)
+        self._accounts[source, kind] = account
+        if len(self._accounts) > MAX_ACCOUNTS:
+            (_, oldest_kind), oldest = self._accounts.popitem(last=False)
+            if oldest.unwritten:
+                everybody = self._account(EVERYBODY, oldest_kind, t)
+                everybody.add(oldest.unwritten, {"name": "several participants"}, oldest.since)
+        return account
+
+
+def _label(record: Record) -> str:
+    """Return the kind of ``record``, with the name of its command or request."""
+    what = record.get("what")
+    name = ""
+    if isinstance(what, dict):
+        name = what.get("command") or what.get("request") or what.get("lease") or ""
+    return f"{record['kind']} {name}".strip()
+
+
+def send_records(
+    options: Namespace, recorder: Recorder, pipe: Connection
+) -> Callable[[], None] | None:
+    """Send records of the notes of ``recorder`` by ``pipe``; return the function that ends this.
+
+    None if the options choose no event log.
+    """
+    return None if options.no_log else RecordSender(recorder, pipe).close
+
+
+class RecordSender:
+    """Sends records of the notes of ``recorder`` to a ``LogWriter`` at the end of ``pipe``."""
+
+    def __init__(self, recorder: Recorder, pipe: Connection) -> None:
+        """Start the thread."""
+        self._recorder = recorder
+        self._pipe = pipe
+        self._maker = RecordMaker()
+        self._now = MonotonicClock().now
+        recorder.enabled = True
+        self._thread = threading.Thread(target=self._run, name="records", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Send the records of all notes, and end the thread."""
+        self._recorder.enabled = False
+        self._recorder.notes.put(None)
+        self._thread.join(CLOSE_TIMEOUT)
+
+    def _run(self) -> None:
+        closing, waiting = False, self._recorder.notes
+        try:
+            while not closing:
+                notes: list[Note | None] = []
+                with suppress(Empty):
+                    notes.append(waiting.get(timeout=IDLE_TURN if self._maker.is_idle else TURN))
+                    while True:
+                        notes.append(waiting.get_nowait())
+                closing = None in notes
+                records = self._made([note for note in notes if note is not None], closing=closing)
+                if records:
+                    self._pipe.send(records)
+                while self._pipe.poll():
+                    self._recorder.problem = str(self._pipe.recv())
+                time.sleep(0.0 if closing else COLLECTING)
+        except (EOFError, OSError):
+            # The other process has ended, and this one will.
+            self._recorder.enabled = False
+
+    def _made(self, notes: list[Note], *, closing: bool) -> list[Record]:
+        recorder, records = self._recorder, list[Record]()
+        lost, recorder.lost = recorder.lost, 0
+        try:
+            records = self._maker.made(notes, self._now(), closing=closing)
+        except Exception:
+            log.exception("The recorder met an error; it continues with the next event.")
+            lost += len(notes)
+        if lost:
+            records.append(record("lost", {"count": lost}, why="Too many events came at once."))
+        return records

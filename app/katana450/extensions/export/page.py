@@ -21,7 +21,7 @@ from katana450.extensions.export.playback import chosen
 from katana450.extensions.joint_view import FLOOR_GAP
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.progress import progress
-from katana450.extensions.water.nodes import WaterLayer
+from katana450.extensions.water import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scene import ArmNodes

@@ -21,7 +21,7 @@ from katana450.extensions.conduit.rings import PITCH, poses, ring
 from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item
-from katana450.extensions.water.nodes import (
+from katana450.extensions.water import (
     CLEAR,
     FLAT,
     IN_AIR,

@@ -22,7 +22,7 @@ from katana450.errors import KatanaError
 from katana450.extensions.programs.building.actions import FollowPlan, UseTool
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
-from katana450.extensions.water.nodes import WaterNodes
+from katana450.extensions.water import WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

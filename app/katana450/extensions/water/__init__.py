@@ -1,1 +1,0 @@
-"""The water of the state, drawn in the scene."""
