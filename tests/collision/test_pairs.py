@@ -6,9 +6,9 @@ from itertools import combinations, product
 
 import numpy as np
 
+from katana450.arm.robot.collision import pairs_that_meet
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.collision.linkage import Linkage, RigidGroup
-from katana450.maths.collision.pairs import pairs_that_meet
 from katana450.maths.collision.shape import box
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3

@@ -19,8 +19,7 @@ from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.export.ros2_package import srdf_text
-from katana450.extensions.hands.fixed_jaw import FixedJaw
-from katana450.extensions.hands.sides import with_sides
+from katana450.extensions.hands.sides import FixedJaw, with_sides
 from katana450.extensions.programs.run.simulation import Planned, run_by_clock
 from katana450.maths.geometry import se3, so3
 from katana450.server.service import serialize

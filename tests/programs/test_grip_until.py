@@ -14,7 +14,7 @@ from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.settings_steps import CloseUntil
-from katana450.extensions.touch.held_load import DENSITY, FRICTION
+from katana450.extensions.touch.solid_body import DENSITY, FRICTION
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.water.units import GRAVITY
 from tests.programs.conftest import TICK, Stage

@@ -60,9 +60,8 @@ from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import Plan, plan
 from katana450.maths.planning.scaling import Bounds
-from katana450.maths.water.course import Course
 from katana450.maths.water.flow import WaterFlow
-from katana450.maths.water.motion import MotionWithWater, VesselMotion
+from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
 from katana450.maths.water.units import ML
 from katana450.settings import Settings
 from tests.conftest import LONG

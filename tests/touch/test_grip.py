@@ -18,8 +18,8 @@ from katana450.arm.control.state import Reason, State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.touch.held_load import DENSITY, FRICTION, SLIDING_RESISTANCE, mass
 from katana450.extensions.touch.pad import ROWS, pads_of
+from katana450.extensions.touch.solid_body import DENSITY, FRICTION, SLIDING_RESISTANCE, mass
 from katana450.extensions.touch.squeeze import FORCE_LIMIT
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3

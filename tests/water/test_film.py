@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.maths.water.film import LANDAU_LEVICH, drained_film, withdrawn_thickness
 from katana450.maths.water.flow import VesselMove, WaterFlow
+from katana450.maths.water.lip import LANDAU_LEVICH, drained_film, withdrawn_thickness
 from katana450.maths.water.units import (
     DENSITY,
     GRAVITY,

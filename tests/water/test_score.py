@@ -7,8 +7,8 @@ import math
 import pytest
 
 from katana450.extensions.programs.script.measures import score
-from katana450.maths.water.course import Course
 from katana450.maths.water.flow import VesselMove, WaterFlow
+from katana450.maths.water.motion import Course
 from tests.water.motions import over_basin, poured, turned_to
 
 

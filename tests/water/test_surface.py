@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.flow import WaterFlow, WaterSurface
-from katana450.maths.water.parcel import Parcel, landing
-from katana450.maths.water.puddle import THICKNESS
+from katana450.maths.water.parcel import THICKNESS, Parcel, landing
 from katana450.maths.water.surface import (
     BODY_FACES,
     SIDES,

@@ -17,7 +17,7 @@ from katana450.arm.robot.props import load_props, water_environment
 from katana450.extensions.water import WORTH_SENDING, WaterNodes
 from katana450.maths.geometry import so3
 from katana450.maths.water.flow import VesselMove, WaterFlow
-from katana450.maths.water.puddle import THICKNESS, Puddle
+from katana450.maths.water.parcel import THICKNESS, Puddle
 from katana450.maths.water.surface import COLOUR
 from katana450.srgb import to_srgb
 from tests.viser_bridge.internals import nodes, outlet

@@ -10,10 +10,9 @@ import numpy as np
 from katana450.arm.control.environment import Environment
 from katana450.arm.control.scene_objects import SceneObject, Shape, named
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.water.course import Course
 from katana450.maths.water.environment import Cup, WaterEnvironment
 from katana450.maths.water.flow import VesselMove, VesselWater, Water, WaterFlow
-from katana450.maths.water.motion import MotionWithWater, VesselMotion
+from katana450.maths.water.motion import Course, MotionWithWater, VesselMotion
 from katana450.maths.water.units import counted
 from katana450.maths.water.vectors import Vector, scale, sub, vector
 

@@ -14,16 +14,16 @@ from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.props import load_props
 from katana450.errors import InputError
-from katana450.extensions.touch.held_load import (
+from katana450.extensions.touch.pad import Pad, PadPressure, pads_of
+from katana450.extensions.touch.solid_body import (
     FRICTION,
     acceleration,
     along_pads,
+    body_of,
     height_above_support,
     mass,
     sliding_speed,
 )
-from katana450.extensions.touch.pad import Pad, PadPressure, pads_of
-from katana450.extensions.touch.solid_body import body_of
 from katana450.extensions.touch.squeeze import FORCE_LIMIT, Squeeze, SqueezedBody
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3

@@ -21,10 +21,16 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import Cup, WaterEnvironment
-from katana450.maths.water.film import drained_film, withdrawn_thickness
-from katana450.maths.water.lip import DROP_VOLUME, left_over, lip_speed, viscous_flow, weir_flow
-from katana450.maths.water.parcel import Ground, Parcel, landing
-from katana450.maths.water.puddle import Puddle, spill
+from katana450.maths.water.lip import (
+    DROP_VOLUME,
+    drained_film,
+    left_over,
+    lip_speed,
+    viscous_flow,
+    weir_flow,
+    withdrawn_thickness,
+)
+from katana450.maths.water.parcel import Ground, Parcel, Puddle, landing, spill
 from katana450.maths.water.slosh import Slosh, damping, frequency
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY, counted
 from katana450.maths.water.vectors import Vector, add, norm, scale, sub, vector

@@ -14,8 +14,7 @@ import numpy.typing as npt
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.flow import WaterSurface
-from katana450.maths.water.parcel import Parcel
-from katana450.maths.water.puddle import THICKNESS
+from katana450.maths.water.parcel import THICKNESS, Parcel
 from katana450.maths.water.units import FEMTOLITRE, GRAVITY
 
 Faces = npt.NDArray[np.uint32]

@@ -28,8 +28,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.cylinder import Cylinder
-from katana450.maths.water.film import withdrawn_thickness
-from katana450.maths.water.lip import THINNING_TIME, viscous_flow, weir_flow
+from katana450.maths.water.lip import THINNING_TIME, viscous_flow, weir_flow, withdrawn_thickness
 from katana450.maths.water.units import GRAVITY, ML
 
 HALVINGS = 40

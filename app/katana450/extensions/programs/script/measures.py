@@ -12,9 +12,8 @@ import numpy as np
 from katana450.arm.control.arm import ArmModel
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import singular_values
-from katana450.maths.water.course import Course
 from katana450.maths.water.flow import Water
-from katana450.maths.water.motion import MotionWithWater
+from katana450.maths.water.motion import Course, MotionWithWater
 from katana450.maths.water.units import MILLILITRE
 
 MEASURES: Final = {
