@@ -45,7 +45,6 @@ KINDS = {
     "tests/real_arm/test_driver_with_emulator.py": SERVERS[0],
     "tests/real_arm/test_session_with_driver.py": SERVERS[1],
     "tests/real_arm/test_emulator_process.py": SERVERS[0],
-    "tests/general_arms/test_other_arm_in_viser.py": SERVERS[1],
     "tests/recording/test_attached_scripts.py": SERVERS[1],
     "tests/recording/test_default_folder.py": BROWSER,
     "tests/recording/test_episodes_on_a_server.py": SERVERS[1],

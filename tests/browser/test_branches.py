@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,15 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import axis_names, limit_text
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.client import Client
-from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import limit_distances, singular_values
 from katana450.server.api import answers
 from tests.browser.page import ViserPage
-from tests.browser.session import AXES, READY, Truth, bar
+from tests.browser.session import Truth, bar
 
 GHOST = """(path) => {
     const ghost = katanaScene.viewer().scene.getObjectByName("branch");
@@ -82,48 +77,6 @@ def test_row_under_the_mouse_shows_its_branch(
     wait_names(page)
     assert page.frame.evaluate(GHOST, f"/arm/{'/'.join(path)}") is None
     assert bar(page, "headline") == "On target"
-
-
-@pytest.mark.long
-def test_branches_are_shown_and_one_is_taken(
-    page: ViserPage, arm: MountedArm, artefacts: Path
-) -> None:
-    chain = arm.chain
-
-    def now(key: str) -> str:
-        return page.text_of(f".k450 [data-now={key}]")
-
-    # At rest the read-out shows the distances to singularity and limit.
-    distances = limit_distances(chain, READY)
-    axis = int(distances.argmin())
-    assert now("limit") == limit_text(axis, axis_names(chain.names)[axis], distances[axis])
-    assert now("singular") == f"{singular_values(chain, READY)[-1]:.3f}"
-
-    page.open_tab("Scene")
-    page.frame.get_by_text("Velocity ellipsoid", exact=True).click()
-    page.wait_until(
-        lambda: any(
-            message.body["visible"]
-            for message in page.messages("SetSceneNodeVisibilityMessage", node="/velocity")
-        ),
-        "the ellipsoid",
-    )
-    assert np.allclose(
-        page.node_pose("/velocity")[:3, 3],
-        (arm.T_base_shoulder @ forward(chain, READY))[:3, 3],
-        atol=1e-5,
-    )
-    page.open_tab("Drive")
-    # The view of the branches moved nothing.
-    assert [page.slider_value(label) for label in AXES] == [
-        round(math.degrees(angle), 6) for angle in READY
-    ]
-    assert "nothing" in page.text_of("[data-branch=front-up]")
-
-    page.frame.get_by_role("button", name="front-down", exact=True).scroll_into_view_if_needed()
-    page.keep(artefacts / "app-branches.png")
-    page.click_button("front-down")
-    page.wait_until(lambda: page.slider_value("3 elbow") < 0.0, "the other elbow", seconds=30.0)
 
 
 @pytest.mark.long

@@ -123,44 +123,6 @@ def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
 
 
 @pytest.mark.long
-def test_clicked_link_gets_a_bar_with_steps(
-    page: ViserPage, links: list[str], truth: Truth, artefacts: Path
-) -> None:
-    page.page.mouse.click(*spot(page, links, 1).pixel)
-    chosen = page.page.get_by_role("group", name="Selected joint")
-    assert chosen.locator("b").inner_text() == "2 shoulder"
-    page.wait_until(lambda: chosen.locator("output").inner_text() == "−68.0°", "the angle")
-    assert np.allclose(q(truth), READY, atol=1e-6)
-    page.page.get_by_role("button", name="2 shoulder plus 1°").click()
-    page.wait_until(lambda: chosen.locator("output").inner_text() == "−67.0°", "one degree more")
-    page.keep(artefacts / "link-selected.png")
-    # By the keyboard, and by the step that is chosen in Jog.
-    page.page.click("#jog-button")
-    page.page.locator("#jog [name=step][value='10'] + span").click()
-    page.page.get_by_role("button", name="2 shoulder minus 10°").focus()
-    page.page.keyboard.press("Enter")
-    page.wait_until(lambda: chosen.locator("output").inner_text() == "−77.0°", "ten degrees less")
-    page.page.locator("#jog [name=step][value='0'] + span").click()
-    page.page.click("#jog-button")
-    page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: chosen.locator("output").inner_text() == "−67.0°", "one undo")
-    chosen.get_by_role("button", name="Deselect").click()
-    assert not chosen.is_visible()
-    # A click on an object selects it instead, and Esc selects nothing.
-    page.page.mouse.click(*spot(page, links, 1).pixel)
-    assert chosen.is_visible()
-    page.page.mouse.click(*page.project(page.node_pose("/cup")[:3, 3] + (0.0, 0.0, 0.05)))
-    page.page.wait_for_selector("#selection:not([hidden])")
-    assert not chosen.is_visible()
-    page.page.mouse.click(*spot(page, links, 1).pixel)
-    page.page.wait_for_selector("#selection", state="hidden")
-    page.page.keyboard.press("Escape")
-    assert not chosen.is_visible()
-    truth.wait(mood="stopped")
-    clear_stop(page, truth)
-
-
-@pytest.mark.long
 def test_stop_ends_a_drag_and_a_stopped_arm_refuses_another(
     page: ViserPage, links: list[str], truth: Truth
 ) -> None:

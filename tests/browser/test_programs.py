@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -49,41 +48,6 @@ def until(page: ViserPage, shown: str, seconds: float = PLANNED) -> None:
     page.wait_until(
         lambda: re.fullmatch(shown, bar(page, "headline")) is not None, shown, seconds=seconds
     )
-
-
-def test_previewed_plan_shows_one_duration_and_runs_immediately(
-    page: ViserPage, arm: Client, artefacts: Path
-) -> None:
-    page.choose("Script", "Pour")
-    page.click_button("Preview")
-    state = state_when(
-        arm, lambda state: state.program is not None and state.program.status == "ready"
-    )
-    assert state.program is not None
-    page.wait_until(lambda: ", about" in page.text_of(".k450.program"), "its length")
-    duration = re.search(r"about ([\d.]+) s", page.text_of(".k450.program"))
-    assert duration is not None
-    thumb = page._labelled("Look at").get_by_role("slider")
-    end = float(thumb.get_attribute("aria-valuemax") or 0)
-    assert float(duration[1]) == pytest.approx(end)
-    assert state.program.seconds <= end < state.program.seconds + 0.1
-    page.keep(artefacts / "planning-previewed.png")
-    # The cup is in the hand of the ghost, with its water; the time is given in words.
-    shown = page.drag_slider("Look at", 7.5)
-    page.wait_until(lambda: f"{shown:.1f} s of {end:.1f} s" in page.panel_text(), "the time")
-    visible = """() => ["/path/ghost", "/path/objects/0", "/path/water/cup"].every(
-        (name) => __viserMutable.nodeRefFromName[name]?.visible)"""
-    page.wait_until(lambda: page.frame.evaluate(visible), "the ghosts", seconds=PLANNED)
-    page.wait_until(lambda: "over basin" in page.text_of(".steps [aria-current]"), "the step")
-    page.keep(artefacts / "planning-sought.png")
-    begun = time.monotonic()
-    page.click_button("Run")
-    state_when(arm, lambda state: state.program is not None and state.program.status == "running")
-    assert time.monotonic() - begun < 2.0
-    page.press_in_bar("STOP")
-    state_when(arm, lambda state: state.stopped is not None and not state.moving)
-    page.press_in_bar("Clear stop")
-    until(page, "On target", 5.0)
 
 
 def test_pause_during_planning_lasts_until_resume(

@@ -90,38 +90,26 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
         ("- pick: part\n- pick: low\n", "already holds an object"),
-        pytest.param("- pick: part\n- release\n", "part would fall 60 mm", marks=pytest.mark.long),
+        ("- pick: part\n- release\n", "part would fall 60 mm"),
         ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         # The pitch of the grasp has nothing to do with it.
         (
             "- pick: part\n- place: {at: {x: 230, y: 720}}\n",
             "nothing carries it there.*choose a place on it.$",
         ),
-        pytest.param(
+        (
             "- pick: part\n- place: {at: {x: 100, y: -40}}\n",
             r"placed there: The path .* at \(100.0, -40.0, \d+.\d\) mm in the base frame",
-            marks=pytest.mark.long,
         ),
         ("- pick: part\n- place: {on: basin}\n", "basin is open at its top and cannot carry part"),
-        pytest.param(
+        (
             "- pick: part\n- place: {at: {x: 60, y: -200}}\n",
             "basin is open at its top and cannot carry part",
-            marks=pytest.mark.long,
         ),
         ("- pick: part\n- place: {at: {x: 230, y: -120, z: 30}}\n", "put it 30.0 mm lower"),
-        pytest.param(
-            "- pick: part\n- place: {on: ball}\n", "ball cannot carry part", marks=pytest.mark.long
-        ),
-        pytest.param(
-            "- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n",
-            "far cannot carry part",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "- pick: part\n- place: {at: {x: 180, y: 150}}\n",
-            "cannot be placed there: .*low",
-            marks=pytest.mark.long,
-        ),
+        ("- pick: part\n- place: {on: ball}\n", "ball cannot carry part"),
+        ("- pick: part\n- place: {on: far, at: {x: 230, y: -120}}\n", "far cannot carry part"),
+        ("- pick: part\n- place: {at: {x: 180, y: 150}}\n", "cannot be placed there: .*low"),
         ("- pick: {object: part, side: front}\n", "its sides are turned too far, seen from"),
     ],
 )
