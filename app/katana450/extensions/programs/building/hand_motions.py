@@ -45,7 +45,7 @@ def finger_unit(plan: PlanState) -> tuple[str, float]:
 
 def _obstacle(plan: PlanState, state: State) -> str:
     """Return what stops the fingers in ``state``, and a remedy."""
-    contacts = [each.parts for each in state.findings if each.reason is Reason.CONTACT]
+    contacts = [entry.parts for entry in state.findings if entry.reason is Reason.CONTACT]
     parts = contacts[0] if contacts else None
     world = plan.plan_context.session.world_at(state)
     # Objects that can be held are touched without a finding.
@@ -54,7 +54,7 @@ def _obstacle(plan: PlanState, state: State) -> str:
         parts = nearest.parts
     if parts is None:
         return f"they need more than {ACTION_TIMEOUT:g} s. Move them less far."
-    names = {each.name for each in state.objects}
+    names = {entry.name for entry in state.objects}
     finger, obstacle = sorted(parts, key=lambda name: name in names)
     remedy = "Choose another height or pitch of the hand."
     if obstacle in names:
@@ -72,18 +72,18 @@ def carry(plan: PlanState, to: ToolTarget, name: str) -> PlanState:
     The tool keeps its present orientation up to the last part. An object that is held upright stays
     upright unless ``to`` has another orientation.
     """
-    at, hand = plan.target, plan.hand
-    here = math.atan2(at.position[1], at.position[0])
-    there = math.atan2(to.position[1], to.position[0])
-    radius = math.hypot(at.position[0], at.position[1])
+    present, hand = plan.target, plan.hand
+    start = math.atan2(present.position[1], present.position[0])
+    end = math.atan2(to.position[1], to.position[0])
+    radius = math.hypot(present.position[0], present.position[1])
     z = float(to.position[2])
-    raised = at.moved(at.position * (1, 1, 0) + UP * max(z, at.position[2]))
-    turn = hand.way_round(here, there)
-    beside = np.array((radius * math.cos(there), radius * math.sin(there), raised.position[2]))
-    over = hand.turned(raised, beside, turn)
+    raised = present.moved(present.position * (1, 1, 0) + UP * max(z, present.position[2]))
+    turn = hand.way_round(start, end)
+    position = np.array((radius * math.cos(end), radius * math.sin(end), raised.position[2]))
+    over = hand.turned(raised, position, turn)
     curves: list[Curve] = []
-    if (raised.position != at.position).any():
-        curves.append(line_between(at, raised))
+    if (raised.position != present.position).any():
+        curves.append(line_between(present, raised))
     if abs(turn) > JOIN_TOLERANCE:
         curves.append(arc_between(np.zeros(3), UP, turn, 0.0, raised, over))
     if max(over.apart(to)) > JOIN_TOLERANCE:

@@ -75,8 +75,8 @@ def line_remedies(
     ``refused``: why the whole line is not.
     """
 
-    def possible(tried: ToolTarget) -> bool:
-        return _possible(lambda: plan.lead([line_between(start, tried)], "line"))
+    def possible(target: ToolTarget) -> bool:
+        return _possible(lambda: plan.lead([line_between(start, target)], "line"))
 
     for pitch in _other_pitch(end, possible):
         yield f"with `pitch: {pitch:g}` at its end"
@@ -147,11 +147,11 @@ def _other_pitch(end: ToolTarget, possible: Callable[[ToolTarget], bool]) -> Ite
     """
     if not end.is_pitched:
         return
-    here = math.degrees(end.pitch)
-    tried = np.arange(-MAX_PITCH, MAX_PITCH + PITCH_STEP, PITCH_STEP).tolist()
-    for each in sorted(tried, key=lambda angle: abs(angle - here)):
-        if possible(replace(end, pitch=math.radians(each))):
-            yield each
+    present = math.degrees(end.pitch)
+    pitches = np.arange(-MAX_PITCH, MAX_PITCH + PITCH_STEP, PITCH_STEP).tolist()
+    for pitch in sorted(pitches, key=lambda angle: abs(angle - present)):
+        if possible(replace(end, pitch=math.radians(pitch))):
+            yield pitch
             return
 
 

@@ -351,9 +351,9 @@ def _about_the_lip(
             axis, axis_in_pose = (frozen(np.cross(UP, d)) for d in (toward, in_pose))
             # The cup turns with the arm on the way to the basin.
             moved = so3.rotation_z(turn) @ (level.position - cup)
-            at = hand.turned(level, lip - held.extent[0] * toward + moved, turn)
+            tool = hand.turned(level, lip - held.extent[0] * toward + moved, turn)
             end = EMPTY_TILT if tilt is None else tilt
-            yield Tilting(at, frozen(lip), axis, axis_in_pose, end)
+            yield Tilting(tool, frozen(lip), axis, axis_in_pose, end)
 
 
 def _over_basin(
@@ -370,9 +370,9 @@ def _over_basin(
     position = over
     for _ in range(3):
         # When the cup lies on its side, or is tilted as far as it will be.
-        at = replace(level, position=position)
+        tool = replace(level, position=position)
         tilted = 0.5 * turn if is_emptied else turn
-        side = plan.joints_of(replace(at, roll=level.roll + tilted))
+        side = plan.joints_of(replace(tool, roll=level.roll + tilted))
         position = position + (over - _lip(plan, held, side)[0]) * (1.0, 1.0, 0.0)
     return Rolling(replace(level, position=position), turn)
 
@@ -396,8 +396,8 @@ def _over_vessel(
             lip, toward = _lip(plan, held, plan.joints_of(tool))
             position = position + over - AIM * toward - lip
         positions.append(position)
-    at = replace(level, position=frozen(positions[0]))
-    return Rolling(at, turn, _through(np.array(positions) - positions[0]))
+    upright = replace(level, position=frozen(positions[0]))
+    return Rolling(upright, turn, _through(np.array(positions) - positions[0]))
 
 
 def _lip(plan: PlanState, held: SceneObject, q: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -72,11 +72,11 @@ def symmetry(held: SceneObject) -> float:
 
 
 def widths(
-    pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray
+    pitches: Sequence[float], scene_object: SceneObject, place: FloatArray, side: FloatArray
 ) -> dict[str, list[tuple[Approach, float]]]:
     """Return all approaches at ``pitches`` [rad], whether the object fits or not.
 
-    The object stands at ``at`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. The
+    The object stands at ``place`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. The
     fingers close on two opposite sides of a box or mesh. A vessel is only grasped from the front.
     """
     if scene_object.shape.is_round:
@@ -85,14 +85,14 @@ def widths(
         above = [(Approach(DOWN, roll), width) for roll in ROUND_ROLLS]
         return {FRONT: front} if is_vessel(scene_object) else {FRONT: front, ABOVE: above}
     sizes = scene_object.extent[1], scene_object.extent[0]
-    skew = math.atan2(at[1], at[0]) - math.atan2(side[1], side[0])
+    skew = math.atan2(place[1], place[0]) - math.atan2(side[1], side[0])
     rolls = [(wrapped(skew + k * DOWN), sizes[k % 2]) for k in range(4)]
     asides = [(wrapped(k * DOWN - skew), sizes[k % 2]) for k in range(4)]
-    near = sorted(asides, key=lambda each: abs(each[0]))
+    near = sorted(asides, key=lambda option: abs(option[0]))
     return {
         ABOVE: [
             (Approach(DOWN, roll), width)
-            for roll, width in sorted(rolls, key=lambda each: abs(each[0]))
+            for roll, width in sorted(rolls, key=lambda option: abs(option[0]))
         ],
         FRONT: [
             (Approach(p, 0.0, aside), width)
@@ -110,22 +110,22 @@ def fitting(options: Widths, opening: float, *, one_jaw: bool) -> Mapping[str, S
     object is beside it then. Raises InputError, with the widths, if there is none.
     """
     most = opening - ((JAW_ROOM if one_jaw else MARGIN) + MARGIN)
-    found = {
+    approaches = {
         name: tuple(
             approach._replace(shift=JAW_ROOM + 0.5 * width) if one_jaw else approach
-            for approach, width in each
+            for approach, width in pairs
             if width <= most
         )
-        for name, each in options.items()
+        for name, pairs in options.items()
     }
-    if not any(found.values()):
-        width = min(width for each in options.values() for _, width in each)
-        beside = "on either side"
+    if not any(approaches.values()):
+        width = min(width for pairs in options.values() for _, width in pairs)
+        room = "on either side"
         if one_jaw:
-            beside = f"beside the moving jaw and {1e3 * JAW_ROOM:.0f} mm beside the fixed one"
+            room = f"beside the moving jaw and {1e3 * JAW_ROOM:.0f} mm beside the fixed one"
         raise InputError(
             f"it is {1e3 * width:.0f} mm wide, which is too wide: the open fingers are "
-            f"{1e3 * opening:.0f} mm apart and need {1e3 * MARGIN:.0f} mm of room {beside}, so an "
+            f"{1e3 * opening:.0f} mm apart and need {1e3 * MARGIN:.0f} mm of room {room}, so an "
             f"object may have {1e3 * most:.0f} mm."
         )
-    return found
+    return approaches

@@ -100,20 +100,20 @@ class ToolPath(CurvePath):
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         arm = arm_of(self.chain)
         alpha = posture(arm, self.branch, *self.curve.at(sigma)[:5])
-        found = []
+        joints = []
         for axis, (angle, sign, shift) in enumerate(zip(alpha, arm.signs, arm.shifts, strict=True)):
             q = sign * (angle - shift) if sign != 1.0 or shift else angle
             turns = self._turn(axis, sigma.c0, q.c0)
-            found.append(q + turns * math.tau if np.any(turns) else q)
-        one, two, three, four, five = found
+            joints.append(q + turns * math.tau if np.any(turns) else q)
+        one, two, three, four, five = joints
         return one, two, three, four, five
 
     def _in_turn(self, q: FloatArray) -> FloatArray:
         """Return the angles `q` (5,) [rad], known up to whole turns, as the path starts at them."""
         lower, upper, slack = self.chain.lower, self.chain.upper, tolerances.LIMIT_SLACK
         near, inside = (
-            q + np.rint((there - q) / math.tau) * math.tau
-            for there in (self.near, 0.5 * (lower + upper))
+            q + np.rint((posture - q) / math.tau) * math.tau
+            for posture in (self.near, 0.5 * (lower + upper))
         )
         return np.where((near < lower - slack) | (near > upper + slack), inside, near)
 
@@ -142,8 +142,8 @@ class ToolPath(CurvePath):
         arm = arm_of(self.chain)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             alpha = posture(arm, self.branch, *self.curve.at(Jet.variable(sigma))[:5])
-            q = np.stack([np.broadcast_to(each.c0, sigma.shape) for each in alpha], axis=1)
-            qd = np.stack([np.broadcast_to(each.c1, sigma.shape) for each in alpha], axis=1)
+            q = np.stack([np.broadcast_to(jet.c0, sigma.shape) for jet in alpha], axis=1)
+            qd = np.stack([np.broadcast_to(jet.c1, sigma.shape) for jet in alpha], axis=1)
         return (q - arm.shifts) * arm.signs, qd * arm.signs
 
     def _refuse_reach(self, sigma: FloatArray, bad: int) -> None:
@@ -177,7 +177,7 @@ class ToolPath(CurvePath):
         gap = np.abs(np.remainder(middle - smooth + math.pi, math.tau) - math.pi)
         kinked = ~(gap <= KINK_TOLERANCE)
         if kinked.any():
-            place, axis = (int(each) for each in np.argwhere(kinked)[0])
+            place, axis = (int(index) for index in np.argwhere(kinked)[0])
             sigma = float(self._sigma[place])
             raise PathError(
                 f"Axis {axis + 1} would have to leap or turn back at once {at_place(sigma)}. "
@@ -247,13 +247,13 @@ def _peaks(q: FloatArray, qd: FloatArray, h: FloatArray) -> FloatArray:
     e, f = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
     root = np.sqrt(np.maximum(e * e - 3.0 * f * da, 0.0))
     divisor = -e - np.copysign(root, e)
-    found = a
+    peaks = a
     with np.errstate(divide="ignore", invalid="ignore"):
         for t in (da / divisor, divisor / (3.0 * f)):
             inside = turns & (t > 0.0) & (t < 1.0)
             t_in = np.where(inside, t, 0.0)
-            found = np.where(inside, a + t_in * (da + t_in * (e + t_in * f)), found)
-    return found
+            peaks = np.where(inside, a + t_in * (da + t_in * (e + t_in * f)), peaks)
+    return peaks
 
 
 FIRST_STEP: Final = 1.0 / 32.0
@@ -375,8 +375,8 @@ def septics(places: FloatArray, left: FloatArray, right: FloatArray) -> FloatArr
         )
     )
     high = np.einsum("ij,jkn->ikn", SEPTIC, lacking)
-    found: FloatArray = (np.concatenate((low, high)) / powers).transpose(1, 0, 2)
-    return found
+    terms: FloatArray = (np.concatenate((low, high)) / powers).transpose(1, 0, 2)
+    return terms
 
 
 class LostPathError(PathError):
@@ -421,64 +421,64 @@ class CurveSearch:
         Raises PathError where the arm cannot follow the curve: the place, why, and what to do.
         """
         places = self._places()
-        found = self._exact(
-            [each.sigma for each in places], np.array([each.posture.q for each in places])
+        path = self._exact(
+            [place.sigma for place in places], np.array([place.posture.q for place in places])
         )
-        self._refuse_limits(found)
-        return found
+        self._refuse_limits(path)
+        return path
 
     def _places(self) -> list[_Place]:
-        here = self._at(0.0, self.q)
-        if here is None or here.posture.least < WALL:
-            raise self._refusal(0.0, None if here is None else here.posture)
-        places, step, rate = [here], FIRST_STEP, np.zeros(len(self.q))
+        last = self._at(0.0, self.q)
+        if last is None or last.posture.least < WALL:
+            raise self._refusal(0.0, None if last is None else last.posture)
+        places, step, rate = [last], FIRST_STEP, np.zeros(len(self.q))
         marks = [*self.curve.joins, 1.0]
         while marks:
             checkpoint()
-            here, end = places[-1], marks[0]
+            last, end = places[-1], marks[0]
             # No sliver is left before a mark.
-            sigma = end if here.sigma + 1.25 * step >= end else here.sigma + step
-            there = self._at(sigma, here.posture.q + (sigma - here.sigma) * rate)
-            if there is not None and self._leads(here.posture, there.posture):
-                rate = (there.posture.q - here.posture.q) / (sigma - here.sigma)
-                places.append(there)
+            sigma = end if last.sigma + 1.25 * step >= end else last.sigma + step
+            following = self._at(sigma, last.posture.q + (sigma - last.sigma) * rate)
+            if following is not None and self._leads(last.posture, following.posture):
+                rate = (following.posture.q - last.posture.q) / (sigma - last.sigma)
+                places.append(following)
                 step = min(2.0 * step, FIRST_STEP)
                 if sigma == end:
                     del marks[0]
                 continue
-            step = 0.5 * min(step, sigma - here.sigma)
+            step = 0.5 * min(step, sigma - last.sigma)
             if step < LEAST_STEP:
-                raise self._refusal(here.sigma, here.posture)
+                raise self._refusal(last.sigma, last.posture)
         return places
 
     @staticmethod
-    def _leads(here: RegularPosture, there: RegularPosture) -> bool:
+    def _leads(start: RegularPosture, end: RegularPosture) -> bool:
         """Return whether a step stays on the branch, clear of its edge, and turns no joint far."""
         return (
-            there.least >= WALL
-            and float(np.abs(there.q - here.q).max()) <= LARGEST_TURN
-            and float(np.linalg.norm(there.matrix - here.matrix)) <= 0.5 * here.least
+            end.least >= WALL
+            and float(np.abs(end.q - start.q).max()) <= LARGEST_TURN
+            and float(np.linalg.norm(end.matrix - start.matrix)) <= 0.5 * start.least
         )
 
     def _at(self, sigma: float, guess: FloatArray) -> _Place | None:
         """Return the place with the exact joints, from a guess (n,) of them; None without."""
         q = guess.copy()
         q[list(self.equations.locked)] = self._given(sigma)
-        found = self.equations.posture(q, self.curve.at(Jet.variable(sigma)).T[0])
-        return None if found is None else _Place(sigma, found)
+        posture = self.equations.posture(q, self.curve.at(Jet.variable(sigma)).T[0])
+        return None if posture is None else _Place(sigma, posture)
 
     def _given(self, sigma: float) -> FloatArray:
-        given: FloatArray = self.q[list(self.equations.locked)] + sigma * self.slope
-        return given
+        angles: FloatArray = self.q[list(self.equations.locked)] + sigma * self.slope
+        return angles
 
     def _exact(self, sigma: list[float], q: FloatArray) -> PosePath:
         """Return the path through the joints `q` (K, n) at ``sigma`` and more places."""
         places = np.array(sigma)
         for _ in range(ROUNDS):
             checkpoint()
-            found = self._through(places, q)
+            path = self._through(places, q)
             middle = 0.5 * (places[:-1] + places[1:])
-            between = joint_derivatives(found, middle)[0]
+            between = joint_derivatives(path, middle)[0]
             exact = self._derivatives(middle, between)[0]
             bad = np.abs(exact - between).max(axis=1) > BESIDE
             if not bad.any():
@@ -487,8 +487,8 @@ class CurveSearch:
             places = np.concatenate((places, middle[bad]))[order]
             q = np.concatenate((q, exact[bad]))[order]
         else:
-            found = self._through(places, q)
-        return found
+            path = self._through(places, q)
+        return path
 
     def _through(self, places: FloatArray, q: FloatArray) -> PosePath:
         # At a join the third derivative leaps: each piece takes that of its own side.
@@ -508,12 +508,12 @@ class CurveSearch:
         pose = self.curve.at(Jet.variable(sigma))
         zeros = np.zeros_like(sigma)
         starts = self.q[list(self.equations.locked)].tolist()
-        given = [
+        locked = [
             Jet(start + slope * sigma, zeros + slope, zeros, zeros)
             for start, slope in zip(starts, self.slope.tolist(), strict=True)
         ]
-        joints = self.equations.solved(q, given, pose)
-        return np.stack([np.stack(each.derivatives()) for each in joints], axis=2)
+        joints = self.equations.solved(q, locked, pose)
+        return np.stack([np.stack(joint.derivatives()) for joint in joints], axis=2)
 
     def _refuse_limits(self, path: PosePath) -> None:
         """Raise PathError where an axis exceeds its limit."""
@@ -528,23 +528,25 @@ class CurveSearch:
 
     def _refusal(self, sigma: float, near: RegularPosture | None) -> LostPathError:
         """Return the refusal of a curve that leads on from ``near``, at ``sigma``, to an edge."""
-        at, point = at_place(sigma), self._point(sigma)
+        where, point = at_place(sigma), self._point(sigma)
         if near is None:
-            return LostPathError(f"The tool is not at the start of the path, {at}.", point, sigma)
+            return LostPathError(
+                f"The tool is not at the start of the path, {where}.", point, sigma
+            )
         u, _, vt = np.linalg.svd(near.matrix)
         last = min(near.matrix.shape) - 1
         taking_part = np.flatnonzero(np.abs(vt[last]) > TAKES_PART).tolist()
         axes = [self.equations.free[k] + 1 for k in taking_part]
         if 1 not in axes and float(np.linalg.norm(u[-3:, last])) > MOSTLY:
             text = (
-                f"The path leaves the reach of the arm {at}: its links come in line there. Keep "
+                f"The path leaves the reach of the arm {where}: its links come in line there. Keep "
                 "the path nearer to the arm, or give it another orientation."
             )
         else:
             *first, end = map(str, axes)
             named = f"axes {', '.join(first)} and {end}" if first else f"axis {end}"
             text = (
-                f"The path comes to a singularity {at}: {named} can turn together there without "
+                f"The path comes to a singularity {where}: {named} can turn together there without "
                 "moving the tool, and would have to turn at once. Lead the path around that "
                 "place, give it another orientation, or use `move`, which keeps to no line."
             )

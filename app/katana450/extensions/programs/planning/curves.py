@@ -338,7 +338,7 @@ class ToolTurn(_OneFormula):
             x, y, z = (place + 0.0 * sigma for place in position)
         else:
             ways = zip(position, self.offsets.T.tolist(), strict=True)
-            x, y, z = (place + _polynomial(each, sigma) for place, each in ways)
+            x, y, z = (place + _polynomial(coefficients, sigma) for place, coefficients in ways)
         roll = _polynomial(self.rolls.tolist(), sigma)
         return ToolJets(x, y, z, self.target.pitch + 0.0 * sigma, roll)
 
@@ -377,7 +377,7 @@ class TurnedCurve:
             )
         else:
             s, c = sin_cos(angle * sigma)
-            one, two, three = (_turned(each, s, c) for each in terms)
+            one, two, three = (_turned(column, s, c) for column in terms)
         return ToolJets.turned((x, y, z), (one, two, three))
 
     @cached_property
@@ -419,11 +419,11 @@ class PoseTurn(_OneFormula):
     def at(self, sigma: Jet) -> ToolJets:
         """Return the pose at `sigma`, one place or many."""
         sine, cosine = sin_cos(_polynomial(self.angles.tolist(), sigma))
-        beside = self.start.position - self.point
+        arm = self.start.position - self.point
         x, y, z = (
-            place + each
-            for place, each in zip(
-                self.point.tolist(), _turned(_terms(beside, self.axis), sine, cosine), strict=True
+            place + offset
+            for place, offset in zip(
+                self.point.tolist(), _turned(_terms(arm, self.axis), sine, cosine), strict=True
             )
         )
         axis = self.axis if self.axis_in_pose is None else self.axis_in_pose

@@ -83,29 +83,29 @@ def grasp_frame(
     if sides.jaw is None:
         left, right = (placed(tip, opened) for tip in sides.tips)
         fingers, ends = (left, right), (left, right)
-        ahead = 0.5 * (left.middle + right.middle) - palm.middle
+        offset = 0.5 * (left.middle + right.middle) - palm.middle
         inside, outside = left.reach(y), -right.reach(-y)
         across = 0.5 * (inside + outside)
     else:
         jaw, wide = (placed(sides.tips[1], x) for x in (sides.gripper.closed, opened))
         fingers, ends = (jaw, jaw), (jaw, palm)
-        ahead = sides.jaw.closed - palm.middle
+        offset = sides.jaw.closed - palm.middle
         across = inside = sides.jaw.face
         thick = jaw.reach(y) - inside
         outside = max(-wide.reach(-y), float(sides.jaw.opened @ y) - thick)
-    ahead = ahead - (ahead @ y) * y
-    if float(np.linalg.norm(ahead)) < MIN_STROKE:
+    offset = offset - (offset @ y) * y
+    if float(np.linalg.norm(offset)) < MIN_STROKE:
         raise InputError(
             f"The fingers {names} do not stand off the palm, so no direction of a grasp is known."
         )
-    x = snapped(ahead, frames_of(hand), float(SNAP_COSINE), y)
+    x = snapped(offset, frames_of(hand), float(SNAP_COSINE), y)
     z = np.cross(x, y)
     if outside - inside < MIN_STROKE:
         raise InputError(f"The fingers {names} leave no room between them when they are open.")
-    tip = min(each.reach(x) for each in ends)
-    base = max(-each.reach(-x) for each in fingers)
-    low = max(-each.reach(-z) for each in fingers)
-    high = min(each.reach(z) for each in fingers)
+    tip = min(body.reach(x) for body in ends)
+    base = max(-body.reach(-x) for body in fingers)
+    low = max(-body.reach(-z) for body in fingers)
+    high = min(body.reach(z) for body in fingers)
     depth = min(DEPTH, DEPTH_FRACTION * (tip - base))
     origin = (tip - depth) * x + across * y + 0.5 * (low + high) * z
     T = se3.from_rotation_translation(np.column_stack((x, y, z)), origin)
@@ -205,16 +205,16 @@ class ArmPlane:
         """
         return self.beside + float(self.across @ R @ (inside - self.centre))
 
-    def turn(self, p: FloatArray, beside: float) -> float:
-        """Return the turn [rad] about axis 1 that brings a point ``beside`` the plane to `p` (3,).
+    def turn(self, p: FloatArray, distance: float) -> float:
+        """Return the turn [rad] about axis 1 that brings a point beside the plane to `p` (3,).
 
-        Raises InputError for a point too near to axis 1.
+        distance: of the point from axis 1 [m], along ``across``. Raises InputError for a point too near to axis 1.
         """
-        outward = math.hypot(p[0], p[1]) ** 2 - beside**2
+        outward = math.hypot(p[0], p[1]) ** 2 - distance**2
         if outward < 0.0:
             raise InputError("it stands too near to axis 1, where the plane of the arm cannot be.")
-        at = math.sqrt(outward) * self.outward + beside * self.across
-        return wrapped(math.atan2(p[1], p[0]) - math.atan2(at[1], at[0]))
+        point = math.sqrt(outward) * self.outward + distance * self.across
+        return wrapped(math.atan2(p[1], p[0]) - math.atan2(point[1], point[0]))
 
 
 def _roll_axis(chain: Chain, T_tool_grasp: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -130,7 +130,7 @@ class HandPlanning:
     @property
     def tip_distances(self) -> Sequence[float]:
         """The distances [m] at which fingertips grasp a low object, in their order."""
-        return [each for each in TIP_DISTANCES if not self.tool or each >= FRAME_DEPTH]
+        return [distance for distance in TIP_DISTANCES if not self.tool or distance >= FRAME_DEPTH]
 
     @property
     def is_redundant(self) -> bool:
@@ -138,11 +138,11 @@ class HandPlanning:
         return self._chain.n > FREE_AXES
 
     def approaches(
-        self, scene_object: SceneObject, at: FloatArray, side: FloatArray
+        self, scene_object: SceneObject, place: FloatArray, side: FloatArray
     ) -> Mapping[str, Sequence[Approach]]:
         """Return the approaches that suit an object, by side, the preferred side first.
 
-        The object stands at ``at`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. A
+        The object stands at ``place`` (3,) [m] with its x axis along ``side`` (3,), both in {S}. A
         vessel is only grasped from the front: from above the wrist could not pour it. Raises
         InputError for an object that does not fit between the fingers.
         """
@@ -152,20 +152,24 @@ class HandPlanning:
             low = STEEP_PITCHES[::-1] if scene_object.height < LOW else None
             pitches = low or (*FLAT_PITCHES, *STEEP_PITCHES)
             pitches = FLAT_PITCHES if is_vessel(scene_object) else pitches
-        return self._fitting(pitches, scene_object, at, side)
+        return self._fitting(pitches, scene_object, place, side)
 
     def with_pitch(
-        self, pitch: float, scene_object: SceneObject, at: FloatArray, side: FloatArray
+        self, pitch: float, scene_object: SceneObject, place: FloatArray, side: FloatArray
     ) -> Sequence[Approach]:
         """Return the approaches with ``pitch`` [rad]; see ``approaches``."""
-        options = self._fitting((pitch,), scene_object, at, side)
+        options = self._fitting((pitch,), scene_object, place, side)
         return options.get(ABOVE if abs(pitch - DOWN) <= YAW_TOLERANCE else FRONT, ())
 
     def _fitting(
-        self, pitches: Sequence[float], scene_object: SceneObject, at: FloatArray, side: FloatArray
+        self,
+        pitches: Sequence[float],
+        scene_object: SceneObject,
+        place: FloatArray,
+        side: FloatArray,
     ) -> Mapping[str, Sequence[Approach]]:
         """Return all approaches between whose fingers the object fits, or raise InputError."""
-        options: Widths = widths(pitches, scene_object, at, side)
+        options: Widths = widths(pitches, scene_object, place, side)
         if self.plane is not None:
             options = self._in_plane(self.plane, options)
         return fitting(options, self.opening, one_jaw=self.one_jaw)
@@ -209,8 +213,8 @@ class HandPlanning:
 
     def drawn_back(self, q: FloatArray, away: float) -> ToolTarget:
         """Return the tool at `q`, drawn back by ``away`` [m] along x of the grasp frame."""
-        at = self.planning.at(q)
-        return at.moved(frozen(at.position - away * self._R(q)[:, 0]))
+        target = self.planning.at(q)
+        return target.moved(frozen(target.position - away * self._R(q)[:, 0]))
 
     def retreat(self, q: FloatArray, away: float) -> ToolTarget:
         """Return the tool with which the hand leaves an object that it released at `q`.
@@ -235,14 +239,14 @@ class HandPlanning:
             turn = self.plane.turn(target.position, self.plane.beside_at(R, np.zeros(3)))
             R = so3.rotation_z(turn) @ R
         T = se3.from_rotation_translation(R, target.position)
-        here, hints = kinematics.branch_of(q), [q]
+        present, hints = kinematics.branch_of(q), [q]
         for axis in kinematics.equations(q).locked[:1]:
             # The swivel of the posture there may be another one.
             hints += [chain.clamp(q + swing * np.eye(chain.n)[axis]) for swing in SWINGS]
         for hint in hints:
             postures = [p for p in kinematics.inverse(T, hint) if p.exact and p.within_limits]
             if postures:
-                names = sorted((str(p.branch) for p in postures), key=lambda name: name != here)
+                names = sorted((str(p.branch) for p in postures), key=lambda name: name != present)
                 return [*dict.fromkeys(names)][:MAX_BRANCHES]
         return ()
 
@@ -251,13 +255,13 @@ class HandPlanning:
         five = self._chain.n == ROLLING_AXES
         return None if five else self.planning.kinematics.branch_of(q)
 
-    def way_round(self, here: float, there: float) -> float:
+    def way_round(self, start: float, end: float) -> float:
         """Return the turn [rad] about axis 1 by which an object is carried between directions.
 
         It is the shorter one, but not behind an arm whose axis 1 does not turn all round.
         """
         turns_round = self._chain.upper[0] - self._chain.lower[0] >= math.tau
-        return wrapped(there - here) if turns_round else there - here
+        return wrapped(end - start) if turns_round else end - start
 
     def turned(self, target: ToolTarget, position: FloatArray, angle: float) -> ToolTarget:
         """Return ``target`` turned by ``angle`` [rad] about the vertical, to ``position`` (3,).
@@ -291,8 +295,8 @@ class HandPlanning:
         now, alike = math.atan2(T_base_object[1, 0], T_base_object[0, 0]), symmetry(held)
         free = yaw is None or alike == 0.0
         if self.plane is None:
-            here, there = (math.atan2(place[1], place[0]) for place in (p, goal))
-            natural = self.way_round(here, there)
+            start, end = (math.atan2(place[1], place[0]) for place in (p, goal))
+            natural = self.way_round(start, end)
             if yaw is None or free:
                 turns = [natural, 0.0, *(wrapped(natural + turn) for turn in TURNS)]
             else:
@@ -321,12 +325,12 @@ class HandPlanning:
             )
         count = round(math.tau / alike)
         rolls = sorted((wrapped(roll - turn + k * alike) for k in range(count)), key=abs)
-        return [self._rolled_over(self.plane, q, p, goal, each - roll)[1] for each in rolls]
+        return [self._rolled_over(self.plane, q, p, goal, angle - roll)[1] for angle in rolls]
 
     def _carried(self, q: FloatArray, p: FloatArray, goal: FloatArray, turn: float) -> ToolTarget:
         """Return the tool at `q`, turned with an object at `p` (3,) so that it is at ``goal``."""
-        at = self.planning.at(q)
-        return self.turned(at, goal + so3.rotation_z(turn) @ (at.position - p), turn)
+        target = self.planning.at(q)
+        return self.turned(target, goal + so3.rotation_z(turn) @ (target.position - p), turn)
 
     def _rolled_over(
         self, plane: ArmPlane, q: FloatArray, p: FloatArray, goal: FloatArray, by: float
@@ -344,8 +348,8 @@ class HandPlanning:
         turn = plane.turn(goal, plane.beside_at(R, inside))
         position = frozen(goal - so3.rotation_z(turn) @ R @ inside)
         # Without a roll, the target keeps the turns of its angles.
-        at = self.planning.target(position, R) if by else self.planning.at(q).moved(position)
-        return wrapped(turn - self._turned(q)), at
+        target = self.planning.target(position, R) if by else self.planning.at(q).moved(position)
+        return wrapped(turn - self._turned(q)), target
 
     def tilt_directions(
         self, q: FloatArray, cup: FloatArray, over: FloatArray
@@ -358,16 +362,16 @@ class HandPlanning:
             over: (3,) the place of the lip [m] in {S}.
         """
         if self.plane is None:
-            here, there = (math.atan2(p[1], p[0]) for p in (cup, over))
-            turn = self.way_round(here, there)
+            start, end = (math.atan2(p[1], p[0]) for p in (cup, over))
+            turn = self.way_round(start, end)
             x, y, _ = self._R(q)[:, 0]
             for aside in TILT_DIRECTIONS:
                 toward = so3.rotation_z(math.atan2(y, x) + turn + aside)[:, 0]
                 yield TiltDirection(turn, toward, toward)
             return
         present = self._turned(q)
-        beside = float(self.plane.across @ so3.rotation_z(-present) @ cup)
-        turn = self.plane.turn(over, beside)
+        distance = float(self.plane.across @ so3.rotation_z(-present) @ cup)
+        turn = self.plane.turn(over, distance)
         for outward in (self.plane.outward, -self.plane.outward):
             yield TiltDirection(wrapped(turn - present), so3.rotation_z(turn) @ outward, outward)
 

@@ -93,13 +93,13 @@ def nearest_place(
         branch: the only branch that may be used; None for all.
         priority: one of ``planning.priorities``.
     """
-    here, places = planning.kinematics.branch_of(q), []
-    for there, wanted in planning.seen_from(q, target, branch):
-        best = planning.nearest(q, wanted, there, priority)
+    present, places = planning.kinematics.branch_of(q), []
+    for other, wanted in planning.seen_from(q, target, branch):
+        best = planning.nearest(q, wanted, other, priority)
         pose = planning.at(best.q)
         if branch is None:
-            pose = planning.converted(pose, there, here)
-        places.append(NearestPlace(pose, best, there, wanted, priority))
+            pose = planning.converted(pose, other, present)
+        places.append(NearestPlace(pose, best, other, wanted, priority))
     return min(places, key=lambda place: place.errors)
 
 
@@ -121,16 +121,16 @@ def unreached(
     why = f"The tool {planning.state.tool} cannot be at {where} with {orientation}"
     if frame.looks_like_metres(target.position):
         return f"{why}. Lengths are in mm here; a length in metres has its unit, as in `0.3 m`."
-    there, kept = (
+    positioned, oriented = (
         nearest_place(planning, q, target, branch, priority) for priority in planning.priorities
     )
     # Only the roll may be missed.
-    moved = there if there.errors[:2] == (0.0, 0.0) else kept
+    moved = positioned if positioned.errors[:2] == (0.0, 0.0) else oriented
 
     def reached(other: ToolTarget) -> bool:
         return planning.joints(q, other, branch) is not None
 
-    works = [*_turns(target, there, moved, frame, reached)]
+    works = [*_turns(target, positioned, moved, frame, reached)]
     for text, p in near_points(frame, moved.pose.position):
         if reached(target.moved(frozen(p))):
             works.append(f"at `{text}` with {planning.orientation}")
@@ -191,8 +191,8 @@ def _binding_axes(planning: ToolPlanning, nearest: NearestPlace) -> tuple[int, .
         freed = replace(chain, lower=chain.lower - wider, upper=chain.upper + wider)
         kinematics: Any = planning.kinematics
         other = replace(planning, kinematics=replace(kinematics, chain=freed))
-        found = other.nearest(best.q, nearest.target, nearest.branch, nearest.priority)
-        return replace(nearest, projection=found).errors < nearest.errors
+        projection = other.nearest(best.q, nearest.target, nearest.branch, nearest.priority)
+        return replace(nearest, projection=projection).errors < nearest.errors
 
     # At a corner of the limits, none alone may help.
     return tuple(axis for axis in best.limits if binds(axis)) or best.limits
@@ -207,14 +207,16 @@ def millimetres(length: float) -> str:
 def near(value: float) -> Iterator[float]:
     """Yield the multiples of STEP beside ``value``, the nearer one first."""
     low, high = math.floor(value / STEP), math.ceil(value / STEP)
-    for each in sorted({low, high}, key=lambda n: abs(n * STEP - value)):
-        yield round(each * STEP, 6)
+    for multiple in sorted({low, high}, key=lambda n: abs(n * STEP - value)):
+        yield round(multiple * STEP, 6)
 
 
 def near_points(frame: ScriptFrame, p: FloatArray) -> Iterator[tuple[str, FloatArray]]:
     """Yield points near ``p`` (3,) [m] in {S}, whose numbers are short: as text, and in {S} [m]."""
-    for point in itertools.product(*(near(each) for each in frame.shown(p).tolist())):
-        place = ", ".join(f"{name}: {each:g}" for name, each in zip(XYZ, point, strict=True))
+    for point in itertools.product(*(near(coordinate) for coordinate in frame.shown(p).tolist())):
+        place = ", ".join(
+            f"{name}: {coordinate:g}" for name, coordinate in zip(XYZ, point, strict=True)
+        )
         yield f"{{{place}}}", frame.point(np.array(point))
 
 
@@ -252,17 +254,17 @@ def _links(planning: ToolPlanning, q: FloatArray) -> str:
 
 def _turns(
     target: ToolTarget,
-    there: NearestPlace,
+    positioned: NearestPlace,
     moved: NearestPlace,
     frame: ScriptFrame,
     reached: Reached,
 ) -> Iterator[str]:
     """Yield texts to copy, each with an orientation that the tool can have at ``target``.
 
-    ``there``: the nearest place that keeps the position. ``moved``: the place in the message.
+    ``positioned``: the nearest place that keeps the position. ``moved``: the place in the message.
     """
     if target.is_pitched:
-        pose, rolled = there.pose, moved.pose
+        pose, rolled = positioned.pose, moved.pose
         for pitch in near(math.degrees(pose.pitch)):
             if reached(replace(target, pitch=math.radians(pitch))):
                 yield f"with `pitch: {pitch:g}`"
@@ -273,7 +275,7 @@ def _turns(
                 yield f"with `roll: {roll:g}`"
                 break
         return
-    best = there.projection
+    best = positioned.projection
     if len(best.q) < 6 or best.position_error > POSITION_WORTH_TELLING:
         return
     R = frame.T[:3, :3]

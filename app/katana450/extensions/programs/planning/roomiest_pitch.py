@@ -58,11 +58,11 @@ def roomiest(chain: Chain, branch: AnyBranch, arc: Curve) -> ToolArc:
     for _ in range(HALVINGS):
         step *= 0.5
         for _ in range(4):
-            tried = best + around * step
-            rooms = _rooms(chain, branch, arc, tried)
+            candidates = best + around * step
+            rooms = _rooms(chain, branch, arc, candidates)
             if rooms.max() <= room:
                 break
-            best, room = tried[rooms.argmax()], float(rooms.max())
+            best, room = candidates[rooms.argmax()], float(rooms.max())
     mean, sine, cosine = best.tolist()
     return replace(arc, pitch=Swing(mean, sine, cosine, 0.0, arc.angle))
 

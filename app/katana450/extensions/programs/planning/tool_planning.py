@@ -73,7 +73,7 @@ class ToolPlanning:
 
     @property
     def priorities(self) -> tuple[Priority, Priority]:
-        """Those that keep the position, and the orientation that the arm can choose."""
+        """The priority that keeps the position, and the one that keeps the orientation."""
         if self.by_equations is None:
             return Priority.POSITION, Priority.PITCH
         return Priority.POSE, Priority.ORIENTATION
@@ -94,10 +94,10 @@ class ToolPlanning:
 
     def branches(self, q: FloatArray) -> Sequence[AnyBranch]:
         """Return all branches: that of `q`, then those that differ in later words of the name."""
-        here = str(self.kinematics.branch_of(q)).split("-")
+        words = str(self.kinematics.branch_of(q)).split("-")
 
         def differences(branch: AnyBranch) -> list[bool]:
-            return [a != b for a, b in zip(str(branch).split("-"), here, strict=False)]
+            return [a != b for a, b in zip(str(branch).split("-"), words, strict=False)]
 
         return sorted(self.kinematics.branches, key=differences)
 
@@ -113,8 +113,8 @@ class ToolPlanning:
         self, q: FloatArray, target: ToolTarget, branch: AnyBranch, priority: Priority
     ) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``, with the arm at `q`."""
-        here = replace(self.state, goal=q, branch=self.kinematics.branch_of(q), priority=priority)
-        return self.kinematics.leap(here, target, branch)
+        state = replace(self.state, goal=q, branch=self.kinematics.branch_of(q), priority=priority)
+        return self.kinematics.leap(state, target, branch)
 
     def seen_from(
         self, q: FloatArray, target: ToolTarget, branch: AnyBranch | None
@@ -131,13 +131,13 @@ class ToolPlanning:
         if branch is not None:
             yield branch, target
             return
-        here = self.kinematics.branch_of(q)
-        for there in self.branches(q):
-            yield there, self.converted(target, here, there)
+        present = self.kinematics.branch_of(q)
+        for other in self.branches(q):
+            yield other, self.converted(target, present, other)
 
-    def converted(self, target: ToolTarget, here: AnyBranch, there: AnyBranch) -> ToolTarget:
-        """Return ``target``, given in the numbers of the branch ``here``, in those of ``there``."""
-        return self.kinematics.target_on(replace(self.state, branch=here), target, there)
+    def converted(self, target: ToolTarget, source: AnyBranch, goal: AnyBranch) -> ToolTarget:
+        """Return ``target``, in the numbers of the branch ``source``, in those of ``goal``."""
+        return self.kinematics.target_on(replace(self.state, branch=source), target, goal)
 
     def joints(
         self, q: FloatArray, target: ToolTarget, branch: AnyBranch | None
@@ -146,8 +146,8 @@ class ToolPlanning:
 
         ``branch``: the only one that may be used; None for all, that of `q` first.
         """
-        for there, wanted in self.seen_from(q, target, branch):
-            posture = self.on_branch(q, wanted, there)
+        for other, wanted in self.seen_from(q, target, branch):
+            posture = self.on_branch(q, wanted, other)
             if posture is not None:
                 return posture
         return None
@@ -188,7 +188,7 @@ class ToolPlanning:
         that the tool cannot choose: fewer than six axes have no yaw of their own, and four axes
         only one angle.
         """
-        given = (angles.roll, angles.pitch, angles.yaw)
+        chosen = (angles.roll, angles.pitch, angles.yaw)
         if now.is_pitched:
             if angles.yaw is not None:
                 raise InputError(
@@ -196,7 +196,7 @@ class ToolPlanning:
                 )
             pitch = now.pitch if angles.pitch is None else angles.pitch
             return replace(now, pitch=pitch, roll=now.roll if angles.roll is None else angles.roll)
-        if given == (None, None, None):
+        if chosen == (None, None, None):
             return now
         if self.chain.n < 6:
             return replace(now, rotation=frozen(self._tilted(now.R, angles, R)))
@@ -206,7 +206,7 @@ class ToolPlanning:
                 "The x axis of the tool is vertical, so roll and yaw turn it about the same axis. "
                 "Give `roll`, `pitch` and `yaw` together."
             )
-        roll, pitch, yaw = (b if a is None else a for a, b in zip(given, present, strict=True))
+        roll, pitch, yaw = (b if a is None else a for a, b in zip(chosen, present, strict=True))
         return replace(now, rotation=frozen(R.T @ so3.from_rpy(roll, pitch, yaw)))
 
     def _tilted(self, R_now: FloatArray, angles: Angles, R: FloatArray) -> FloatArray:
@@ -232,8 +232,8 @@ class ToolPlanning:
         pitch = math.atan2(-now[0], math.hypot(now[1], now[2]))
         pitch = pitch if angles.pitch is None else angles.pitch
         rolls = (roll, roll + math.pi) if angles.roll is None else (angles.roll,)
-        for each in rolls:
-            wanted = so3.from_rpy(each, pitch, 0.0)[2]
+        for option in rolls:
+            wanted = so3.from_rpy(option, pitch, 0.0)[2]
             turn = self._turn(now, wanted)
             if turn is not None:
                 return R_now @ so3.exp(-turn)

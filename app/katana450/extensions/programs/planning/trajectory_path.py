@@ -54,8 +54,10 @@ class CubicSpline(PiecewisePolynomial):
 
     def values_at(self, times: FloatArray) -> FloatArray:
         """Return the values (N, n) at ``times`` (N,) [s] after the first one."""
-        found = self.at(Jet.variable(np.asarray(times) / self._total))
-        return np.stack([np.broadcast_to(each.c0, times.shape) for each in found], axis=1)
+        coordinates = self.at(Jet.variable(np.asarray(times) / self._total))
+        return np.stack(
+            [np.broadcast_to(coordinate.c0, times.shape) for coordinate in coordinates], axis=1
+        )
 
 
 def _second_derivatives(h: FloatArray, slopes: FloatArray) -> FloatArray:
@@ -129,21 +131,21 @@ class TrajectoryPath(PolynomialPath):
                 f"{np.degrees(beyond.max()):.4g} deg beyond its limit."
             )
 
-    def slowing(self, kept: float, speed: FloatArray) -> str:
-        """Return a sentence on a plan that takes ``kept`` [s] for this; "" if that is its time.
+    def slowing(self, duration: float, speed: FloatArray) -> str:
+        """Return a sentence on a plan that takes ``duration`` [s] for this; "" if that is its time.
 
         speed: (n,) maximum speeds of the joints [rad/s].
         """
-        if kept - self.duration <= max(SLOWED_RATIO * self.duration, SLOWED_TIME):
+        if duration - self.duration <= max(SLOWED_RATIO * self.duration, SLOWED_TIME):
             return ""
         t = np.linspace(0.0, self.duration, CHECKS_PER_PIECE * len(self.times))
         rates = np.abs(np.diff(self._line.values_at(t), axis=0)).max(axis=0) / t[1]
         axis = int((rates / speed).argmax())
         why = "the accelerations from rest and to rest are limited"
         if rates[axis] > speed[axis]:
-            asked, limit = np.degrees((rates[axis], speed[axis]))
-            why = f"axis {axis + 1} would turn at {asked:.4g} deg/s, and its limit is {limit:.4g}"
-        return f"Asked to take {self.duration:.4g} s, it takes {kept:.2f} s: {why}."
+            rate, limit = np.degrees((rates[axis], speed[axis]))
+            why = f"axis {axis + 1} would turn at {rate:.4g} deg/s, and its limit is {limit:.4g}"
+        return f"Asked to take {self.duration:.4g} s, it takes {duration:.2f} s: {why}."
 
     @property
     def duration(self) -> float:

@@ -153,18 +153,20 @@ class Grasp(Step, word="grasp"):
 
     def _approaches(self, plan: PlanState, scene_object: SceneObject) -> Sequence[Approach]:
         """Return the approaches to try, in their order, without those that were given up."""
-        at = _point(plan, scene_object, 0.0)
+        place = _point(plan, scene_object, 0.0)
         turned = plan.direction(scene_object.T[:3, 0], in_base=True)
         if self.pitch is not None:
-            return plan.hand.with_pitch(self.pitch, scene_object, at, turned)
-        found = plan.hand.approaches(scene_object, at, turned)
-        sides = [self.side] if self.side else list(found)
-        chosen = [each for side in sides for each in found.get(side, ())]
+            return plan.hand.with_pitch(self.pitch, scene_object, place, turned)
+        options = plan.hand.approaches(scene_object, place, turned)
+        sides = [self.side] if self.side else list(options)
+        chosen = [approach for side in sides for approach in options.get(side, ())]
         if not chosen:
             raise InputError(_no_approach(scene_object, self.side))
-        remaining = [each for each in chosen if each not in plan.given_up]
+        remaining = [approach for approach in chosen if approach not in plan.given_up]
         # Without one in reach, the first gives the reason.
-        in_reach = [each for each in remaining if self._is_in_reach(plan, scene_object, each)]
+        in_reach = [
+            approach for approach in remaining if self._is_in_reach(plan, scene_object, approach)
+        ]
         return in_reach or remaining[:1]
 
     def _is_in_reach(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> bool:
@@ -173,9 +175,9 @@ class Grasp(Step, word="grasp"):
         return any(
             hand.branches_to(
                 plan.q,
-                hand.before(_point(plan, scene_object, each.height), approach, each.distance),
+                hand.before(_point(plan, scene_object, grip.height), approach, grip.distance),
             )
-            for each in self._grips(plan, scene_object, approach)
+            for grip in self._grips(plan, scene_object, approach)
         )
 
     def _grips(self, plan: PlanState, scene_object: SceneObject, approach: Approach) -> list[Grip]:
@@ -183,11 +185,11 @@ class Grasp(Step, word="grasp"):
         if self.height is not None:
             return [Grip(self.height)]
         fractions = HEIGHT_FRACTIONS[ABOVE if approach.pitch == DOWN else FRONT]
-        found = [Grip(fraction * scene_object.height) for fraction in fractions]
+        grips = [Grip(fraction * scene_object.height) for fraction in fractions]
         if scene_object.height < LOW:
             middle = 0.5 * scene_object.height
-            found += [Grip(middle, each) for each in plan.hand.tip_distances]
-        return found
+            grips += [Grip(middle, distance) for distance in plan.hand.tip_distances]
+        return grips
 
     def _plan(
         self, plan: PlanState, scene_object: SceneObject, approach: Approach, room: _Room
@@ -251,16 +253,16 @@ class Grasp(Step, word="grasp"):
         held = with_fingers(plan.standing(q), plan.plan_context.arm.gripper.closed)
         if held.held is None or held.held.name != self.name:
             raise InputError(f"the fingers do not hold it: {_why_not_held(held)}.")
-        others = tuple(each for each in held.objects if each.name != self.name)
+        others = tuple(other for other in held.objects if other.name != self.name)
         world = plan.plan_context.session.world_at(replace(held, objects=others))
         nearest = None if world is None else _nearer(plan, world, held.x_setpoint, MARGIN)
         if nearest is not None:
             raise InputError(_too_near(nearest, MARGIN))
         return held
 
-    def _checked_later(self, ahead: Sequence[object]) -> bool:
-        """Return whether an ``if`` of ``ahead`` asks whether the object is held, before a grasp."""
-        for step in ahead:
+    def _checked_later(self, steps: Sequence[object]) -> bool:
+        """Return whether an ``if`` of ``steps`` asks whether the object is held, before a grasp."""
+        for step in steps:
             if isinstance(step, Conditional) and step.condition == Held(self.name):
                 return True
             if isinstance(step, Grasp):
@@ -313,11 +315,11 @@ def _nearer(
     Pairs that are nearer at Home may be as near as there. None if all are far enough.
     """
     home = np.append(plan.plan_context.ready, x[-1])
-    placed, kept = world.at(x), SweptClearance.about(world, minimum, home).minimum
-    pairs = placed.nearer_than(kept)[0].tolist()
-    found = {pair: placed.distance(pair) for pair in pairs}
-    near = [pair for pair, distance in found.items() if distance < kept[pair]]
-    return placed.contact(min(near, key=found.__getitem__)) if near else None
+    placed, minimums = world.at(x), SweptClearance.about(world, minimum, home).minimum
+    pairs = placed.nearer_than(minimums)[0].tolist()
+    distances = {pair: placed.distance(pair) for pair in pairs}
+    near = [pair for pair, distance in distances.items() if distance < minimums[pair]]
+    return placed.contact(min(near, key=distances.__getitem__)) if near else None
 
 
 def _smallest_distance(
