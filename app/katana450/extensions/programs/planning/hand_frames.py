@@ -208,7 +208,8 @@ class ArmPlane:
     def turn(self, p: FloatArray, distance: float) -> float:
         """Return the turn [rad] about axis 1 that brings a point beside the plane to `p` (3,).
 
-        distance: of the point from axis 1 [m], along ``across``. Raises InputError for a point too near to axis 1.
+        distance: of the point from axis 1 [m], along ``across``. Raises InputError for a point too
+        near to axis 1.
         """
         outward = math.hypot(p[0], p[1]) ** 2 - distance**2
         if outward < 0.0:

@@ -221,7 +221,7 @@ class Pour(Step, word="pour"):
 
     def _vessel(self, plan: PlanState) -> SceneObject:
         """Return the vessel in the hand. Raises InputError without it."""
-        held = next((each for each in plan.state.objects if each.held), None)
+        held = next((other for other in plan.state.objects if other.held), None)
         name = self.source or (held.name if held is not None and is_vessel(held) else CUP)
         if held is None or held.name != name:
             raise InputError(f"The {name} is not in the hand: `grasp: {name}` first.")
