@@ -75,14 +75,15 @@ def test_no_motion_makes_or_loses_water(
 def test_tilted_cup_keeps_its_capacity_and_the_basin_catches_the_rest(
     flow: WaterFlow, rate: float, final: float, dt: float
 ) -> None:
-    water = flow.begin(FULL, over_basin(flow.water_environment, 0.0))
+    water, drained = flow.begin(FULL, over_basin(flow.water_environment, 0.0)), 0
     for after in poured(flow, water, turned_to(final, rate), final / rate + 3.5, dt):
         checked(water, after, flow)
         assert after.cup.kept <= water.cup.kept
+        drained = water.cup.film - after.cup.film
         water = after
     over = water.cup.volume - counted(flow.water_environment.cup.inside.holds(final))
-    # A film stays on the wall, and less than a drop hangs at the lip.
-    assert over < DROP_VOLUME
+    # A film stays on the wall. At the lip hangs less than a drop before the last step drained.
+    assert over < DROP_VOLUME + drained
     assert over >= 0 or water.cup.kept == counted(FULL) or water.cup.film > -over
     assert water.cup.film < MILLILITRE
     assert water.spilled == 0
