@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,12 +11,13 @@ import pytest
 from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
-from katana450.client import Client, connect
+from katana450.client import connect
 from katana450.client.files import LostError
 from katana450.server.api import answers, requests
 from tests.browser.camera import Drawing
 from tests.browser.conftest import Windows
 from tests.gateway.site import Site, open_site
+from tests.gateway.test_people import poll
 
 
 @pytest.fixture
@@ -86,13 +86,6 @@ def test_admin_lists_and_disconnects(site: Site, windows: Windows) -> None:
         assert page.evaluate("document.activeElement.id") == "help-button"
     with connect(url, "Watch", token) as watch:
         assert watch.query(answers.State).stopped == "Ada pressed STOP."
-
-
-def poll(program: Client) -> None:
-    """Query the state for ten seconds."""
-    for _ in range(100):
-        program.query(answers.State)
-        time.sleep(0.1)
 
 
 @pytest.mark.long

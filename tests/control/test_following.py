@@ -30,6 +30,7 @@ from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan
 from katana450.settings import Settings
 from tests.control.clearing import cleared
+from tests.control.test_contact import clearance
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m
@@ -277,12 +278,6 @@ def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured:
         assert (after.setpoint == stopped[-1].setpoint).all()
     free = trace(session, cleared(session, stopped[-1]), {}, 50)[-1]
     assert (free.setpoint == stopped[-1].setpoint).all()
-
-
-def clearance(world: CollisionWorld, state: State) -> float:
-    contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
-    assert contact is not None
-    return contact.distance
 
 
 def test_plan_goes_around_the_cup_if_the_straight_path_is_blocked(

@@ -8,7 +8,6 @@ import os
 import re
 import signal
 import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.web.access_links import AccessFile
 from tests.browser.server import APP, AppServer
 from tests.event_log.logs import records
-from tests.gateway.client import HOUR, UPRIGHT, Control, Peer, ask, opened
+from tests.gateway.client import HOUR, UPRIGHT, Control, Peer, ask, healthy, opened
 from tests.gateway.lines import Lines
 
 KEY = "k" * 32
@@ -131,12 +130,6 @@ async def act(server: AppServer, tokens: dict[str, str], numbers: dict[str, str]
         assert time.monotonic() < end
         await asyncio.sleep(0.1)
     assert post(server, tokens["Otto"], do="home") == 409
-
-
-def healthy(server: AppServer) -> bool:
-    with suppress(OSError):
-        return ask(f"{server.url}/health")[0] == 200
-    return False
 
 
 async def refused(control: Control, do: str) -> None:

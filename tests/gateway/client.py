@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from katana450.arm.control.lease import HEARTBEAT_INTERVAL
+from tests.browser.server import AppServer
 
 SUBPROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 
@@ -39,6 +40,13 @@ HOUR = 3600.0
 """One hour [s]."""
 
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
+
+
+def healthy(server: AppServer) -> bool:
+    """Return whether ``server`` reports itself to be well."""
+    with suppress(OSError):
+        return ask(f"{server.url}/health")[0] == 200
+    return False
 
 
 def ask(

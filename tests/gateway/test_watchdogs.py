@@ -24,7 +24,7 @@ from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
-from tests.gateway.client import ask
+from tests.gateway.client import ask, healthy
 from tests.gateway.postures import FAR
 from tests.gateway.test_frozen_arm import process_state
 from tests.waiting import until
@@ -59,12 +59,6 @@ def look(server: AppServer) -> dict[str, Any]:
     """Return the state of the arm."""
     state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
     return state
-
-
-def healthy(server: AppServer) -> bool:
-    with suppress(OSError):
-        return ask(f"{server.url}/health")[0] == 200
-    return False
 
 
 def clear_stop(arm: Client) -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
@@ -20,6 +19,7 @@ from katana450.extensions.programs.server.preview import Preview
 from katana450.maths.collision.clearance import STOP
 from katana450.maths.geometry.arrays import FloatArray
 from tests.general_arms.gripping_arms import gripping_urdf
+from tests.programs.test_pick_place import place
 from tests.viser_bridge import internals
 
 TICK = 0.01
@@ -74,14 +74,6 @@ def played(plan: Planned) -> tuple[State, ...]:
     states = run_by_clock(plan).states
     assert not any(state.findings for state in states)
     return states
-
-
-def place(scene_object: SceneObject) -> list[float]:
-    """Return x, y, z [mm] of an object, which must stand upright and free."""
-    assert not scene_object.held
-    assert scene_object.T[2, 2] == pytest.approx(1.0, abs=1e-12)
-    x, y, z = (1e3 * scene_object.T[:3, 3]).tolist()
-    return [x, y, z]
 
 
 def in_base(plan: Planned, state: State) -> FloatArray:
