@@ -51,3 +51,10 @@ def test_every_file_is_in_one_room() -> None:
             counts[file] += 1
     wrong = [str(file.relative_to(PACKAGE)) for file, count in counts.items() if count != 1]
     assert not wrong, "These files are in no room, or in several:\n" + "\n".join(wrong)
+
+
+def test_folders_of_programs_are_small() -> None:
+    folders = [path for path in (PACKAGE / "extensions" / "programs").rglob("*") if path.is_dir()]
+    sizes = {path.name: len(list(path.glob("[!_]*"))) for path in folders}
+    assert len(sizes) > 6
+    assert {name: size for name, size in sizes.items() if size > 14} == {}

@@ -206,9 +206,9 @@ class Declared:
 
     @classmethod
     def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:  # noqa: ARG003
-        """Yield field and text of each mistake in ``given`` that no field has by itself.
+        """Yield field and text of each mistake in ``values`` that no field has by itself.
 
-        The field is "" for the whole mapping. ``given`` has the attributes that the mapping gives,
+        The field is "" for the whole mapping. ``values`` has the attributes that the mapping gives,
         None for one that is wrong.
         """
         yield from ()

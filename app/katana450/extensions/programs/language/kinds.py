@@ -74,7 +74,7 @@ def mapping(about: str, required: str, properties: Mapping[str, Schema]) -> Sche
 
 
 def list_of(schema: Schema, low: int, high: int) -> Schema:
-    """Return a list of ``low`` to ``high`` values like ``each``."""
+    """Return a list of ``low`` to ``high`` values of the kind ``schema``."""
     return {"type": "array", "items": schema, "minItems": low, "maxItems": high}
 
 

@@ -216,7 +216,7 @@ class Call(StepBlock):
 
 
 def _called(definition: Definition, values: Pairs) -> tuple[LocatedStep, ...]:
-    """Return the steps of ``definition`` with the arguments ``given``."""
+    """Return the steps of ``definition`` with ``values`` of its parameters."""
     known = [str(name.held) for name, _ in definition.parameters]
     arguments = {str(name.held): value for name, value in values}
     for name, _ in values:

@@ -156,10 +156,6 @@ def _with_poses(value: YamlValue, context: ScriptContext) -> ScriptContext:
     return context
 
 
-EXTENSIONS = {"let": _with_values, "poses": _with_poses, "define": with_definitions}
-"""How each field of a script with names extends those before it."""
-
-
 MAX_NAME_LENGTH = 40
 """Maximum number of characters of a name."""
 

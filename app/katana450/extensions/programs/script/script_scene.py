@@ -426,7 +426,7 @@ def check_scene(session: Session, scene: Scene) -> None:
 def _object_difference(
     entry: SceneEntry, present: SceneObject, T_palm_tool: FloatArray | None
 ) -> str:
-    """Return a clause that names how ``found`` differs from ``entry``; "" for not at all."""
+    """Return a clause that names how ``present`` differs from ``entry``; "" for not at all."""
     same_size = entry.shape is Shape.MESH or np.allclose(entry.size, present.size, rtol=1e-6)
     if entry.shape is not present.shape or not same_size:
         return f"{entry.name} has another shape or size"

@@ -192,7 +192,7 @@ def let_go(plan: PlanState) -> PlanState:
 
 
 def _standing(held: SceneObject, place: FloatArray) -> SceneObject:
-    """Return the held object upright with its underside at ``at`` (3,) [m] in the base frame."""
+    """Return the held object upright with its underside at ``place`` (3,) [m] in the base frame."""
     return replace(held, T=se3.from_rotation_translation(np.eye(3), place), held=False)
 
 
