@@ -91,15 +91,14 @@ class LogFile:
         Raises BlockingIOError if another server writes there.
         """
         self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        self._file = open_bytes(self.folder / PRESENT, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o600)
+        path = self.folder / PRESENT
+        self._file = open_bytes(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
         try:
             claim_file(self._file)
             self._size = os.fstat(self._file).st_size
-            if self._size:
-                os.lseek(self._file, -1, os.SEEK_END)
-                if os.read(self._file, 1) != b"\n":
-                    # A killed server was writing this line.
-                    self._write(b"\n")
+            if self._size and not _ends_line(path):
+                # A killed server was writing this line.
+                self._write(b"\n")
         except OSError:
             self.close()
             raise
@@ -148,3 +147,10 @@ class LogFile:
                 os.ftruncate(self._file, self._size)
             raise
         self._size += len(line)
+
+
+def _ends_line(path: Path) -> bool:
+    """Return whether the last line of a file with content is complete."""
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read() == b"\n"
