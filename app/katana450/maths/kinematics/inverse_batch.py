@@ -20,6 +20,7 @@ from katana450.maths.kinematics.batch import CHUNK, chunks, number_array
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.closed_form import Functions, closed_form
 from katana450.maths.kinematics.solver import Solver
+from katana450.maths.kinematics.turns import in_limits_turns
 
 _LAST_ROW: Final = np.array([[0.0], [0.0], [0.0], [1.0]])
 
@@ -131,29 +132,26 @@ class _Arm(NamedTuple):
     """Values that are computed once per chain.
 
     Attributes:
+        chain: the chain.
         solver: the scalar solver.
         posture: the closed form on arrays.
-        turns: (joint, sign, shift, lower, upper) of the joints whose angle differs from that of the
-            canonical arm, or whose limits [rad] exceed half a turn.
+        is_turned: whether an angle differs from that of the canonical arm, or a limit exceeds half
+            a turn.
     """
 
+    chain: Chain
     solver: Solver
     posture: Callable[..., Any]
-    turns: tuple[tuple[int, float, float, float, float], ...]
+    is_turned: bool
 
 
 @lru_cache(maxsize=64)
 def _arm(chain: Chain) -> _Arm:
     solver = Solver.of(chain)
     arm = solver.arm
-    lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
-    joints = zip(range(5), arm.signs, arm.shifts, lower.tolist(), upper.tolist(), strict=True)
-    turns = tuple(
-        (i, sign, shift, a, b)
-        for i, sign, shift, a, b in joints
-        if sign < 0.0 or shift or max(-a, b) > np.pi + tolerances.LIMIT_SLACK
-    )
-    return _Arm(solver, closed_form(arm, _ARRAYS), turns)
+    is_canonical = set(arm.signs) == {1.0} and not any(arm.shifts)
+    is_turned = not is_canonical or max(-chain.lower.min(), chain.upper.max()) > np.pi
+    return _Arm(chain, solver, closed_form(arm, _ARRAYS), bool(is_turned))
 
 
 def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None:
@@ -172,8 +170,9 @@ def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None
     # Both comparisons are false for an overflow and inside the cylinder of radius d.
     beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
     _canonical(made, rows, rho, r, angles)
-    _turn(made, angles)
     q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
+    if made.is_turned:
+        q[...] = in_limits_turns(made.chain, (q - arm.shifts) * arm.signs)
     for i in beside.nonzero()[0]:
         q[i] = solver.solve(T[:, :, i].tolist())
 
@@ -223,24 +222,3 @@ def _wrap(theta: FloatArray) -> None:
     np.rint(turns, out=turns)
     turns *= 2.0 * np.pi
     theta -= turns
-
-
-def _turn(made: _Arm, angles: FloatArray) -> None:
-    """Convert alpha (2, 2, 5, C) to q in place, each angle in the turn inside its limits if any."""
-    for i, sign, shift, lower, upper in made.turns:
-        angle = angles[:, :, i]
-        if shift:
-            angle -= shift
-            _wrap(angle)
-        if sign < 0.0:
-            np.negative(angle, out=angle)
-        if max(-lower, upper) > np.pi + tolerances.LIMIT_SLACK:
-            below, above = angle < lower, angle > upper
-            # The first turn that is not beyond the violated limit.
-            turns = np.where(
-                below,
-                np.ceil((lower - angle) * (0.5 / np.pi)),
-                np.floor((upper - angle) * (0.5 / np.pi)),
-            )
-            other = angle + 2.0 * np.pi * turns
-            np.copyto(angle, other, where=(below | above) & (other >= lower) & (other <= upper))
