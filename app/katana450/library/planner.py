@@ -172,7 +172,7 @@ def _number(value: float, name: str) -> float:
 def _checked(angles: Sequence[float | str | None]) -> Angles:
     """Return pitch, roll and yaw as floats. Raises InputError, which names a wrong one."""
     checked = Angles(*map(_angle, angles, Angles._fields))
-    check_radians((each for each in checked if each is not None), "The orientation")
+    check_radians((angle for angle in checked if angle is not None), "The orientation")
     return checked
 
 

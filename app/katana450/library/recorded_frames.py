@@ -43,12 +43,12 @@ class RecordedFrames:
             first, last = file.start + start, min(file.start + end, file.end)
             self._standing = _first_state(file)
             self._offset = file.utc_offset + MOMENT
-            found = list(rows_from(file, first, last))
-        if not found or any(row.position is None for row in found):
+            rows = list(rows_from(file, first, last))
+        if not rows or any(row.position is None for row in rows):
             raise InputError(f"{path} has no states of an arm with a tool in that part.")
         frames: list[StateRow] = []
-        for row in found:
-            if not frames or row is found[-1] or row.t >= frames[-1].t + MIN_STEP:
+        for row in rows:
+            if not frames or row is rows[-1] or row.t >= frames[-1].t + MIN_STEP:
                 frames.append(row)
         self._times = [row.t for row in frames]
         self.points = frozen([row.position for row in frames])  # type: ignore[arg-type]

@@ -149,7 +149,7 @@ class Recording:
     @cached_property
     def commands(self) -> tuple[RecordedCommand, ...]:
         """All commands in order, with their times and who gave them. Raises InputError."""
-        reader, found = TickReader(), []
+        reader, commands = TickReader(), []
         with RecordingFile.open(self.path) as file:
             for message in file.messages(PLANS, SOLIDS, COMMANDS):
                 if message.topic != COMMANDS:
@@ -157,10 +157,10 @@ class Recording:
                     continue
                 tick = reader.tick(message)
                 if not isinstance(tick, TickMessage) and tick.t >= self.start:
-                    for each in tick.submissions:
-                        giver = "" if each.actor is None else each.actor.name
-                        found.append(RecordedCommand(tick.t, each.command, giver))
-        return tuple(found)
+                    for submission in tick.submissions:
+                        giver = "" if submission.actor is None else submission.actor.name
+                        commands.append(RecordedCommand(tick.t, submission.command, giver))
+        return tuple(commands)
 
     @cached_property
     def events(self) -> tuple[Mapping[str, Any], ...]:
@@ -172,14 +172,14 @@ class Recording:
     def programs(self) -> tuple[RecordedProgram, ...]:
         """All runs of scripts by their begin, with the texts. Raises InputError."""
         with RecordingFile.open(self.path) as file:
-            texts = {each.name: each.data for each in file.attachments()}
-            found = [run for run in script_runs([file]) if run.script in texts]
-        for run in found:
+            texts = {attachment.name: attachment.data for attachment in file.attachments()}
+            runs = [run for run in script_runs([file]) if run.script in texts]
+        for run in runs:
             if sha256(texts[run.script]) != run.sha256:
                 raise InputError(f"{self.path} is damaged: {run.script} is not the text that ran.")
         return tuple(
             RecordedProgram(run.name, run.start, run.end, texts[run.script].decode("utf-8"))
-            for run in found
+            for run in runs
         )
 
     @cached_property
@@ -228,8 +228,8 @@ class Recording:
                 robot.
         """
         with RecordingFile.open(self.path) as file:
-            found = session_for(file, None if urdf is None else Path(urdf))
-            return part_and_script(file, found, start, end)[1]
+            robot = session_for(file, None if urdf is None else Path(urdf))
+            return part_and_script(file, robot, start, end)[1]
 
     def run_again(
         self,
@@ -259,9 +259,9 @@ class Recording:
                 or it was stopped.
         """
         with RecordingFile.open(self.path) as file:
-            found = session_for(file, None if urdf is None else Path(urdf))
-            text = part_and_script(file, found, start, end)[1]
-        check_same_arm(client, found.session.require_arm(), self.path)
+            robot = session_for(file, None if urdf is None else Path(urdf))
+            text = part_and_script(file, robot, start, end)[1]
+        check_same_arm(client, robot.session.require_arm(), self.path)
         return client.run(text, speed)
 
     def score(
@@ -362,8 +362,8 @@ class Recording:
 def _split(name: str, values: FloatArray, columns: Iterable[object]) -> dict[str, FloatArray]:
     """Return the columns of ``values`` (N, k) by their names."""
     return {
-        name.format(each): np.asarray(column)
-        for each, column in zip(columns, values.T, strict=True)
+        name.format(column_name): np.asarray(column)
+        for column_name, column in zip(columns, values.T, strict=True)
     }
 
 

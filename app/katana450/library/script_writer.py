@@ -416,9 +416,9 @@ def plain(value: Any) -> Any:
         case np.ndarray() | np.generic():
             return plain(value.tolist())
         case Mapping():
-            return {str(name): plain(each) for name, each in value.items()}
+            return {str(name): plain(entry) for name, entry in value.items()}
         case list() | tuple():
-            return [plain(each) for each in value]
+            return [plain(entry) for entry in value]
         case float() if not math.isfinite(value):
             raise InputError(f"A number of a script must be finite, not {value}.")
     return value

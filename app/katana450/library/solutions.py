@@ -56,7 +56,7 @@ class IKSolutions:
     @cached_property
     def q(self) -> FloatArray:
         """(k, n) or (N, k, n) joint angles [rad]."""
-        return np.array([each.q for each in self])
+        return np.array([solution.q for solution in self])
 
     @cached_property
     def within_limits(self) -> npt.NDArray[np.bool_]:
@@ -79,7 +79,7 @@ class IKSolutions:
     def _errors(self) -> tuple[FloatArray, FloatArray]:
         if self._solutions is None:
             return errors_of(self._chain, self.q, validated_poses(self._T))
-        errors = np.array([(each.position_error, each.rotation_error) for each in self])
+        errors = np.array([(solution.position_error, solution.rotation_error) for solution in self])
         return errors[:, 0], errors[:, 1]
 
     @property
@@ -100,10 +100,10 @@ class IKSolutions:
         """
         slack = ROUNDING_ERRORS * self.rotation_misfit
         return tuple(
-            each
-            for each in self
-            if each.within_limits
-            and (each.exact or max(each.position_error, each.rotation_error) <= slack)
+            solution
+            for solution in self
+            if solution.within_limits
+            and (solution.exact or max(solution.position_error, solution.rotation_error) <= slack)
         )
 
     def __iter__(self) -> Iterator[Solution]:

@@ -149,7 +149,7 @@ class BranchWords:
         zero = self._zero
         x, y, _ = np.cross(zero.z[0], zero.z[1]).tolist()
         sides = (zero.ahead(0, 1, zero.p[1]), x, y)
-        return next((_sign(each) for each in sides if abs(each) > ZERO), 1.0)
+        return next((_sign(side) for side in sides if abs(side) > ZERO), 1.0)
 
     @cached_property
     def _up(self) -> float:
@@ -183,9 +183,9 @@ class BranchWords:
         has_wrist = len(self.joints) > 4
         wrist = look.foot(4, 5) if has_wrist else look.tool
         faces = self._front * look.ahead(0, 1, wrist)
-        beside = self._up * self._front * self._beside(look, wrist)
-        if beside:
-            shoulder, side = "left" if beside * faces < 0.0 else "right", _sign(faces)
+        aside = self._up * self._front * self._beside(look, wrist)
+        if aside:
+            shoulder, side = "left" if aside * faces < 0.0 else "right", _sign(faces)
         else:
             shoulder, side = "front" if faces >= 0.0 else "back", 1.0
         end = look.p[3] if self._is_parallel(2) else wrist
@@ -205,9 +205,9 @@ class BranchWords:
         It is 0 if it is not constant, or less than that by which axis 2 passes axis 1.
         """
         offset = abs(look.ahead(0, 1, look.p[1]))
-        beside = float(look.z[1] @ (wrist - look.p[0]))
+        aside = float(look.z[1] @ (wrist - look.p[0]))
         upright = abs(float(look.z[0] @ look.z[1])) < ZERO and self._is_parallel(1)
-        return beside if upright and abs(beside) > max(offset, ZERO) else 0.0
+        return aside if upright and abs(aside) > max(offset, ZERO) else 0.0
 
     def _from_tool(self, look: _Look) -> tuple[str, ...]:
         centre = look.foot(1, 0)

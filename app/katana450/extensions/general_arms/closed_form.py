@@ -168,9 +168,9 @@ class ClosedForm(GeneralKinematics):
         before, after = form.links.T_1_S, form.T_after
 
         def canonical(T: FloatArray, free: Sequence[float]) -> list[Angles]:
-            seen = se3.inverse(T) if is_reversed else T
+            pose = se3.inverse(T) if is_reversed else T
             # For one pose `dot` takes half the time of `@`.
-            return solve(before.dot(seen).dot(after).tolist(), free)
+            return solve(before.dot(pose).dot(after).tolist(), free)
 
         return canonical
 
@@ -208,7 +208,9 @@ class ClosedForm(GeneralKinematics):
             return q
 
         def again(targets: FloatArray) -> FloatArray:
-            return np.array([joints(canonical(each, alpha)[k]) for k, each in enumerate(targets)])
+            return np.array(
+                [joints(canonical(target, alpha)[k]) for k, target in enumerate(targets)]
+            )
 
         poses = np.repeat(T[None], len(q), axis=0)
         return list(map(tuple, self.rounding.corrected(np.array(q), poses, again).tolist()))
@@ -259,14 +261,14 @@ class ClosedForm(GeneralKinematics):
         return self._exact_batch(poses)[:, branch]
 
     def _exact_batch(self, poses: FloatArray) -> FloatArray:
-        seen = inverses(poses) if self.is_reversed else poses
+        chain_poses = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
-            found = self._solve_arrays(
-                np.moveaxis(self.form.links.T_1_S @ seen @ self.form.T_after, 0, -1), shift
+            solutions = self._solve_arrays(
+                np.moveaxis(self.form.links.T_1_S @ chain_poses @ self.form.T_after, 0, -1), shift
             )
         zeros = np.zeros(len(poses))
-        alpha = np.array([[each + zeros for each in angles] for angles in found])
+        alpha = np.array([[angle + zeros for angle in angles] for angles in solutions])
         q = alpha.transpose(2, 0, 1) - shift
         q = in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
         if self.form.build is six_axes:

@@ -305,15 +305,15 @@ class Descent:
 
     def _slope(self, now: Look) -> FloatArray:
         """Return how the smallest singular value rises with each joint (n,) [1/rad]."""
-        found = []
+        matrices = []
         for k in range(len(now.q)):
             q = list(now.q)
             q[k] += PROBE
             _, moved = self.search.motion(q)
             J = np.array(moved).T
             J[3:] /= self.search.length
-            found.append(self.regularity.matrix(J))
-        least = np.linalg.svd(np.array(found), compute_uv=False)[:, -1]
+            matrices.append(self.regularity.matrix(J))
+        least = np.linalg.svd(np.array(matrices), compute_uv=False)[:, -1]
         return np.asarray((least - now.least) / PROBE)
 
 

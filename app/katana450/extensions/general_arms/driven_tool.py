@@ -81,8 +81,8 @@ def ready_posture(descent: Descent, T_base_shoulder: FloatArray) -> FloatArray:
     score -= 0.02 * np.abs(q).sum(axis=1)
     best = np.argsort(-score, kind="stable")[:MAX_COMPARED]
     q, T, score = q[best], T[best], score[best]
-    twists = [descent.search.motion(each)[1] for each in q.tolist()]
-    score += np.minimum([_least(descent, each) for each in twists], REGULAR) / REGULAR
+    twists = [descent.search.motion(candidate)[1] for candidate in q.tolist()]
+    score += np.minimum([_least(descent, twist) for twist in twists], REGULAR) / REGULAR
     score += np.minimum(_lowest_axis(np.array(twists), T, T_base_shoulder) / reach, HEIGHT)
     return np.array(q[int(score.argmax())])
 
@@ -96,7 +96,7 @@ def _candidates(chain: Chain) -> FloatArray:
     still |= set(range(2, chain.n - 4))
     choices = []
     for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
-        inside = [each for each in ANGLES if low <= each <= high]
+        inside = [angle for angle in ANGLES if low <= angle <= high]
         if k in still and 0.0 in inside:
             inside = [0.0]
         elif k in still or not inside:
@@ -261,7 +261,7 @@ class DrivenTool:
 
         The pose `T` (4, 4) is that of the target with axis 1 as in the goal.
         """
-        found = []
+        projections = []
         for start in self._starts(state, T, branch):
             q = start
             for _ in range(SETTLINGS if self.chain.n < 6 else 1):
@@ -269,18 +269,21 @@ class DrivenTool:
                 if abs(q[0] - before[0]) < SETTLED:
                     break
             name = str(self.branch_of(q))
-            found.append(self._projected(q, target_at(q), name, state.priority))
-        return self._best(found, state, T, branch)
+            projections.append(self._projected(q, target_at(q), name, state.priority))
+        return self._best(projections, state, T, branch)
 
     def _best(
-        self, found: Sequence[Projection], state: State, T: FloatArray, branch: AnyBranch
+        self, projections: Sequence[Projection], state: State, T: FloatArray, branch: AnyBranch
     ) -> Projection:
         """Return the nearest of ``found``, on ``branch`` if one is.
 
         If the limits exclude the branch for the pose `T` (4, 4), the posture is on another one, and
         its limits are those that do so.
         """
-        best = min(found, key=lambda each: (each.branch != branch, *_misses(each, state.priority)))
+        best = min(
+            projections,
+            key=lambda candidate: (candidate.branch != branch, *_misses(candidate, state.priority)),
+        )
         closed = self._solver.on_branch(T, str(branch), state.goal)
         if best.branch == branch or closed is None:
             return best
@@ -346,11 +349,11 @@ class DrivenTool:
         tool best.
         """
         swivel = self._solver.swivel
-        found = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
-        while len(found.free) > 6:
-            rest = [replace(found, locked=(*found.locked, k)) for k in found.free]
-            found = max(rest, key=lambda each: each.least(q))
-        return found
+        equations = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
+        while len(equations.free) > 6:
+            rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]
+            equations = max(rest, key=lambda candidate: candidate.least(q))
+        return equations
 
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
         """Return the speed of the tool point [m/s] for the rates `qd` (n,)."""
@@ -385,8 +388,8 @@ class DrivenTool:
         return ready_posture(self._tracker.descent, T_base_shoulder)
 
 
-def _misses(found: Projection, priority: Priority) -> tuple[float, ...]:
-    position, rotation = round(found.position_error, 7), round(found.rotation_error, 7)
+def _misses(projection: Projection, priority: Priority) -> tuple[float, ...]:
+    position, rotation = round(projection.position_error, 7), round(projection.rotation_error, 7)
     if priority is Priority.POSITION:
         return (position,)
     return (rotation, position) if priority is Priority.ORIENTATION else (position, rotation)

@@ -100,9 +100,9 @@ class FileRounding:
         q, chain = np.array(q), self.chain
         missed = np.abs(forward_batch(chain, q) - T).max(axis=(1, 2))
         for k in np.flatnonzero((missed > EXACT) & (missed <= BESIDE * self.offset)).tolist():
-            found, _ = self._search.descend(self._search.goal(T[k]), q[k].tolist(), STEPS)
-            if np.abs(forward(chain, found) - T[k]).max() < missed[k]:
-                q[k] = in_limits_turns(chain, np.array(found))
+            angles, _ = self._search.descend(self._search.goal(T[k]), q[k].tolist(), STEPS)
+            if np.abs(forward(chain, angles) - T[k]).max() < missed[k]:
+                q[k] = in_limits_turns(chain, np.array(angles))
         return q
 
     @cached_property

@@ -107,8 +107,8 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
             sine = bounded(d / scale)
         cosine = root((1.0 - sine) * (1.0 + sine))
         xc, yc, xs, ys = cx * cosine, cy * cosine, cx * sine, cy * sine
-        ahead = rho * cosine
-        return (xc + ys, yc - xs, ahead), (ys - xc, -yc - xs, -ahead)
+        length = rho * cosine
+        return (xc + ys, yc - xs, length), (ys - xc, -yc - xs, -length)
 
     return turns
 
@@ -165,7 +165,7 @@ def three_turns(
         half = 0.5 * atan2(radius, q33)
         sine = root(sign * sin(total + half) * sin(total - half))
         cosine = root(sign * sin(half + rest) * sin(half - rest))
-        found = []
+        turns = []
         for signed in (sine, -sine):
             b = 2.0 * atan2(signed, cosine)
             cb, sb = cos(b), sin(b)
@@ -177,10 +177,10 @@ def three_turns(
                 return atan2(c2 * y + s2 * z, x)
 
             a = atan2(q23, q13) - atan2(-c * s2 * cb - s * c2, s2 * sb)
-            taken = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
-            a = select(radius <= FREE, taken, a)
-            found.append((a, b, left(cos(a), sin(a)), cos(a), sin(a)))
-        return found[0], found[1], radius
+            free_turn = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
+            a = select(radius <= FREE, free_turn, a)
+            turns.append((a, b, left(cos(a), sin(a)), cos(a), sin(a)))
+        return turns[0], turns[1], radius
 
     return split
 
@@ -214,10 +214,10 @@ def _square_turns(
                 return atan2(sign * (ca * q21 - sa * q11), sign * (ca * q22 - sa * q12))
 
             is_free = radius <= FREE
-            taken = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
+            free_turn = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
             # Of a direction any length gives the angles.
-            x = select(is_free, cos(taken), s2 * q13)
-            y = select(is_free, sin(taken), s2 * q23)
+            x = select(is_free, cos(free_turn), s2 * q13)
+            y = select(is_free, sin(free_turn), s2 * q23)
             length = select(is_free, 1.0, radius)
             a, c, ca, sa = atan2(y, x), left(x, y), x / length, y / length
         b = atan2(radius, sign * q33)

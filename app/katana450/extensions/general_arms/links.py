@@ -136,15 +136,15 @@ def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
     first = T = _start(z[0], points[0])
     off_angle = off_length = 0.0
     for i in range(n - 1):
-        here, x_before = T[:3, 3], T[:3, 0]
+        place, x_before = T[:3, 3], T[:3, 0]
         along, length, twist, tilt, x = _normal(
-            z[i], here, z[i + 1], points[i + 1], x_before, (angle, gap), almost
+            z[i], place, z[i + 1], points[i + 1], x_before, (angle, gap), almost
         )
         exact_twist = twist if tilt else _snapped(twist, angle)
         exact_length = _zeroed(length, gap)
         exact_along = _zeroed(along, gap)
         if i == 0:
-            first = T = _frame(z[0], x, here + along * z[0])
+            first = T = _frame(z[0], x, place + along * z[0])
             exact_along = 0.0
         else:
             turn = math.atan2(float(np.cross(x_before, x) @ z[i]), float(x_before @ x))
@@ -229,7 +229,7 @@ def _frame(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
 
 def _normal(
     z: FloatArray,
-    here: FloatArray,
+    place: FloatArray,
     z2: FloatArray,
     p2: FloatArray,
     x: FloatArray,
@@ -245,7 +245,7 @@ def _normal(
     """
     across = np.cross(z, z2)
     sine, cosine = float(np.linalg.norm(across)), float(z @ z2)
-    gap = p2 - here
+    gap = p2 - place
     if sine <= within[0]:
         between = gap - (gap @ z) * z
         length = float(np.linalg.norm(between))

@@ -107,8 +107,8 @@ def nearest_pose(
             q_hint=q_hint,
             priority=priority,
         )
-        given = yaw_counts and priority is Priority.POSE
-        findings = of_projection(chain, best, priority, yaw_was_given=given)
+        has_yaw = yaw_counts and priority is Priority.POSE
+        findings = of_projection(chain, best, priority, yaw_was_given=has_yaw)
     elif priority is not Priority.POSE or branch is not None:
         raise InputError(
             "Other priorities than 'pose', and one branch, are for five-axis arms. The kinematics "
@@ -119,7 +119,7 @@ def nearest_pose(
         findings = tuple(losses_of(chain, best, priority, at_edge=False))
     reason = "; ".join(REASONS[finding.reason](finding) for finding in findings)
     return NearestPose(
-        **{each.name: getattr(best, each.name) for each in fields(best)}, reason=reason
+        **{field.name: getattr(best, field.name) for field in fields(best)}, reason=reason
     )
 
 
@@ -138,15 +138,18 @@ def nearest_posture(
     """
     chain = kinematics.chain
     solutions = kinematics.inverse(T, q_hint)
-    usable = [each for each in solutions if each.within_limits or not within_limits]
-    exact = [each for each in usable if each.exact]
+    usable = [solution for solution in solutions if solution.within_limits or not within_limits]
+    exact = [solution for solution in usable if solution.exact]
     if exact:
         hint = None if q_hint is None else chain.check_q(q_hint)
-        best = min(exact, key=lambda each: _cost(chain, each.q, hint))
+        best = min(exact, key=lambda solution: _cost(chain, solution.q, hint))
     else:
         if within_limits:
             usable += _searched(chain, T, solutions, q_hint)
-        best = min(usable, key=lambda each: (round(each.position_error, 6), each.rotation_error))
+        best = min(
+            usable,
+            key=lambda solution: (round(solution.position_error, 6), solution.rotation_error),
+        )
     return projected(chain, best.q, T, best.branch, Priority.POSE, bounded=within_limits)
 
 
@@ -155,7 +158,7 @@ def _searched(
 ) -> list[Solution]:
     """Return postures inside the limits that searches from ``solutions`` and the hint lead to."""
     search = _search(chain)
-    starts = [chain.clamp(each.q) for each in solutions]
+    starts = [chain.clamp(solution.q) for solution in solutions]
     if q_hint is not None:
         starts.insert(0, chain.clamp(q_hint))
     ends: list[Solution] = []
@@ -267,10 +270,10 @@ def losses_of(
     if gap is not None:
         yield Finding(Reason.ACROSS_GAP, gap[1], gap[0])
     if off:
-        kept = priority is Priority.ORIENTATION and not turned
+        gives_way = priority is Priority.ORIENTATION and not turned
         # It is out of reach only if that is shown: by the links, or by a limit.
-        kept = kept or gap is not None or not (best.reach or best.limits)
-        reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
+        gives_way = gives_way or gap is not None or not (best.reach or best.limits)
+        reason = Reason.POSITION_CHANGED if gives_way else Reason.OUT_OF_REACH
         yield Finding(reason, best.position_error)
     if turned:
         yield Finding(Reason.ORIENTATION_CHANGED, best.rotation_error)

@@ -244,21 +244,21 @@ class Numerical(GeneralKinematics):
         """
         search = replace(self, weight=weight)
         goal = search.goal(T)
-        begun = [search.descend(goal, start.tolist(), QUICK_STEPS) for start in starts]
-        begun += [
+        first_ends = [search.descend(goal, start.tolist(), QUICK_STEPS) for start in starts]
+        first_ends += [
             search.descend(goal, start, QUICK_STEPS) for start in self.seeds(T)[:FEW_SEEDS].tolist()
         ]
         ends = [
             search.descend(goal, q, STEPS)
-            for q, _ in sorted(begun, key=lambda each: each[1])[:FEW_ENDS]
+            for q, _ in sorted(first_ends, key=lambda end: end[1])[:FEW_ENDS]
         ]
-        q, _ = min(ends, key=lambda each: each[1])
+        q, _ = min(ends, key=lambda end: end[1])
         return in_limits_turns(self.chain, np.array(q))
 
     def goal(self, T: FloatArray) -> tuple[float, ...]:
         """Return `T` in the frame of axis 1: the rotation by columns, then the place."""
-        here = self.links.T_1_S @ T
-        return (*here[:3, :3].T.ravel().tolist(), *here[:3, 3].tolist())
+        pose = self.links.T_1_S @ T
+        return (*pose[:3, :3].T.ravel().tolist(), *pose[:3, 3].tolist())
 
     def step(self, goal: tuple[float, ...], q: Sequence[float]) -> SearchState:
         """Return error and Jacobian at `q` [rad], translations divided by `length`."""
@@ -283,11 +283,13 @@ class Numerical(GeneralKinematics):
             if now.square <= SOLVED * SOLVED:
                 break
             dq = self._turned(now, q, mu)
-            tried = [min(max(x + d, a), b) for x, d, a, b in zip(q, dq, lower, upper, strict=True)]
-            then = self.step(goal, tried)
+            candidate = [
+                min(max(x + d, a), b) for x, d, a, b in zip(q, dq, lower, upper, strict=True)
+            ]
+            then = self.step(goal, candidate)
             if then.square < now.square:
                 slow = slow + 1 if then.square > (1.0 - STALLED) * now.square else 0
-                q, now = tried, then
+                q, now = candidate, then
                 mu = max(0.1 * mu, LEAST_DAMPING)
                 if slow == 3:
                     break
@@ -330,12 +332,12 @@ class Numerical(GeneralKinematics):
         return dq
 
 
-def _turn(here: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, float, float]:
+def _turn(pose: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, float, float]:
     """Return the rotation vector [rad] from the first nine numbers of `here` to those of `goal`.
 
     Half the sum of x x x', y x y', z x z' is its axis times its sine.
     """
-    a, b, c, d, e, f, g, h, i, *_ = here
+    a, b, c, d, e, f, g, h, i, *_ = pose
     j, k, m, n, o, p, r, s, t, *_ = goal
     x = 0.5 * (b * m - c * k + e * p - f * o + h * t - i * s)
     y = 0.5 * (c * j - a * m + f * n - d * p + i * r - g * t)
@@ -343,7 +345,7 @@ def _turn(here: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, floa
     sine = math.sqrt(x * x + y * y + z * z)
     cosine = 0.5 * (a * j + b * k + c * m + d * n + e * o + f * p + g * r + h * s + i * t - 1.0)
     if cosine < -0.99:
-        first, second = (np.reshape(each[:9], (3, 3)).T for each in (here, goal))
+        first, second = (np.reshape(numbers[:9], (3, 3)).T for numbers in (pose, goal))
         w: list[float] = so3.log(second @ first.T).tolist()
         return w[0], w[1], w[2]
     factor = math.atan2(sine, cosine) / sine if sine > 1e-12 else 1.0

@@ -76,10 +76,10 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
         (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
         z = z - d1
-        beside = (c1 * z - height) / s1
-        up = c1 * beside + s1 * z
-        found = []
-        for c, s, ahead in turns(x, y, beside, free[0]):
+        offset = (c1 * z - height) / s1
+        up = c1 * offset + s1 * z
+        solutions = []
+        for c, s, length in turns(x, y, offset, free[0]):
             one = atan2(s, c)
             m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
             m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
@@ -88,7 +88,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
             first, second, radius = split(
                 (m11, m12, m13), (m21, m22, m23), (m31, m32, m33), free[5]
             )
-            u, v = ahead - a1, up
+            u, v = length - a1, up
             for psi, five, six, cp, sp in (first, second):
                 wx, wy = u - ex * cp + ey * sp, v - ex * sp - ey * cp
                 towards, opening, bend, square = bent(wx, wy)
@@ -102,8 +102,8 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
                         )
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
-                    found.append((one, two, flip2 * bend_, four, five, six))
-        return found
+                    solutions.append((one, two, flip2 * bend_, four, five, six))
+        return solutions
 
     return solve
 
@@ -179,23 +179,23 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
         (r11, _, r13, x), (r21, _, r23, y), (r31, _, _, z), _ = rows
         z = z - d1
-        beside = (c1 * z - height) / s1
-        up = c1 * beside + s1 * z
-        front, back = turns(x, y, beside, free[0])
+        offset = (c1 * z - height) / s1
+        up = c1 * offset + s1 * z
+        front, back = turns(x, y, offset, free[0])
         along = -flip * s1 * r23, flip * s1 * r13
         planes: Angles = (*front, *back)
         if f.is_scalar and front[2] <= near:
-            planes = _by_axes(*planes, x, y, beside, *along)
-        found = []
-        for c, s, ahead in (planes[:3], planes[3:]):
+            planes = _by_axes(*planes, x, y, offset, *along)
+        solutions = []
+        for c, s, outward in (planes[:3], planes[3:]):
             one = atan2(s, c)
             m11, m21 = c * r11 + s * r21, c1 * (c * r21 - s * r11) + s1 * r31
             psi = f.select(hypot(m11, m21) <= FREE, 0.0, atan2(m21, m11))
-            u, v = ahead - a1 - length * cos(psi), up - length * sin(psi)
+            u, v = outward - a1 - length * cos(psi), up - length * sin(psi)
             towards, opening, bend, _ = bent(u, v)
             for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
-                found.append((one, two, flip2 * bend_, flip * (psi - two - bend_)))
-        return found
+                solutions.append((one, two, flip2 * bend_, flip * (psi - two - bend_)))
+        return solutions
 
     return solve
 
@@ -205,12 +205,12 @@ def _by_axes(*numbers: float) -> tuple[float, ...]:
 
     numbers: the two turns, (cos, sin, x') each; x, y and height of the tool point; c and s.
     """
-    front, back, (x, y, beside, c, s) = numbers[:3], numbers[3:6], numbers[6:]
+    front, back, (x, y, offset, c, s) = numbers[:3], numbers[3:6], numbers[6:]
     size = math.hypot(c, s)
     if size <= FREE:
         return front + back
     c, s = c / size, s / size
-    if abs(c * y - s * x - beside) > AGREES:
+    if abs(c * y - s * x - offset) > AGREES:
         return front + back
     along = c, s, c * x + s * y
     if c * front[0] + s * front[1] >= c * back[0] + s * back[1]:

@@ -161,25 +161,25 @@ class PoseEquations:
         A = np.concatenate((turns @ J[:3], J[3:]))
         return A, np.concatenate((turns @ look.error[:3], look.error[3:])), look.matrix
 
-    def solved(self, q: FloatArray, given: Sequence[Jet], pose: ToolJets) -> JointJets:
+    def solved(self, q: FloatArray, locked_jets: Sequence[Jet], pose: ToolJets) -> JointJets:
         """Return the joints as jets at N places of a curve of poses, from angles `q` (N, n) [rad].
 
         ``given``: the locked joints. The angles may be off by little.
         """
         inverse = np.linalg.inv(self._matrix(q))
         zeros = np.zeros(len(q))
-        joints = [Jet(each, zeros, zeros, zeros) for each in q.T]
-        for k, each in zip(self.locked, given, strict=True):
-            joints[k] = each
+        joints = [Jet(jet, zeros, zeros, zeros) for jet in q.T]
+        for k, jet in zip(self.locked, locked_jets, strict=True):
+            joints[k] = jet
         for _ in range(PASSES if self.is_exact else LOOSE_PASSES):
             lacking = self._lacking(joints, pose)
             orders = [
                 np.stack([np.broadcast_to(row, zeros.shape) for row in rows], axis=1)
                 for rows in zip(*((e.c0, e.c1, e.c2, e.c3) for e in lacking), strict=True)
             ]
-            turns = [(inverse @ each[:, :, None])[:, :, 0] for each in orders]
+            turns = [(inverse @ order[:, :, None])[:, :, 0] for order in orders]
             for place, k in enumerate(self.free):
-                joints[k] = joints[k] + Jet(*(each[:, place] for each in turns))
+                joints[k] = joints[k] + Jet(*(turn[:, place] for turn in turns))
         return tuple(joints)
 
     def _lacking(self, q: Sequence[Jet], pose: ToolJets) -> list[Jet]:
@@ -207,7 +207,7 @@ class PoseEquations:
         `posture.point_by_exponentials`.
         """
         chain = self.chain
-        x, y, z = (Jet.constant(each) for each in chain.M[:3, 3].tolist())
+        x, y, z = (Jet.constant(number) for number in chain.M[:3, 3].tolist())
         moved: list[Vector] = [tuple(column) for column in chain.M[:3, :3].T.tolist()]
         for k in range(chain.n - 1, -1, -1):
             wx, wy, wz, vx, vy, vz = chain.S[:, k].tolist()
@@ -218,7 +218,7 @@ class PoseEquations:
             x = x + s * ax + versine * (wy * az - wz * ay)
             y = y + s * ay + versine * (wz * ax - wx * az)
             z = z + s * az + versine * (wx * ay - wy * ax)
-            moved = [_turned(each, w, s, versine) for each in moved]
+            moved = [_turned(column, w, s, versine) for column in moved]
             if chain.n < 6 and k in self._turning:
                 moved.append(w)
         return (x, y, z), moved[:3], moved[3:][::-1]  # type: ignore[return-value]

@@ -77,20 +77,20 @@ class PoseTracker:
 
         ``projected`` returns the projection of ``target`` that joint angles give.
         """
-        here, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
+        angles, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
         distance, angle = since.apart(target)
         count = max(1, math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH)))
         for number in range(1, count + 1):
             stop = target if number == count else since.towards(target, number / count)
-            before = here
-            here, effort, ended = self._advanced(here, place, stop, branch, priority, effort)
-            if number == 1 and not ended and self._is_led_along_edge(here, stop, priority):
-                kept = self._with_its_swivel(before, stop, branch)
-                here, ended = (here, False) if kept is None else (kept, True)
+            before = angles
+            angles, effort, ended = self._advanced(angles, place, stop, branch, priority, effort)
+            if number == 1 and not ended and self._is_led_along_edge(angles, stop, priority):
+                at_swivel = self._with_its_swivel(before, stop, branch)
+                angles, ended = (angles, False) if at_swivel is None else (at_swivel, True)
             if not ended or (effort <= 0 and number < count):
-                return Tracked(projected(np.array(here)), since=stop if ended else place)
+                return Tracked(projected(np.array(angles)), since=stop if ended else place)
             place = stop
-        goal = np.array(here)
+        goal = np.array(angles)
         beyond = self._beyond(goal, target, branch, priority)
         return Tracked(projected(goal), None if beyond is None else projected(beyond))
 
@@ -107,14 +107,14 @@ class PoseTracker:
         done, part = 0.0, 1.0
         while self.branches.is_exact and priority is Priority.POSE and done < 1.0 and effort > 0:
             place = stop if done + part >= 1.0 else start.towards(stop, done + part)
-            found = self._exact(place, branch, q)
+            angles = self._exact(place, branch, q)
             effort -= EFFORT_OF_FORM
-            if found is None or part < LEAST_PART:
+            if angles is None or part < LEAST_PART:
                 break
-            if max(abs(a - b) for a, b in zip(found, q, strict=True)) > HOP:
+            if max(abs(a - b) for a, b in zip(angles, q, strict=True)) > HOP:
                 part *= 0.5
                 continue
-            q, done = found, min(done + part, 1.0)
+            q, done = angles, min(done + part, 1.0)
             part = min(2.0 * part, 1.0 - done)
         if done >= 1.0:
             return q, effort, True
@@ -137,25 +137,25 @@ class PoseTracker:
 
         On the way every posture is inside the limits, clear of the edge, and a hop from the last.
         """
-        here = np.array(q)
+        near = np.array(q)
         number = self.branches.branches.index(branch)
 
         def on_branch(places: Sequence[ToolTarget]) -> FloatArray:
             T = np.array([place.T for place in places])
-            postures = self.branches.at_its_swivel(T, here)
+            postures = self.branches.at_its_swivel(T, near)
             assert postures is not None
             return postures[:, number]
 
         if not self._takes(stop, on_branch([stop])[0]):
             return None
-        start = ToolTarget.of(forward(self.chain, here))
+        start = ToolTarget.of(forward(self.chain, near))
         places = [
             *(start.towards(stop, k / SWIVEL_SAMPLES) for k in range(1, SWIVEL_SAMPLES)),
             stop,
         ]
-        steps = np.diff(on_branch(places), axis=0, prepend=here[None])
+        steps = np.diff(on_branch(places), axis=0, prepend=near[None])
         steps -= math.tau * np.round(steps / math.tau)
-        postures = here + np.cumsum(steps, axis=0)
+        postures = near + np.cumsum(steps, axis=0)
         leads = np.abs(steps).max() <= HOP and all(map(self._takes, places, postures))
         return tuple(self.chain.clamp(postures[-1]).tolist()) if leads else None
 
@@ -172,10 +172,10 @@ class PoseTracker:
     def _exact(self, place: ToolTarget, branch: str, q: Angles) -> Angles | None:
         """Return the posture of ``branch`` at ``place`` inside the limits; None without one."""
         near = np.array(q)
-        found = self.branches.on_branch(place.T, branch, near)
-        if found is None or not self.chain.within_limits(found):
+        posture = self.branches.on_branch(place.T, branch, near)
+        if posture is None or not self.chain.within_limits(posture):
             return None
-        angles = tuple(self.chain.clamp(found).tolist())
+        angles = tuple(self.chain.clamp(posture).tolist())
         now = self.descent.search.step(self.descent.goal(place), angles)
         return angles if now.square <= EXACT * EXACT else None
 
@@ -187,10 +187,10 @@ class PoseTracker:
         misses = self.descent.misses(self.descent.look(goal, tuple(q.tolist())), priority)
         if max(misses) <= MIN_LEAP_GAIN or self.chain.n < 6:
             return None
-        ahead = self.branches.on_branch(target.T, branch, q)
-        if ahead is None or not self.chain.within_limits(ahead):
+        posture = self.branches.on_branch(target.T, branch, q)
+        if posture is None or not self.chain.within_limits(posture):
             return None
-        ahead = self.chain.clamp(ahead)
-        after = self.descent.look(goal, tuple(ahead.tolist()))
+        posture = self.chain.clamp(posture)
+        after = self.descent.look(goal, tuple(posture.tolist()))
         exact = max(map(abs, after.error.tolist())) <= math.sqrt(tolerances.SAME_POSITION)
-        return ahead if exact else None
+        return posture if exact else None

@@ -72,13 +72,13 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
     def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
         (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
         z = z - d1
-        beside = (c1 * z - height) / s1
-        up = c1 * beside + s1 * z
+        side = (c1 * z - height) / s1
+        up = c1 * side + s1 * z
         free4 = free[3]
-        found = []
-        for c, s, ahead in turns(x, y, beside, free[0]):
+        solutions = []
+        for c, s, length in turns(x, y, side, free[0]):
             one = atan2(s, c)
-            towards, opening, bend, _ = bent(ahead - a1, up)
+            towards, opening, bend, _ = bent(length - a1, up)
             m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
             m31, m32, m33 = c * r21 - s * r11, c * r22 - s * r12, c * r23 - s * r13
             m21, m22, m23 = c1 * m31 + s1 * r31, c1 * m32 + s1 * r32, c1 * m33 + s1 * r33
@@ -95,9 +95,9 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
                     free4,
                 )
                 three = flip * bend_ - bearing
-                found.append((one, two, three, first[0], first[1], first[2]))
-                found.append((one, two, three, second[0], second[1], second[2]))
-        return found
+                solutions.append((one, two, three, first[0], first[1], first[2]))
+                solutions.append((one, two, three, second[0], second[1], second[2]))
+        return solutions
 
     return solve
 
@@ -134,7 +134,7 @@ def crossing_shoulder(
         opening = 2.0 * atan2(root(amplitude - excess), root(amplitude + excess))
         heading, on_axis = atan2(y, x), radius <= FREE
         free1, free2, free4 = free[0], free[1], free[3]
-        found = []
+        solutions = []
         for three in (middle + opening, middle - opening):
             ct, st = cos(three), sin(three)
             px, py = cx * ct - cy * st, cx * st + cy * ct
@@ -143,17 +143,17 @@ def crossing_shoulder(
             vz = g31 * px + g32 * py + g33 * cz + gz
             rho = hypot(vx, vy)
             level = (z - c1 * vz) / s1
-            beside = c1 * level - s1 * vz
+            offset = c1 * level - s1 * vz
             # Both are the same number; the smaller radius keeps more of its digits.
-            ahead = select(
+            length = select(
                 rho < radius,
                 root((rho - level) * (rho + level)),
-                root((radius - beside) * (radius + beside)),
+                root((radius - offset) * (radius + offset)),
             )
             bearing, beside_axis = atan2(vy, vx), rho > FREE
-            for side in (ahead, -ahead):
+            for side in (length, -length):
                 two = select(beside_axis, atan2(level, side) - bearing, free2)
-                one = select(on_axis, free1, heading - atan2(beside, side))
+                one = select(on_axis, free1, heading - atan2(offset, side))
                 c, s = cos(one), sin(one)
                 cb, sb = cos(two), sin(two)
                 q = []
@@ -169,8 +169,8 @@ def crossing_shoulder(
                 (q11, q21, q31), (q12, q22, q32), (q13, q23, q33) = q
                 wrist = split((q11, q12, q13), (q21, q22, q23), (q31, q32, q33), free4)
                 for a, b, c6, _, _ in wrist[:2]:
-                    found.append((one, two, three, a, b, c6))
-        return found
+                    solutions.append((one, two, three, a, b, c6))
+        return solutions
 
     return solve
 

@@ -106,11 +106,11 @@ class SevenAxes(GeneralKinematics):
     @staticmethod
     def of(chain: Chain, links: DHLinks) -> SevenAxes | str:
         """Return the closed form of `chain`, or the conditions that it misses."""
-        seen = ((links, False), (links_of(reversed_chain(chain)), True))
+        views = ((links, False), (links_of(reversed_chain(chain)), True))
         for locked, can_lock in ((2, _locks_third), (0, _locks_first)):
-            for each, is_reversed in seen:
-                if can_lock(each):
-                    return SevenAxes(chain, each, locked, is_reversed)
+            for view, is_reversed in views:
+                if can_lock(view):
+                    return SevenAxes(chain, view, locked, is_reversed)
         return (
             "whichever joint is locked, the other six do not have three axes at one end that meet "
             "in one point, and beside these two that meet or are parallel"
@@ -164,10 +164,10 @@ class SevenAxes(GeneralKinematics):
                 form = parallel_shoulder if is_parallel_shoulder(six) else crossing_shoulder
                 solve, places = form(six, ARRAYS), (1, 2, 3, 4, 5, 6)
                 columns = _after_first(links, rows, alpha)
-            found = solve(columns, six.shift)
+            solutions = solve(columns, six.shift)
         q = np.empty((len(swivels), 8, 7))
         q[:, :, self.locked] = swivels[:, None]
-        for k, angles in enumerate(found):
+        for k, angles in enumerate(solutions):
             for place, angle in zip(places, angles, strict=True):
                 q[:, k, place] = angle - links.shift[place]
         return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
@@ -202,8 +202,8 @@ class SevenAxes(GeneralKinematics):
         swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
-            beside = self._search.solve(T, hint, seeds=0)
-            ends = [hint[self.swivel], beside[self.swivel]]
+            neighbour = self._search.solve(T, hint, seeds=0)
+            ends = [hint[self.swivel], neighbour[self.swivel]]
             swivels = np.append(swivels, np.clip(ends, low, high))
         q = self.at_swivels(T, swivels)
         cost = self._cost(q, T, hint)

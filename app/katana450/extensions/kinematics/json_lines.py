@@ -49,8 +49,8 @@ def _check_numbers(value: Any, place: str, depth: int) -> None:
         if not isinstance(value, list):
             what = "numbers" if depth == 1 else "rows"
             raise InputError(f"{place} is {shown(value)}; it must be a list of {what}.")
-        for k, each in enumerate(value):
-            _check_numbers(each, f"{place}[{k}]", depth - 1)
+        for k, entry in enumerate(value):
+            _check_numbers(entry, f"{place}[{k}]", depth - 1)
         if depth == 2 and len({len(row) for row in value}) > 1:
             raise InputError(f"The rows of {place} have different lengths; its shape must be 4x4.")
     elif isinstance(value, bool) or not isinstance(value, int | float):
@@ -102,30 +102,30 @@ def requested_pose(
 def _requested(
     request: Mapping[str, Any], chain: Chain, T_frame_shoulder: FloatArray
 ) -> RequestedPose:
-    given = [key for key in ("T", *QUATERNIONS, "rpy", "pitch", "roll") if key in request]
-    if given == ["T"] and "p" not in request:
+    orientation = [key for key in ("T", *QUATERNIONS, "rpy", "pitch", "roll") if key in request]
+    if orientation == ["T"] and "p" not in request:
         T = numbers(request, "T", 2)
         pose = se3.validated(T, "T")
         misfit = so3.misfit(np.array(T)[:3, :3])
         return RequestedPose(se3.inverse(T_frame_shoulder) @ pose, misfit)
-    if not given and "p" not in request:
+    if not orientation and "p" not in request:
         raise InputError("The key 'T' is missing, or 'p' with an orientation.")
-    if given not in (["wxyz"], ["xyzw"], ["rpy"], ["pitch", "roll"]) or "p" not in request:
+    if orientation not in (["wxyz"], ["xyzw"], ["rpy"], ["pitch", "roll"]) or "p" not in request:
         raise InputError(
             "A pose is T, or p with one orientation: wxyz, xyzw, rpy, or both pitch and roll; "
             f"this has {', '.join(sorted(KEYS & set(request)))}."
         )
     p = finite_array(numbers(request, "p", 1), (3,), "p")
-    if given == ["pitch", "roll"]:
-        pitch, roll = (float(numbers(request, key, 0)) for key in given)
+    if orientation == ["pitch", "roll"]:
+        pitch, roll = (float(numbers(request, key, 0)) for key in orientation)
         if not (math.isfinite(pitch) and math.isfinite(roll)):
             raise InputError("pitch and roll must be finite numbers.")
         check_radians((pitch, roll), "The pose")
         position = (se3.inverse(T_frame_shoulder) @ np.append(p, 1.0))[:3]
         target = ToolTarget(position, pitch, roll)
-        poses = [target.pose(chain, target.facing(chain, each, 0.0)) for each in BRANCHES[::2]]
+        poses = [target.pose(chain, target.facing(chain, branch, 0.0)) for branch in BRANCHES[::2]]
         return RequestedPose(min(poses, key=lambda T: _misses(chain, T)), 0.0)
-    R, misfit = _rotation(request, given[0])
+    R, misfit = _rotation(request, orientation[0])
     T = se3.from_rotation_translation(R, p)
     return RequestedPose(se3.inverse(T_frame_shoulder) @ T, misfit)
 
@@ -219,13 +219,15 @@ class JsonKinematics:
         kinematics = kinematics_of(chain)
         hint = chain.check_q(numbers(request, "q", 1)) if "q" in request else None
         T, misfit = requested_pose(request, chain, self._T_frame_shoulder)
-        solutions = [each for each in kinematics.inverse(T, hint) if each.exact]
+        solutions = [candidate for candidate in kinematics.inverse(T, hint) if candidate.exact]
         if not solutions:
             best = nearest_pose(
                 kinematics, T, priority=self._priority, q_hint=hint, within_limits=False
             )
             # If the axes do not cross, some branches do not reach every pose.
-            solutions = [each for each in kinematics.inverse(best.T, best.q) if each.exact]
+            solutions = [
+                candidate for candidate in kinematics.inverse(best.T, best.q) if candidate.exact
+            ]
         reached = [forward(chain, solution.q) for solution in solutions]
         answer = {
             "solutions": [

@@ -76,7 +76,7 @@ class VoxelGrid:
 
     def chunks(self, length: int) -> list[range]:
         """Return all flat indices in their order, in ranges of ``length``."""
-        return [range(len(self))[at : at + length] for at in range(0, len(self), length)]
+        return [range(len(self))[start : start + length] for start in range(0, len(self), length)]
 
     def centers(self, indices: npt.ArrayLike) -> FloatArray:
         """Return the centres (N, 3) of the voxels ``indices`` (N,), in the base frame [m]."""
@@ -136,15 +136,15 @@ class Survey:
 
     def map(self, counts: Iterable[IntArray]) -> ReachabilityMap:
         """Return the map from the counts of all chunks in their order."""
-        found = np.concatenate(list(counts))
+        totals = np.concatenate(list(counts))
         at_home = None
-        if found.ndim == 2:
-            found, home = found.T
-            at_home = home[found > 0] > 0
-        reached = np.flatnonzero(found)
+        if totals.ndim == 2:
+            totals, home = totals.T
+            at_home = home[totals > 0] > 0
+        reached = np.flatnonzero(totals)
         return ReachabilityMap(
             points=self.grid.centers(reached),
-            fraction=found[reached] / self.reachability.orientations,
+            fraction=totals[reached] / self.reachability.orientations,
             at_home=at_home,
         )
 

@@ -116,29 +116,29 @@ class PoseSolver:
         low, high = self.chain.lower[solver.swivel], self.chain.upper[solver.swivel]
         step = (high - low) / SWIVELS
         swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
-        taken = np.zeros(len(T), dtype=np.bool)
+        is_taken = np.zeros(len(T), dtype=np.bool)
         # Those in the middle take the most poses, which the others need not try.
         for swivel in swivels[np.argsort(np.abs(swivels - 0.5 * (low + high)), kind="stable")]:
-            left = np.flatnonzero(~taken)
+            left = np.flatnonzero(~is_taken)
             q = solver.at_swivels(T[left], np.full(len(left), swivel))
-            taken[left] = self._exact(q, T[left])
-        return taken
+            is_taken[left] = self._exact(q, T[left])
+        return is_taken
 
     def _searched(self, solver: Numerical, T: FloatArray) -> BoolArray:
-        taken = np.zeros(len(T), dtype=np.bool)
+        is_taken = np.zeros(len(T), dtype=np.bool)
         hint = None
         for number, pose in enumerate(T):
             q = np.array(solver.solve(pose, hint, SEEDS))
-            taken[number] = self._exact(q[None, None], pose[None])[0]
+            is_taken[number] = self._exact(q[None, None], pose[None])[0]
             # The next pose is often near this one.
-            hint = q if taken[number] else None
-        return taken
+            hint = q if is_taken[number] else None
+        return is_taken
 
     def _exact(self, q: FloatArray, T: FloatArray) -> BoolArray:
         """Return (N,) whether one of `q` (N, k, n) is inside the limits and takes `T` (N, 4, 4)."""
-        taken = np.zeros(len(T), dtype=np.bool)
-        taken[self.exact(q, T)[0]] = True
-        return taken
+        is_taken = np.zeros(len(T), dtype=np.bool)
+        is_taken[self.exact(q, T)[0]] = True
+        return is_taken
 
     def exact(
         self, q: FloatArray, T: FloatArray, axes: int | None = None
@@ -195,15 +195,15 @@ class PitchesAndRolls:
         arm = arm_of(self.solver.chain)
         p_C = p @ arm.T_C_S[:3, :3].T + arm.T_C_S[:3, 3]
         possible = np.zeros((len(p) * self.pitches, self.rolls), dtype=np.bool)
-        beside = arm.off_axis > 0.0
-        for roll in range(self.rolls if beside else 1):
+        has_offset = arm.off_axis > 0.0
+        for roll in range(self.rolls if has_offset else 1):
             # The rolls that a posture can take: all of them, or only the one that it is for.
-            rolls = slice(roll, roll + 1) if beside else slice(None)
+            rolls = slice(roll, roll + 1) if has_offset else slice(None)
             for poses in self._tool_poses(p_C, roll):
                 T = poses.reshape(-1, 4, 4)
                 q = self.solver.solver.inverse_batch(T)
                 pose, branch = self.solver.exact(q, T, axes=4)
-                rollable = self._rollable(q[pose, branch, 4])[:, : 1 if beside else None]
+                rollable = self._rollable(q[pose, branch, 4])[:, : 1 if has_offset else None]
                 for number in range(q.shape[1]):
                     on_branch = branch == number
                     possible[pose[on_branch], rolls] |= rollable[on_branch]
@@ -231,8 +231,8 @@ class PitchesAndRolls:
             outward = turn * np.sqrt(np.maximum(rho**2 - lateral**2, 0.0))
             alpha1 = bearing - np.arctan2(lateral, outward)
             c, s = turn * np.cos(alpha1), turn * np.sin(alpha1)
-            beside = np.stack((c * out - s * side, s * out + c * side, up + 0.0 * c), axis=-1)
-            T_C_K = _roll_frames(p[:, None, :] - beside, c, s, phi)
+            offset = np.stack((c * out - s * side, s * out + c * side, up + 0.0 * c), axis=-1)
+            T_C_K = _roll_frames(p[:, None, :] - offset, c, s, phi)
             yield T_S_C @ T_C_K @ roll_K @ arm.T_K_tool
 
     def _rollable(self, theta5: FloatArray) -> BoolArray:
@@ -363,18 +363,18 @@ class PlaneDirections:
         outward = np.cross(up, across)
         # A turn about axis 4 adds to an angle in this plane.
         plane = np.stack((outward, np.cross(across, outward)))
-        seen = plane @ chain.M[:3, :3]
+        axes = plane @ chain.M[:3, :3]
         # The axis of the tool that lies in the plane; of two the first.
-        axis = int(np.round(np.linalg.norm(seen, axis=0), 6).argmax())
-        start = math.atan2(seen[1, axis], seen[0, axis])
+        axis = int(np.round(np.linalg.norm(axes, axis=0), 6).argmax())
+        start = math.atan2(axes[1, axis], axes[0, axis])
         T = forward(chain, home)
         at_home = plane @ so3.exp(-float(home[0]) * up) @ T[:3, axis]
-        there = math.atan2(at_home[1], at_home[0])
+        home_angle = math.atan2(at_home[1], at_home[0])
         away = np.array(form.solve(T, home.tolist())) - home
         away -= math.tau * np.round(away / math.tau)
         if int(np.abs(away).max(axis=1).argmin()) >= FACING:
-            there = math.pi - there
-        angles = np.append(np.linspace(0.0, math.tau, steps, endpoint=False), there)
+            home_angle = math.pi - home_angle
+        angles = np.append(np.linspace(0.0, math.tau, steps, endpoint=False), home_angle)
         # Seen from the back of the arm, outward is opposite.
         return cls(form, solver, np.stack((angles - start, math.pi - angles - start)))
 
@@ -397,13 +397,13 @@ class PlaneDirections:
         T[:, 0, :3, :3] = chain.M[:3, :3]
         # The point alone decides axis 1, apart from the side that faces it.
         pans = self.form.solve_batch(T[:, 0])[:, ::FACING, 0]
-        found = np.zeros((len(p), count), dtype=np.bool)
+        possible = np.zeros((len(p), count), dtype=np.bool)
         for pan, turns in zip(pans.T, self.turns, strict=True):
             turned = np.array([so3.exp(turn * chain.S[:3, 3]) for turn in turns])
             panned = np.array([so3.exp(angle * chain.S[:3, 0]) for angle in pan]).reshape(-1, 3, 3)
             T[..., :3, :3] = panned[:, None] @ (turned @ chain.M[:3, :3])
-            found |= self.solver.taken(T.reshape(-1, 4, 4)).reshape(len(p), count)
-        return found
+            possible |= self.solver.taken(T.reshape(-1, 4, 4)).reshape(len(p), count)
+        return possible
 
 
 POSES_OF_SEARCH: Final = 64
@@ -555,11 +555,11 @@ def rotations(directions: int, rolls: int) -> FloatArray:
     across = np.sqrt(1.0 - heights * heights)
     azimuth = GOLDEN * np.arange(directions)
     z = np.stack((across * np.cos(azimuth), across * np.sin(azimuth), heights), axis=1)
-    found = []
+    matrices = []
     for direction in z:
         other = np.eye(3)[int(np.abs(direction).argmin())]
         x = np.cross(other, direction)
         x /= np.linalg.norm(x)
         R = np.column_stack((x, np.cross(direction, x), direction))
-        found += [R @ so3.rotation_z(math.tau * roll / rolls) for roll in range(rolls)]
-    return np.array(found)
+        matrices += [R @ so3.rotation_z(math.tau * roll / rolls) for roll in range(rolls)]
+    return np.array(matrices)

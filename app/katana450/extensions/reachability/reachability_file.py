@@ -58,17 +58,17 @@ class StoredMap:
 
 
 def write_npz(
-    file: BinaryIO, survey: Survey, found: ReachabilityMap, robot: str, tool: str
+    file: BinaryIO, survey: Survey, reach_map: ReachabilityMap, robot: str, tool: str
 ) -> None:
     """Write the map; the same map gives the same bytes."""
     reachability = survey.reachability
     np.savez_compressed(
         file,
         allow_pickle=False,
-        **({} if found.at_home is None else {"at_home": found.at_home}),
+        **({} if reach_map.at_home is None else {"at_home": reach_map.at_home}),
         format=np.array(FORMAT),
-        points=found.points,
-        fraction=found.fraction,
+        points=reach_map.points,
+        fraction=reach_map.fraction,
         voxel=np.array(survey.voxel),
         table=np.array(reachability.table),
         pitches=np.array(reachability.pitches),

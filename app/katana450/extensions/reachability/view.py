@@ -119,7 +119,7 @@ class ReachabilityCloud:
     def legend(self) -> str:
         """The legend as HTML: a colour scale, with labels at its ends."""
         top = self._stored.fraction.max(initial=0.0)
-        tried = "orientations" if self.tells_home else "pitches and rolls"
+        choices = "orientations" if self.tells_home else "pitches and rolls"
         stops = ", ".join(
             f"rgb({red}, {green}, {blue})"
             for red, green, blue in fraction_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
@@ -128,7 +128,7 @@ class ReachabilityCloud:
             "<div class='k450'><p class='scale'>"
             f"How freely {escape(self._stored.tool)} can be turned there"
             f"<i style='background: linear-gradient(to right, {stops})'></i>"
-            f"0 %<span>{100.0 * top:.0f} % of all {tried}</span></p></div>"
+            f"0 %<span>{100.0 * top:.0f} % of all {choices}</span></p></div>"
         )
 
     @property

@@ -49,10 +49,10 @@ def workspace(options: argparse.Namespace) -> int:
             options.rolls,
         ),
     )
-    found = survey.map(_counts(survey))
+    reach_map = survey.map(_counts(survey))
     if out is not None:
-        write_files({out: lambda file: write_npz(file, survey, found, robot.name, tool)})
-    print(_summary(survey, found, tool))
+        write_files({out: lambda file: write_npz(file, survey, reach_map, robot.name, tool)})
+    print(_summary(survey, reach_map, tool))
     if out is not None:
         print(f"Written: {out}")
     return 0
@@ -81,29 +81,29 @@ def _ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _summary(survey: Survey, found: ReachabilityMap, tool: str) -> str:
+def _summary(survey: Survey, reach_map: ReachabilityMap, tool: str) -> str:
     reachability = survey.reachability
-    if not len(found.points):
+    if not len(reach_map.points):
         return f"The tool {tool} reaches no voxel. Choose smaller voxels or a lower table."
-    litres = 1e3 * len(found.points) * survey.voxel**3
-    low, high = (1e3 * edge(found.points, axis=0) for edge in (np.min, np.max))
+    litres = 1e3 * len(reach_map.points) * survey.voxel**3
+    low, high = (1e3 * edge(reach_map.points, axis=0) for edge in (np.min, np.max))
     extent = ", ".join(
         f"{name} {a:.0f} … {b:.0f}" for name, a, b in zip("xyz", low, high, strict=True)
     )
-    best = found.points[int(np.argmax(found.fraction))]
+    best = reach_map.points[int(np.argmax(reach_map.fraction))]
     where = ", ".join(f"{1e3 * value:.0f}" for value in best)
     reached = (
-        f"The tool {tool} reaches {len(found.points)} voxels of {1e3 * survey.voxel:g} mm, "
+        f"The tool {tool} reaches {len(reach_map.points)} voxels of {1e3 * survey.voxel:g} mm, "
         f"{litres:.1f} litres above the table at {1e3 * reachability.table:g} mm:\n"
         f"{extent} mm in the base frame."
     )
     if reachability.orientations == 1:
         return f"{reached}\nThe arm cannot choose its orientation there, so it is not mapped."
-    if found.at_home is not None:
-        fraction = found.at_home.mean()
+    if reach_map.at_home is not None:
+        fraction = reach_map.at_home.mean()
         reached += f"\nIn {fraction:.1%} of them it can have the orientation that it has at Home."
     return (
         f"{reached}\n"
-        f"Of {reachability.orientations} orientations {found.fraction.mean():.1%} on average, "
-        f"up to {found.fraction.max():.1%} at {where} mm."
+        f"Of {reachability.orientations} orientations {reach_map.fraction.mean():.1%} on average, "
+        f"up to {reach_map.fraction.max():.1%} at {where} mm."
     )

@@ -181,8 +181,8 @@ def arm_of(chain: Chain) -> FiveAxisArm:
 
     along = T_C_S[:3, :3] @ omega[4]
     along = np.array([along[0], 0.0, along[2]]) / math.hypot(along[0], along[2])
-    ahead = float(along @ (tool - wrist))
-    sign5 = -1.0 if ahead < -tolerances.FAMILY_LENGTH else 1.0
+    tool_length = float(along @ (tool - wrist))
+    sign5 = -1.0 if tool_length < -tolerances.FAMILY_LENGTH else 1.0
     x_K = sign5 * along
     foot = roll + (along @ (tool - roll)) * along
     off_axis = float(np.linalg.norm(tool - foot))

@@ -138,21 +138,21 @@ class CanonicalTarget(NamedTuple):
     ) -> CanonicalTarget:
         """Return the target of five freedoms: `tool` point, pitch and roll in the arm's plane."""
         orientation = PlaneOrientation.turned(pitch, roll)
-        beside = arm.beside(pitch, roll)
-        return CanonicalTarget(*tool, beside, tool, None, orientation, priority)
+        offset = arm.beside(pitch, roll)
+        return CanonicalTarget(*tool, offset, tool, None, orientation, priority)
 
     def seen_from(self, theta1: float) -> PlaneOrientation:
         """Return the target orientation in the plane at `theta1`."""
         if self.along is None:
             return self.orientation
-        seen = self.orientation.seen_from(theta1)
+        orientation = self.orientation.seen_from(theta1)
         if self.priority is Priority.POSE:
-            return seen
+            return orientation
         pitch = self.pitch(theta1)
-        if seen.overlap(pitch) <= tolerances.TOUCHING:
+        if orientation.overlap(pitch) <= tolerances.TOUCHING:
             # Half a turn away every roll is equally near: keep the roll of the target.
-            seen = self.orientation.seen_from(theta1 + math.pi)
-        return PlaneOrientation.turned(pitch, seen.best_roll(pitch))
+            orientation = self.orientation.seen_from(theta1 + math.pi)
+        return PlaneOrientation.turned(pitch, orientation.best_roll(pitch))
 
     def heading(self, theta1: float) -> Vector:
         """Return the target's roll axis in the plane at `theta1`: outward, sideways, down."""

@@ -67,7 +67,7 @@ def closed_form(arm: FiveAxisArm, functions: Functions) -> Callable[..., Posture
     a, tilt, mirrored = arm.a, arm.tilt, arm.is_mirrored
     far, near = arm.l1 + arm.l2, abs(arm.l1 - arm.l2)
     squares = (arm.l1 - arm.l2) * far
-    ahead, below = arm.l3 * math.cos(tilt), arm.l3 * math.sin(tilt)
+    along, below = arm.l3 * math.cos(tilt), arm.l3 * math.sin(tilt)
 
     def posture(c: Number, s: Number, u: Number, rows: Sequence[Sequence[Number]]) -> Posture:
         (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, z), _ = rows
@@ -76,9 +76,9 @@ def closed_form(arm: FiveAxisArm, functions: Functions) -> Callable[..., Posture
         roll = atan2(sp * (c * r12 + s * r22) + cp * r32, sp * (c * r13 + s * r23) + cp * r33)
         # The wrist from the shoulder.
         if mirrored:
-            u, v, phi = u - ahead * cp, -z - ahead * sp, pitch
+            u, v, phi = u - along * cp, -z - along * sp, pitch
         else:
-            u, v = u - a - ahead * cp + below * sp, -z - ahead * sp - below * cp
+            u, v = u - a - along * cp + below * sp, -z - along * sp - below * cp
             phi = pitch + tilt
         square = u * u + v * v
         rho = sqrt(square)
@@ -87,8 +87,8 @@ def closed_form(arm: FiveAxisArm, functions: Functions) -> Callable[..., Posture
         sine = root(stretched * folded)
         towards = atan2(v, u)
         # The angle between the upper arm and the line from shoulder to wrist.
-        beside = atan2(sine, square + squares)
+        wrist_angle = atan2(sine, square + squares)
         bend = atan2(2.0 * sine, folded - stretched)
-        return phi, towards - beside, towards + beside, bend, roll
+        return phi, towards - wrist_angle, towards + wrist_angle, bend, roll
 
     return posture

@@ -44,14 +44,14 @@ def exact_member(chain: Chain, up: FloatArray) -> tuple[Chain, list[str]]:
         T_S_C[:3, :3] = _turn(z, math.copysign(1.0, float(z @ up)) * up) @ T_S_C[:3, :3]
     exact = _exact(chain, arm, T_S_C)
     moved, turned = _change(chain, exact)
-    beside = (
+    offset = (
         f", the tool point is {1e3 * arm.gap:.2g} mm beside the roll axis"
         if arm.gap > tolerances.FAMILY_EXACT
         else ""
     )
     note = (
         "Axes deviate from perpendicular, parallel or upright by up to "
-        f"{math.degrees(off):.2g} deg{beside}. This is treated as rounding: the exact arm is used, "
+        f"{math.degrees(off):.2g} deg{offset}. This is treated as rounding: the exact arm is used, "
         f"whose tool differs by at most about {1e3 * moved:.1g} mm and "
         f"{math.degrees(turned):.1g} deg."
     )
@@ -75,8 +75,8 @@ def _exact(chain: Chain, arm: FiveAxisArm, T_S_C: FloatArray) -> Chain:
     home = arm.T_C_S @ chain.M
     # The tool keeps its bearing to the roll axis.
     R_C_tool = _turn(arm.T_C_S[:3, :3] @ chain.S[:3, 4], roll) @ home[:3, :3]
-    at = foot + R_C_K @ arm.T_K_tool[:3, 3]
-    M = T_S_C @ se3.from_rotation_translation(R_C_tool, at)
+    tool_point = foot + R_C_K @ arm.T_K_tool[:3, 3]
+    M = T_S_C @ se3.from_rotation_translation(R_C_tool, tool_point)
     S = screws.moved(T_S_C, np.column_stack(S_C))
     return dataclasses.replace(chain, M=M, S=S)
 

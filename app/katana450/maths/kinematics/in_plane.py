@@ -173,14 +173,14 @@ def _best_at(planar: PlanarArm, u: float, v: float, target: PlanarTarget) -> InP
     free_roll = roll.fit(psi)
     if posture is not None and free_roll is not None:
         return InPlane(posture, free_roll, wanted.angle(phi, psi), False, False)
-    found: list[InPlane] = []
+    candidates: list[InPlane] = []
     for end in roll.ends:
         posture = planar.at(u, v, wanted.best_pitch(end))
         if posture is not None:
-            found.append(InPlane(posture, end, wanted.angle(posture.phi, end), False, True))
+            candidates.append(InPlane(posture, end, wanted.angle(posture.phi, end), False, True))
     for posture in planar.pitch_ends(u, v):
-        found.extend(_rolled(posture, target, bound=True))
-    return _chosen(found, hint) if found else None
+        candidates.extend(_rolled(posture, target, bound=True))
+    return _chosen(candidates, hint) if candidates else None
 
 
 def _with_roll(posture: Posture, target: PlanarTarget, *, bound: bool) -> InPlane:
@@ -198,8 +198,8 @@ def _rolled(posture: Posture, target: PlanarTarget, *, bound: bool) -> list[InPl
     ]
 
 
-def _chosen(found: list[InPlane], roll_hint: float | None) -> InPlane:
+def _chosen(candidates: list[InPlane], roll_hint: float | None) -> InPlane:
     """Return the solution with the smallest error, and of equal ones that nearest to the hint."""
-    minimum = min(each.rotation_error for each in found) + tolerances.SAME_ROTATION
-    equal = [each for each in found if each.rotation_error <= minimum]
+    minimum = min(candidate.rotation_error for candidate in candidates) + tolerances.SAME_ROTATION
+    equal = [candidate for candidate in candidates if candidate.rotation_error <= minimum]
     return equal[0] if roll_hint is None else min(equal, key=lambda e: abs(e.psi - roll_hint))

@@ -36,7 +36,7 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike) -> FloatArray:
     Raises InputError for the first invalid pose, RobotDescriptionError for an arm outside the
     family.
     """
-    made = _arm(chain)
+    form = _arm(chain)
     T = number_array(T, (4, 4), "The poses")
     q = np.empty((len(T), 4, 5))
     # One block of memory: malloc reuses a block of the same size, so no page is cleared again.
@@ -47,7 +47,7 @@ def inverse_batch(chain: Chain, T: npt.ArrayLike) -> FloatArray:
             canonical, angles = _arrays(work, rows.stop - rows.start)
             np.copyto(canonical, T[rows].transpose(1, 2, 0))
             _validate(canonical, rows.start, angles.reshape(20, -1))
-            _solve(made, canonical, angles, q[rows])
+            _solve(form, canonical, angles, q[rows])
     return q
 
 
@@ -154,12 +154,12 @@ def _arm(chain: Chain) -> _Arm:
     return _Arm(chain, solver, closed_form(arm, _ARRAYS), bool(is_turned))
 
 
-def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None:
+def _solve(form: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None:
     """Fill `q` (C, 4, 5) for the poses `T` (4, 4, C).
 
     `angles` (2, 2, 5, C) is scratch memory.
     """
-    solver, arm = made.solver, made.solver.arm
+    solver, arm = form.solver, form.solver.arm
     rows = T
     if not arm.is_canonical:
         # T_C_S T T_tool_K, the last product row by row.
@@ -168,20 +168,20 @@ def _solve(made: _Arm, T: FloatArray, angles: FloatArray, q: FloatArray) -> None
     rho = np.sqrt(x * x + y * y)
     r = np.sqrt((rho - arm.d) * (rho + arm.d)) if arm.d else rho
     # Both comparisons are false for an overflow and inside the cylinder of radius d.
-    beside = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
-    _canonical(made, rows, rho, r, angles)
+    near_axis = ~((r >= tolerances.NEAR_AXIS_1 * arm.reach) & (r < np.inf))
+    _canonical(form, rows, rho, r, angles)
     q[...] = angles.reshape(4, 5, -1).transpose(2, 0, 1)
-    if made.is_turned:
-        q[...] = in_limits_turns(made.chain, (q - arm.shifts) * arm.signs)
-    for i in beside.nonzero()[0]:
+    if form.is_turned:
+        q[...] = in_limits_turns(form.chain, (q - arm.shifts) * arm.signs)
+    for i in near_axis.nonzero()[0]:
         q[i] = solver.solve(T[:, :, i].tolist())
 
 
 def _canonical(
-    made: _Arm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
+    form: _Arm, rows: FloatArray, rho: FloatArray, r: FloatArray, alpha: FloatArray
 ) -> None:
     """Fill `alpha` (2, 2, 5, C) (shoulder, elbow, joint) in [-pi, pi], for poses off axis 1."""
-    posture, arm = made.posture, made.solver.arm
+    posture, arm = form.posture, form.solver.arm
     x, y = rows[0, 3], rows[1, 3]
 
     def fill_shoulder(side: FloatArray, c: FloatArray, s: FloatArray, u: FloatArray) -> None:

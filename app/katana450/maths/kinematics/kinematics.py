@@ -48,7 +48,7 @@ class Kinematics(Protocol):
 
 def inverse_one_by_one(kinematics: Kinematics, T: npt.ArrayLike) -> FloatArray:
     """Return `Kinematics.inverse_batch` of a method that solves one pose at a time."""
-    q = [[each.q for each in kinematics.inverse(pose)] for pose in validated_poses(T)]
+    q = [[solution.q for solution in kinematics.inverse(pose)] for pose in validated_poses(T)]
     return np.array(q).reshape(len(q), len(kinematics.branches), kinematics.chain.n)
 
 

@@ -58,23 +58,23 @@ class LimitedArm:
             return [(branch, arm) for arm in self._pieces(branch)]
         _, _, theta3, _, _ = self.limits
         return [
-            (each, arm)
-            for each in BRANCHES
-            if _bends(theta3, _bend(each))
-            for arm in self._pieces(each)
+            (candidate, arm)
+            for candidate in BRANCHES
+            if _bends(theta3, _bend(candidate))
+            for arm in self._pieces(candidate)
         ]
 
     def _pieces(self, branch: Branch) -> tuple[PlanarArm, ...]:
-        found = self._planar.get(branch)
-        if found is None:
+        pieces = self._planar.get(branch)
+        if pieces is None:
             arm, (_, theta2, theta3, theta4, _) = self.arm, self.limits
             bend, side = _bend(branch), 1 if branch.shoulder == "front" else -1
-            found = tuple(
+            pieces = tuple(
                 PlanarArm(arm.l1, arm.l2, arm.l3, theta2, piece, theta4, sign, -arm.a, side)
                 for sign, piece in _bends(theta3, bend) or _least_bend(theta3, -bend)
             )
-            self._planar[branch] = found
-        return found
+            self._planar[branch] = pieces
+        return pieces
 
 
 @lru_cache(maxsize=64)

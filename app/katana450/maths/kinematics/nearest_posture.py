@@ -92,16 +92,16 @@ def _faced(
     and postures that have that roll nevertheless: a level cup stays level, the position gives way.
     """
     branches = (branch,) if branch else dict(limited.planar(None))
-    found, kept = [], []
+    postures, fitting = [], []
     for facing in (canonical.faced(inward=False), canonical.faced(inward=True)):
         fits = limited.limits[4].fit(facing.roll()) is not None
-        for each in branches:
-            posture = _reached(limited, facing, each, hint)
+        for candidate in branches:
+            posture = _reached(limited, facing, candidate, hint)
             if posture is not None:
-                found.append(posture)
+                postures.append(posture)
                 if fits or posture.rotation_error <= tolerances.SAME_ROTATION:
-                    kept.append(posture)
-    return _nearest(limited, canonical, kept or found, hint) if found else None
+                    fitting.append(posture)
+    return _nearest(limited, canonical, fitting or postures, hint) if postures else None
 
 
 def _exact(found_posture: NearestPosture) -> bool:
@@ -148,15 +148,17 @@ def _solved(
 ) -> NearestPosture | None:
     """Return the best of the postures on the allowed branches, or None."""
     planar = limited.planar(branch)
-    found: list[NearestPosture] = []
+    postures: list[NearestPosture] = []
     for approach in (False, True):
-        for each, arm in planar:
-            found.extend(_nearest_postures(limited, canonical, each, arm, hint, approach))
-        if any(found_posture.position_error <= tolerances.SAME_POSITION for found_posture in found):
+        for candidate, arm in planar:
+            postures.extend(_nearest_postures(limited, canonical, candidate, arm, hint, approach))
+        if any(
+            found_posture.position_error <= tolerances.SAME_POSITION for found_posture in postures
+        ):
             break
-    if len(found) <= 1:
-        return found[0] if found else None
-    return _nearest(limited, canonical, found, hint)
+    if len(postures) <= 1:
+        return postures[0] if postures else None
+    return _nearest(limited, canonical, postures, hint)
 
 
 def _nearest_postures(
@@ -181,12 +183,12 @@ def _nearest_postures(
             c, s = math.cos(theta1), math.sin(theta1)
             u, v = canonical.x * c + canonical.y * s - a, up - canonical.z
             wanted = canonical.seen_from(theta1).tilted(arm.tilt)
-            found = search(
+            solution = search(
                 planar, u, v, PlanarTarget(wanted, limits[4], roll_hint, canonical.priority)
             )
-            if found is None:
+            if solution is None:
                 break
-            pu, pv = planar.tool(found.posture)
+            pu, pv = planar.tool(solution.posture)
             if settled:
                 break
             # The tool point at pu is nearest to the target with theta1 turned to face it.
@@ -195,15 +197,15 @@ def _nearest_postures(
             if (bound and held) or abs(aligned - theta1) <= tolerances.ALIGNED:
                 bound = held
                 break
-        if found is not None:
-            alpha = (theta1, *found.posture[:3], found.psi)
+        if solution is not None:
+            alpha = (theta1, *solution.posture[:3], solution.psi)
             yield NearestPosture(
                 alpha=alpha if hint is None else limited.turned(alpha, hint),
                 branch=branch,
                 position_error=math.hypot(pu - u, pv - v, canonical.y * c - canonical.x * s - d),
-                rotation_error=found.rotation_error,
+                rotation_error=solution.rotation_error,
                 theta1_bound=bound,
-                in_plane=found,
+                in_plane=solution,
             )
             if approach and canonical.along is not None and not canonical.on_axis:
                 place = canonical._replace(x=0.0, y=0.0, z=up - pv)
@@ -266,28 +268,39 @@ def _fitted(interval: Interval, theta: float) -> tuple[float, bool]:
 
 
 def _nearest(
-    limited: LimitedArm, canonical: CanonicalTarget, found: list[NearestPosture], hint: Five | None
+    limited: LimitedArm,
+    canonical: CanonicalTarget,
+    postures: list[NearestPosture],
+    hint: Five | None,
 ) -> NearestPosture:
     """Return the posture with the smallest errors, in the order of the priority."""
-    found = _minimum(
-        found, [found_posture.position_error for found_posture in found], tolerances.SAME_POSITION
+    postures = _minimum(
+        postures,
+        [found_posture.position_error for found_posture in postures],
+        tolerances.SAME_POSITION,
     )
     if canonical.priority is Priority.POSITION:
-        pitch = [limited.arm.pitch(s.alpha) - canonical.pitch(s.alpha[0]) for s in found]
-        found = _minimum(found, [abs(wrapped(error)) for error in pitch], tolerances.SAME_ROTATION)
-    found = _minimum(
-        found, [found_posture.rotation_error for found_posture in found], tolerances.SAME_ROTATION
+        pitch = [limited.arm.pitch(s.alpha) - canonical.pitch(s.alpha[0]) for s in postures]
+        postures = _minimum(
+            postures, [abs(wrapped(error)) for error in pitch], tolerances.SAME_ROTATION
+        )
+    postures = _minimum(
+        postures,
+        [found_posture.rotation_error for found_posture in postures],
+        tolerances.SAME_ROTATION,
     )
     if hint is None:
-        return found[0]
-    return min(found, key=lambda s: max(abs(a - b) for a, b in zip(hint, s.alpha, strict=True)))
+        return postures[0]
+    return min(postures, key=lambda s: max(abs(a - b) for a, b in zip(hint, s.alpha, strict=True)))
 
 
-def _minimum(found: list[NearestPosture], errors: list[float], same: float) -> list[NearestPosture]:
+def _minimum(
+    postures: list[NearestPosture], errors: list[float], same: float
+) -> list[NearestPosture]:
     """Return the postures whose error is the smallest, to within `same`."""
     minimum = min(errors) + same
     return [
         found_posture
-        for found_posture, error in zip(found, errors, strict=True)
+        for found_posture, error in zip(postures, errors, strict=True)
         if error <= minimum
     ]

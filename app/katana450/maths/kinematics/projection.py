@@ -182,8 +182,8 @@ def _axis_1_binds(
     r = outward - arm.beside(arm.pitch(found_posture.alpha), found_posture.alpha[4])[0]
     side = 1.0 if found_posture.branch.shoulder == "front" else -1.0
     ends = abs(r) <= tolerances.ON_AXIS and side * missed_outward < -tolerances.SAME_POSITION
-    beside = abs(outward) <= tolerances.ON_AXIS and abs(missed_aside) > tolerances.SAME_POSITION
-    return ends or beside
+    is_aside = abs(outward) <= tolerances.ON_AXIS and abs(missed_aside) > tolerances.SAME_POSITION
+    return ends or is_aside
 
 
 def _binding(

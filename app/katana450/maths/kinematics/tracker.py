@@ -127,31 +127,31 @@ def track(
     limited = LimitedArm.of(chain)
     alpha = limited.arm.angles(chain.clamp(q))
     canonical = target.canonical(limited.arm, priority)
-    ahead = nearest_posture(limited, canonical, branch, alpha)
-    if _within_hop(alpha, ahead.alpha):
+    nearest = nearest_posture(limited, canonical, branch, alpha)
+    if _within_hop(alpha, nearest.alpha):
         return Tracked(
-            _projection(chain, target, canonical, _not_away(limited.arm, alpha, canonical, ahead))
+            _projection(chain, target, canonical, _not_away(limited.arm, alpha, canonical, nearest))
         )
     # One hop at least, so that the loop ends.
-    effort = max(MAX_POSES - _effort(ahead), 1)
+    effort = max(MAX_POSES - _effort(nearest), 1)
     for stop in () if since is None else _stops(limited.arm, since, target):
         stop_target = stop.canonical(limited.arm, priority)
         pursuit = _Pursuit(
             limited, stop_target, nearest_posture(limited, stop_target, branch, alpha)
         )
-        found = pursuit.follow(alpha, MAX_POSES_PER_STRIDE)
-        alpha, effort = found.alpha, effort - _effort(pursuit.best) - pursuit.effort
+        posture = pursuit.follow(alpha, MAX_POSES_PER_STRIDE)
+        alpha, effort = posture.alpha, effort - _effort(pursuit.best) - pursuit.effort
         if effort <= 0:
-            return Tracked(_projection(chain, target, canonical, found), since=stop)
-    pursuit = _Pursuit(limited, canonical, ahead)
-    found = pursuit.follow(alpha, effort)
-    best = _projection(chain, target, canonical, found)
+            return Tracked(_projection(chain, target, canonical, posture), since=stop)
+    pursuit = _Pursuit(limited, canonical, nearest)
+    posture = pursuit.follow(alpha, effort)
+    best = _projection(chain, target, canonical, posture)
     if not pursuit.ended:
         return Tracked(best, since=target)
-    miss, miss_ahead = (_misses(limited.arm, canonical, s.alpha) for s in (found, ahead))
+    miss, miss_ahead = (_misses(limited.arm, canonical, s.alpha) for s in (posture, nearest))
     if not _nearer(miss_ahead, miss, MIN_LEAP_GAIN):
         return Tracked(best)
-    return Tracked(best, beyond_gap=_projection(chain, target, canonical, ahead))
+    return Tracked(best, beyond_gap=_projection(chain, target, canonical, nearest))
 
 
 def leap(
@@ -217,11 +217,11 @@ class _Pursuit:
         `maximum` is the maximum effort of the hops after the first MIN_HOPS_PER_STRIDE.
         """
         arm = self.limited.arm
-        found, miss, hops = None, _misses(arm, self.canonical, alpha), 0
+        posture, miss, hops = None, _misses(arm, self.canonical, alpha), 0
         while not self.ended and (self.effort < maximum or hops < MIN_HOPS_PER_STRIDE):
             hops += 1
             if _within_hop(alpha, self.best.alpha):
-                found, self.ended = _not_away(arm, alpha, self.canonical, self.best), True
+                posture, self.ended = _not_away(arm, alpha, self.canonical, self.best), True
                 break
             hop = _hop(self.limited, alpha, self.canonical, self.best.branch)
             self.effort += _effort(hop)
@@ -229,13 +229,13 @@ class _Pursuit:
             worthwhile = _nearer(hop_miss, miss, MIN_HOP_GAIN)
             # If the bounds of the hop do not bind, another hop would lead nowhere.
             self.ended = not worthwhile or _within(HOP * (1.0 - MIN_HOP_GAIN), alpha, hop.alpha)
-            if worthwhile or (found is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
-                found, alpha, miss = hop, hop.alpha, hop_miss
+            if worthwhile or (posture is None and not _nearer(miss, hop_miss, tolerances.ROUNDING)):
+                posture, alpha, miss = hop, hop.alpha, hop_miss
             else:
                 # The goal stays, with the constraints that bind the hop.
-                found = hop._replace(alpha=alpha)
-        assert found is not None
-        return found
+                posture = hop._replace(alpha=alpha)
+        assert posture is not None
+        return posture
 
 
 def _effort(found_posture: NearestPosture) -> int:

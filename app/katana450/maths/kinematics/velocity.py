@@ -140,7 +140,7 @@ def coasted(chain: Chain, q: FloatArray, qd: FloatArray, dt: float) -> FloatArra
     about their own. Near a singularity it is kept as far as the damping allows.
     """
     after = q + dt * qd
-    (J, R, _), (J_after, R_after, _) = (_freedoms(chain, each) for each in (q, after))
+    (J, R, _), (J_after, R_after, _) = (_freedoms(chain, angles) for angles in (q, after))
     wanted = J @ qd
     wanted[-3:] = R_after.T @ R @ wanted[-3:]
     if chain.n >= ALL_FREEDOMS:
@@ -191,8 +191,8 @@ def tool_speed(chain: Chain, q: FloatArray, qd: FloatArray) -> float:
     du -= third * arm.l3 * math.sin(four)
     dv = first * arm.l1 * math.cos(two) + second * arm.l2 * math.cos(three)
     dv += third * arm.l3 * math.cos(four)
-    beside = arm.off_axis * (abs(pan) + abs(third) + abs(roll)) if arm.off_axis else 0.0
-    return math.hypot(du - pan * arm.d, pan * u, dv) + beside
+    offset_speed = arm.off_axis * (abs(pan) + abs(third) + abs(roll)) if arm.off_axis else 0.0
+    return math.hypot(du - pan * arm.d, pan * u, dv) + offset_speed
 
 
 def tool_speed_bound(chain: Chain, qd: FloatArray) -> float:
@@ -205,8 +205,8 @@ def tool_speed_bound(chain: Chain, qd: FloatArray) -> float:
     l2, l3 = arm.l2 + arm.l3, arm.l3
     reach: float = abs(arm.a) + arm.l1 + l2
     plane: float = first * (arm.l1 + l2) + second * l2 + third * l3
-    beside: float = arm.off_axis * (pan + first + second + third + roll)
-    return math.hypot(pan * reach, plane + pan * abs(arm.d)) + beside
+    offset_speed: float = arm.off_axis * (pan + first + second + third + roll)
+    return math.hypot(pan * reach, plane + pan * abs(arm.d)) + offset_speed
 
 
 def _excess(chain: Chain, qd: FloatArray) -> float:
