@@ -181,7 +181,8 @@ class SampledPath:
         """Return the least slowness found for the bounds `a` and `j` of tau(t).
 
         The search begins with `start` (K + 3,), and ends early if it gains nothing more, or is not
-        near the time `at_most` after its first rounds. No coefficient is below ``floor`` (K + 3,).
+        near the time `at_most` after its first rounds. No coefficient is below ``floor`` (K + 3,),
+        with which all `rounds` are searched.
         """
         c = start if floor is not None else start * self.excess(start, a, j).max()
         best, minimum = c, np.inf
@@ -198,7 +199,7 @@ class SampledPath:
                 reference, gained = minimum, number
             hopeless = number + 1 == FIRST_ROUNDS and minimum > at_most
             hopeless |= c is floor and maximum == 1.0
-            if hopeless or number - gained >= PATIENCE:
+            if hopeless or (floor is None and number - gained >= PATIENCE):
                 break
             near = self.near(excess)
             c = c * np.where(near > 1.0, near**SLOWING_POWER, near**SPEEDING_POWER)
