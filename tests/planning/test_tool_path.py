@@ -21,8 +21,8 @@ from katana450.extensions.programs.planning.curves import (
     ToolLine,
     ToolLines,
     ToolScrew,
+    roomiest,
 )
-from katana450.extensions.programs.planning.roomiest_pitch import roomiest
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

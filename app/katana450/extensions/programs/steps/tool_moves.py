@@ -45,8 +45,8 @@ from katana450.extensions.programs.planning.curves import (
     ToolLines,
     arc_between,
     line_between,
+    roomiest,
 )
-from katana450.extensions.programs.planning.roomiest_pitch import roomiest
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import ToolTarget
