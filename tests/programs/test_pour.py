@@ -14,7 +14,7 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.demos import PourDemo, Spot
-from katana450.extensions.programs.script.measures import score
+from katana450.extensions.programs.script.measures import water_measures
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.water.flow import Water
@@ -37,10 +37,10 @@ def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
     end, pouring = states[-1], stage.session.pouring
     assert end.t == pytest.approx(program.duration, abs=0.03 * len(program.tasks))
     assert end.poured is not None
-    found = score(end.poured.water, end.poured.course)
+    measures = water_measures(end.poured.water, end.poured.course)
     # A film of water stays on the wall of the cup.
-    assert 99.5 <= found.emptied_percent <= 99.95
-    assert found.spilled_ml == 0.0
+    assert 99.5 <= measures["emptied_percent"] <= 99.95
+    assert measures["spilled_ml"] == 0.0
     # The water surface stays below the lip until the cup is turned over to pour.
     (turned,) = (task.action for task in program.tasks if task.name == POURING)
     assert isinstance(turned, FollowPlan)

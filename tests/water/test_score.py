@@ -6,26 +6,27 @@ import math
 
 import pytest
 
-from katana450.extensions.programs.script.measures import score
+from katana450.extensions.programs.script.measures import water_measures
 from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.motion import Course
+from katana450.maths.water.units import MILLILITRE
 from tests.water.motions import over_basin, poured, turned_to
 
 
 def test_the_volumes_add_up_in_the_middle_of_a_pour(flow: WaterFlow) -> None:
     water = flow.begin(2e-4, over_basin(flow.water_environment, 0.0))
     *_, water = poured(flow, water, turned_to(2.0, 1.0), 1.2, 0.01)
-    result = score(water, Course())
-    assert min(result.in_cup_ml, result.in_basin_ml, result.in_air_ml) > 0.0
-    parts = result.in_cup_ml + result.in_basin_ml + result.in_air_ml + result.spilled_ml
-    assert parts == pytest.approx(200.0, rel=1e-12)
-    assert result.emptied_percent == pytest.approx(result.in_basin_ml / 2.0)
+    parts = (water.cup.kept, water.basin, water.air)
+    assert min(parts) > 0
+    assert sum(parts) + water.spilled == pytest.approx(200.0 * MILLILITRE, rel=1e-12)
+    measures = water_measures(water, Course())
+    assert measures["emptied_percent"] == pytest.approx(measures["emptied_ml"] / 2.0)
 
 
 def test_score_without_water_is_nan(flow: WaterFlow) -> None:
     empty = flow.begin(0.0, over_basin(flow.water_environment, 0.0))
     empty = flow.step(empty, {"cup": VesselMove(over_basin(flow.water_environment, 2.0))}, 0.01)
-    assert math.isnan(score(empty, Course()).emptied_percent)
+    assert math.isnan(water_measures(empty, Course())["emptied_percent"])
 
 
 def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
@@ -36,8 +37,8 @@ def test_course_measures_duration_and_peak_jerk(flow: WaterFlow) -> None:
     assert course.duration == pytest.approx(2.01)
     assert course.peak_jerk == pytest.approx(3.0, rel=1e-3)
     assert course.after((9.0, 9.0, 9.0), 0.0) == course
-    result = score(flow.begin(1e-4, over_basin(flow.water_environment, 0.0)), course)
-    assert (result.duration, result.peak_jerk) == (course.duration, course.peak_jerk)
+    water = flow.begin(1e-4, over_basin(flow.water_environment, 0.0))
+    assert water_measures(water, course)["cup_peak_jerk_m_s3"] == course.peak_jerk
 
 
 def test_unequal_steps_do_not_change_the_peak_jerk() -> None:

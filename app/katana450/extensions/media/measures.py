@@ -235,7 +235,7 @@ def _of_water(program: Program, trace: Trace) -> dict[str, float | None]:
     end = trace.water[-1]
     if end is None:
         return {}
-    measured = water_measures(end)
+    measured = water_measures(end.water, end.course)
     executed = sorted(set(trace.task.tolist()))
     pours = [number for number in executed if program.tasks[number].name == POURING]
     carried = trace.task < (pours[0] if pours else len(program.tasks))

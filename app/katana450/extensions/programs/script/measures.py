@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -13,7 +12,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.velocity import singular_values
 from katana450.maths.water.flow import Water
-from katana450.maths.water.motion import Course, MotionWithWater
+from katana450.maths.water.motion import Course
 from katana450.maths.water.units import MILLILITRE
 
 MEASURES: Final = {
@@ -78,41 +77,6 @@ def title_of(measure: str) -> str:
     return measure.removesuffix(end).replace("_", " ").capitalize()
 
 
-@dataclass(frozen=True)
-class Score:
-    """Where the water is, and how the cup was moved.
-
-    Attributes:
-        emptied_percent: part of all water that is in the basin [%]; NaN without water.
-        in_cup_ml: volume in the cup and on its wall [ml].
-        in_basin_ml, in_air_ml, spilled_ml: volumes [ml].
-        duration: duration of the motion [s].
-        peak_jerk: maximum jerk of the cup [m/s^3].
-    """
-
-    emptied_percent: float
-    in_cup_ml: float
-    in_basin_ml: float
-    in_air_ml: float
-    spilled_ml: float
-    duration: float
-    peak_jerk: float
-
-
-def score(water: Water, course: Course) -> Score:
-    """Return the score of the present ``water`` after ``course``."""
-    total = water.total
-    return Score(
-        emptied_percent=100.0 * water.basin / total if total else math.nan,
-        in_cup_ml=water.cup.kept / MILLILITRE,
-        in_basin_ml=water.basin / MILLILITRE,
-        in_air_ml=water.air / MILLILITRE,
-        spilled_ml=water.spilled / MILLILITRE,
-        duration=course.duration,
-        peak_jerk=course.peak_jerk,
-    )
-
-
 def motion_measures(
     arm: ArmModel, tools: Sequence[str], q: FloatArray, qd: FloatArray
 ) -> dict[str, float]:
@@ -138,12 +102,15 @@ def motion_measures(
     }
 
 
-def water_measures(end: MotionWithWater) -> dict[str, float]:
-    """Return the measures of the water at the end of a run, by their names."""
-    end_score = score(end.water, end.course)
+def water_measures(water: Water, course: Course) -> dict[str, float]:
+    """Return the measures of ``water`` after the ``course`` of the cup, by their names.
+
+    ``emptied_percent`` is NaN without water.
+    """
+    total = water.total
     return {
-        "emptied_percent": end_score.emptied_percent,
-        "emptied_ml": end_score.in_basin_ml,
-        "spilled_ml": end_score.spilled_ml,
-        "cup_peak_jerk_m_s3": end_score.peak_jerk,
+        "emptied_percent": 100.0 * water.basin / total if total else math.nan,
+        "emptied_ml": water.basin / MILLILITRE,
+        "spilled_ml": water.spilled / MILLILITRE,
+        "cup_peak_jerk_m_s3": course.peak_jerk,
     }

@@ -183,7 +183,7 @@ def scored(
         points = _in_base(robot, forward_batch(arm.chain, measured.q)[:, :3, 3])
     water = states[-1].poured
     if water is not None and water.water.total:
-        values |= water_measures(water)
+        values |= water_measures(water.water, water.course)
     missing = tuple(sorted((targets or {}).keys() - places.keys()))
     return Scored(
         name, values, places, frozen(t), frozen(tool), frozen(speed), frozen(points), missing
