@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from katana450.server.view.layer import ViewLayer as ViewLayer
     from katana450.server.view.panel_folder import FolderContext as FolderContext
     from katana450.server.view.panel_folder import PanelFolder as PanelFolder
+    from katana450.server.viser_bridge.presets import Preset as Preset
     from katana450.server.web.http_api import RouteContext as RouteContext
     from katana450.server.web.listen import listen as listen
 

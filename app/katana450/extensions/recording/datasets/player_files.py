@@ -23,7 +23,7 @@ from katana450.extensions.recording.datasets.sampling import RecordedStates, fra
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
-from katana450.server.viser_bridge.presets import Preset
+from katana450.sdk import Preset
 
 THEME = "Light"
 """Theme of pictures, as of the page."""
