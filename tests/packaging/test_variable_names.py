@@ -36,9 +36,7 @@ AVOIDED = frozenset(
 """Names that say nothing about the quantity: `candidate`, `posture` or `match` says what it is."""
 
 NOT_YET = (
-    "arm/control",
     "arm/drivers",
-    "arm/runtime",
     "extensions/leader",
     "extensions/real_arm",
     "extensions/recording",

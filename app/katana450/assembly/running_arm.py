@@ -77,7 +77,7 @@ class RunningArm:
             MonotonicClock(),
             settings.rate,
             settings.silence,
-            partial(restarted, kept=last) if again else None,
+            partial(restarted, last_state=last) if again else None,
             SilenceProfile.REAL_ARM if strict else driver.silence_profile,
         )
         self._silence_timeout = settings.silence

@@ -87,7 +87,7 @@ class Appearance:
 
     def of(self, name: str) -> LinkAppearance:
         """Return the appearance of the link or object ``name``."""
-        return next((appearance for each, appearance in self.changed if each == name), AS_MADE)
+        return next((appearance for key, appearance in self.changed if key == name), AS_MADE)
 
     def having(
         self, name: str, trait: AppearanceTrait, value: float | tuple[float, ...] | None
@@ -105,7 +105,7 @@ class Appearance:
 
     def without(self, name: str) -> Appearance:
         """Return the appearance with ``name`` as it is made."""
-        return Appearance(tuple(each for each in self.changed if each[0] != name))
+        return Appearance(tuple(change for change in self.changed if change[0] != name))
 
 
 ALL_AS_MADE = Appearance()

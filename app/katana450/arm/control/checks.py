@@ -38,8 +38,8 @@ def check_joints(joints: JointSet, environment: Environment, command: cmd.Comman
     """Raise InputError if a robot with ``joints`` and no arm does not support ``command``."""
     match command:
         case cmd.Batch(commands=commands):
-            for each in commands:
-                check_joints(joints, environment, each)
+            for part in commands:
+                check_joints(joints, environment, part)
         case _ if not command.traits.joints_only:
             raise InputError(joints.refusal)
         case cmd.AxisCommand():
@@ -61,8 +61,8 @@ def check(
         case cmd.AxisCommand():
             command.targets(np.zeros(n))
         case cmd.Batch(commands=commands):
-            for each in commands:
-                check(arm, pouring, environment, each)
+            for part in commands:
+                check(arm, pouring, environment, part)
         case cmd.Joints(q=q) | cmd.Servo(q=q) if q.shape != (n,):
             raise InputError(f"This arm has {n} joints, but the command has {q.size}.")
         case cmd.Tool(name=name):
@@ -91,7 +91,7 @@ def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
         case cmd.Turn() | cmd.Orient() if not isinstance(command, kinematics.turn):
             raise InputError(TURNS[kinematics.freedoms])
         case cmd.SetPriority(priority=priority) if priority not in kinematics.priorities:
-            known = ", ".join(repr(each.value) for each in kinematics.priorities)
+            known = ", ".join(repr(choice.value) for choice in kinematics.priorities)
             raise InputError(
                 f"This arm has no priority {priority.value!r}; its priorities are {known}."
             )

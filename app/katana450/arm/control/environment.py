@@ -99,7 +99,7 @@ class Environment:
     def table_height(self) -> float:
         """Height of the table in the base frame [m]."""
         parts = () if self._world is None else self._world.parts
-        tables = [each.T_mover_shape[0][2, 3] for each in parts if each.name == "table"]
+        tables = [part.T_mover_shape[0][2, 3] for part in parts if part.name == "table"]
         return float(tables[0]) if tables else 0.0
 
     def world(self, objects: Sequence[SceneObject]) -> CollisionWorld | None:
@@ -127,7 +127,11 @@ class Environment:
 
     def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
         """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m]."""
-        holdable = {each.name for each in objects if each.can_be_held and not each.carried}
+        holdable = {
+            scene_object.name
+            for scene_object in objects
+            if scene_object.can_be_held and not scene_object.carried
+        }
         fingers = set(self.hand.fingers if self.hand is not None and self.hand.can_hold else ())
         names = [world.parts[number].name for number in world.part_of.tolist()]
         touching = [
@@ -177,8 +181,8 @@ class Environment:
         """
         T = self.pose(scene_object, x)
         yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
-        at = (T[0, 3], T[1, 3], height)
-        T = se3.from_rotation_translation(so3.rotation_z(yaw), at)
+        place = (T[0, 3], T[1, 3], height)
+        T = se3.from_rotation_translation(so3.rotation_z(yaw), place)
         return replace(scene_object, T=T, held=False, fixed=False)
 
     def _palm(self, x: FloatArray) -> FloatArray:

@@ -62,8 +62,8 @@ def of_projection(
     in_place = best.position_error <= POSITION_WORTH_TELLING
     pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
     if not in_place:
-        kept = priority is Priority.PITCH and not pitch_gave_way
-        reason = Reason.POSITION_CHANGED if kept else Reason.OUT_OF_REACH
+        keeps_pitch = priority is Priority.PITCH and not pitch_gave_way
+        reason = Reason.POSITION_CHANGED if keeps_pitch else Reason.OUT_OF_REACH
         findings.append(Finding(reason, best.position_error))
     if yaw_was_given and best.yaw_error > ANGLE_WORTH_TELLING:
         findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))

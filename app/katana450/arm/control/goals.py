@@ -50,11 +50,11 @@ def with_goal(
 
     Without a mode the state is positioning at the goal.
     """
-    kept = tuple(f for f in state.findings if f.reason in GRIPPER_REASONS)
+    of_gripper = tuple(f for f in state.findings if f.reason in GRIPPER_REASONS)
     pause = tuple(f for f in state.findings if f.reason is Reason.PAUSED)
     # The contact that the arm brakes for stays a finding when a new goal comes.
-    met = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
-    aimed = replace(state, goal=goal, findings=pause + met + findings + kept)
+    contacts = tuple(f for f in state.findings if f.reason is Reason.CONTACT and state.blocked)
+    aimed = replace(state, goal=goal, findings=pause + contacts + findings + of_gripper)
     return with_mode(aimed, Positioning(JointTarget(goal)) if mode is None else mode)
 
 

@@ -43,13 +43,13 @@ def gripped(
             return state
         held, slid = state.held, hand.grip_model.slid(state, dt)
         reason = Reason.SLIPPED if slid is None else Reason.SLIDING
-        found = Finding(reason, load, parts=(held.name, hand.fingers[0]))
+        cause = Finding(reason, load, parts=(held.name, hand.fingers[0]))
         if slid is None:
             state = _let_go(environment, state)
         else:
-            objects = tuple(slid if each is held else each for each in state.objects)
+            objects = tuple(slid if other is held else other for other in state.objects)
             state = replace(state, objects=objects)
-        return replace(state, findings=(found, *state.findings))
+        return replace(state, findings=(cause, *state.findings))
     if not gripper.is_wider(state.gripper_setpoint, state.gripper_goal):
         opening = gripper.is_wider(state.gripper_goal, state.gripper)
         return without_finding(state, Reason.LOPSIDED) if opening else state
@@ -74,7 +74,7 @@ def touching(hand: Hand | None, state: State) -> tuple[str, ...]:
         return hand.fingers
     away = [finding.parts for finding in state.findings if finding.reason is Reason.LOPSIDED]
     near = [side for parts in away if parts for side in hand.sides if side[0] not in parts]
-    return tuple(each for side in near for each in side)
+    return tuple(name for side in near for name in side)
 
 
 def _let_go(environment: Environment, state: State) -> State:
@@ -85,7 +85,10 @@ def _let_go(environment: Environment, state: State) -> State:
         lifted = replace(held, T=environment.pose(held, x), held=False)
         return environment.left(held, x, surface_below(state.objects, lifted))
 
-    objects = tuple(released(each) if each.held else each for each in state.objects)
+    objects = tuple(
+        released(scene_object) if scene_object.held else scene_object
+        for scene_object in state.objects
+    )
     return replace(state, objects=objects, grip=None, squeeze=0.0)
 
 

@@ -90,7 +90,7 @@ class Lease:
 
     def renamed(self, person: Person) -> Self:
         """Return the lease with the new name of ``person``, where it holds or requests it."""
-        waiting = tuple(person if each == person else each for each in self.waiting)
+        waiting = tuple(person if waiter == person else waiter for waiter in self.waiting)
         holder = person if self.holder == person else self.holder
         return replace(self, holder=holder, waiting=waiting)
 
@@ -191,7 +191,7 @@ class Lease:
         return replace(self._without(person), holder=person, heard=t, left=math.inf)
 
     def _without(self, person: Person) -> Self:
-        return replace(self, waiting=tuple(each for each in self.waiting if each != person))
+        return replace(self, waiting=tuple(waiter for waiter in self.waiting if waiter != person))
 
     def _check_holds(self, person: Person) -> None:
         if self.holder != person:

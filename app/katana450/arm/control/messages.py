@@ -235,8 +235,10 @@ def sentence(state: State) -> str:
     """
     if not state.findings:
         return ""
-    now = [_reason(state, each) for each in state.findings if each.reason in ABOUT_NOW]
-    goal = [_reason(state, each) for each in state.findings if each.reason not in ABOUT_NOW]
+    now = [_reason(state, finding) for finding in state.findings if finding.reason in ABOUT_NOW]
+    goal = [
+        _reason(state, finding) for finding in state.findings if finding.reason not in ABOUT_NOW
+    ]
     if goal and state.moving:
         goal[0] = f"at the goal: {goal[0]}"
     return _capital("; ".join((*now, *goal))) + "."
@@ -286,7 +288,7 @@ def condition(values: FloatArray) -> str:
 
 def excluded(branch: object, axes: Sequence[int]) -> str:
     """Return the reason why the arm cannot take ``branch``: the limits of ``axes``, from 0."""
-    *most, last = [str(each + 1) for each in axes]
+    *most, last = [str(axis + 1) for axis in axes]
     which = f"axes {', '.join(most)} and {last}" if most else f"axis {last}"
     return (
         f"The limits of {which} exclude the branch {branch} for this target: choose another one, "

@@ -37,30 +37,30 @@ arm would only come back to where it was."""
 
 
 def met_before_rest(
-    world: CollisionWorld, limiter: Limiter, x: FloatArray, ahead: JointMotion
+    world: CollisionWorld, limiter: Limiter, x: FloatArray, next_motion: JointMotion
 ) -> Contact | None:
-    """Return the contact on the path to ``ahead`` and from there to rest; None if it is clear.
+    """Return the contact on the path to ``next_motion`` and on to rest; None if it is clear.
 
     x: (k,) the joints (n,), followed by what stays as it is [rad or m]. The distance in the contact
     is that at ``x``.
     """
-    here, others = x[: ahead.q.size], x[ahead.q.size :]
-    if is_surely_clear(world, x, np.append(limiter.stopping_point(ahead), others)):
+    joints, others = x[: next_motion.q.size], x[next_motion.q.size :]
+    if is_surely_clear(world, x, np.append(limiter.stopping_point(next_motion), others)):
         return None
     still = np.zeros(others.size)
     path = limiter.stopping_path(
-        ahead, MAX_PATH_LENGTH, lambda change: world.linkage.turned(np.append(change, still))
+        next_motion, MAX_PATH_LENGTH, lambda change: world.linkage.turned(np.append(change, still))
     )
-    for a, b in pairwise([here, *path]):
+    for a, b in pairwise([joints, *path]):
         step = advance(world, np.append(a, others), np.append(b, others), MIN_STOP_TIME)
         if step.contact is not None or step.stopped:
             return world.nearest(x) if step.contact is None else measured(world, step.contact, x)
     return None
 
 
-def measured(world: CollisionWorld, met: Contact, x: FloatArray) -> Contact:
-    """Return ``met`` with the distance of its parts at ``x`` (k,) [rad or m]."""
-    return replace(met, distance=world.gap(x, *met.parts))
+def measured(world: CollisionWorld, contact: Contact, x: FloatArray) -> Contact:
+    """Return ``contact`` with the distance of its parts at ``x`` (k,) [rad or m]."""
+    return replace(contact, distance=world.gap(x, *contact.parts))
 
 
 def may_go_on(world: CollisionWorld, state: State) -> bool:
@@ -164,8 +164,10 @@ class MotionStepper:
         self._tool_speed = PLANNED_SPEED_FRACTION * tool_speed
         self._follower = PlanFollower(world, slides=robot.gripper.slides)
         self._any = Limiter(robot.limits)
-        kept = {} if self._arm is None else self._arm.kinematics.branch_limits(robot.limits)
-        self._elbow = {branch: Limiter(limits) for branch, limits in kept.items()}
+        branch_limits = (
+            {} if self._arm is None else self._arm.kinematics.branch_limits(robot.limits)
+        )
+        self._elbow = {branch: Limiter(limits) for branch, limits in branch_limits.items()}
 
     def step(self, state: State, dt: float) -> State:
         """Return ``state`` with its setpoints advanced by ``dt`` [s]."""
@@ -180,24 +182,29 @@ class MotionStepper:
             state = replace(state, blocked=False)
         # A brake continues to rest: at the edge of the clear path the arm would only quiver.
         braking = state.blocked and state.jogging is None
-        ahead, along = self._brake(state, dt) if braking else self._ahead(state, dt)
+        next_motion, along = self._brake(state, dt) if braking else self._ahead(state, dt)
         if self._world is None:
-            return with_place(replace(state, motion=ahead, gripper_setpoint=fingers), along)
-        contact = None if braking else self._met(state, ahead, along, state.gripper_setpoint)
+            return with_place(replace(state, motion=next_motion, gripper_setpoint=fingers), along)
+        contact = None if braking else self._met(state, next_motion, along, state.gripper_setpoint)
         if contact is not None:
-            ahead, along = self._brake(state, dt)
+            next_motion, along = self._brake(state, dt)
         hand = None
         if fingers != state.gripper_setpoint:
-            here = np.append(ahead.q, state.gripper_setpoint)
-            hand = advance(self._world, here, np.append(ahead.q, fingers), dt, self._touch)
+            next_x = np.append(next_motion.q, state.gripper_setpoint)
+            hand = advance(self._world, next_x, np.append(next_motion.q, fingers), dt, self._touch)
             fingers = float(hand.x[-1])
-            if self._met(state, ahead, along, fingers) is not None and not ahead.at_rest:
+            if (
+                self._met(state, next_motion, along, fingers) is not None
+                and not next_motion.at_rest
+            ):
                 fingers = state.gripper_setpoint
-        at_rest = state.motion.at_rest and ahead.at_rest and (ahead.q == state.setpoint).all()
+        at_rest = (
+            state.motion.at_rest and next_motion.at_rest and (next_motion.q == state.setpoint).all()
+        )
         pinched = bool(at_rest) and fingers == state.gripper_setpoint and hand is not None
         after = replace(
             state,
-            motion=state.motion if at_rest else ahead,
+            motion=state.motion if at_rest else next_motion,
             mode=with_place(state, along).mode,
             gripper_setpoint=fingers,
             blocked=braking or contact is not None or pinched,
@@ -226,7 +233,7 @@ class MotionStepper:
 
     def _elbow_stops_inside(self, limits: Limits, motion: JointMotion) -> bool:
         """Return whether the elbow comes to rest inside ``limits`` if it brakes now."""
-        q, qd, qdd = (float(each[ELBOW]) for each in (motion.q, motion.qd, motion.qdd))
+        q, qd, qdd = (float(values[ELBOW]) for values in (motion.q, motion.qd, motion.qdd))
         lower, upper = float(limits.lower[ELBOW]), float(limits.upper[ELBOW])
         acceleration, jerk = float(limits.acceleration[ELBOW]), float(limits.jerk[ELBOW])
         fastest = abs(qd) + qdd**2 / (2.0 * jerk)
@@ -280,8 +287,8 @@ class MotionStepper:
             return self._beside(state, dt), None
         if state.stopped is not None or state.paused or isinstance(state.mode, Leaving):
             return self._brake(state, dt)
-        ahead = self._follower.ahead(following, dt, state.speed)
-        return ahead.motion(), ahead
+        next_place = self._follower.ahead(following, dt, state.speed)
+        return next_place.motion(), next_place
 
     def _beside(self, state: State, dt: float) -> JointMotion:
         """Return the next motion of an arm that follows no plan.
@@ -313,15 +320,15 @@ class MotionStepper:
             if rates is not None:
                 wanted = fraction * rates
                 straight = free.all() and in_proportion(self._any, motion, steady, wanted, dt)
-                ahead = straight or self._any.at_rate(motion, wanted, dt)
+                next_motion = straight or self._any.at_rate(motion, wanted, dt)
             else:
-                ahead = self._towards(limiter, state, dt, fraction)
-            speed = tool.tool_speed(ahead.q, ahead.qd)
+                next_motion = self._towards(limiter, state, dt, fraction)
+            speed = tool.tool_speed(next_motion.q, next_motion.qd)
             enough = max(self._tool_speed, tool.tool_speed(motion.q, motion.qd))
-            if speed <= enough and self._slow_to_rest(tool, ahead):
-                return ahead
+            if speed <= enough and self._slow_to_rest(tool, next_motion):
+                return next_motion
             fraction *= 0.9 * min(1.0, self._tool_speed / speed)
-        return self._slow_or_braking(tool, motion, ahead, dt)
+        return self._slow_or_braking(tool, motion, next_motion, dt)
 
     @staticmethod
     def _towards(limiter: Limiter, state: State, dt: float, fraction: float) -> JointMotion:
@@ -331,9 +338,9 @@ class MotionStepper:
         return limiter.towards(state.motion, state.goal, dt, fraction)
 
     def _slow_or_braking(
-        self, tool: ToolKinematics, now: JointMotion, ahead: JointMotion, dt: float
+        self, tool: ToolKinematics, now: JointMotion, next_motion: JointMotion, dt: float
     ) -> JointMotion:
-        return ahead if self._slow_to_rest(tool, ahead) else self._any.stop(now, dt)
+        return next_motion if self._slow_to_rest(tool, next_motion) else self._any.stop(now, dt)
 
     def _slow_to_rest(self, tool: ToolKinematics, motion: JointMotion) -> bool:
         """Return whether the tool stays below its maximum speed if every joint brakes now."""
@@ -354,13 +361,13 @@ class MotionStepper:
         # Joints that brake also turn the tool about each other's axes, which can speed it up.
         pull = tool.tool_speed_bound(limits.acceleration + fastest * float(fastest.sum()))
         rising = float((np.abs(motion.qdd) / limits.jerk).max())
-        at, duration = self._any.braking(motion)
+        end, duration = self._any.braking(motion)
         t, braking = 0.0, motion
         while (speed := tool.tool_speed(braking.q, braking.qd)) <= maximum:
             t += max(spacing, (maximum - speed) / pull)
             if t >= duration:
                 return True
-            braking = at(t)
+            braking = end(t)
             # Slow joints cannot make the tool too fast in any posture.
             if t > rising and tool.tool_speed_bound(braking.qd) <= maximum:
                 return True
@@ -393,17 +400,17 @@ class MotionStepper:
         )
 
     def _met(
-        self, state: State, ahead: JointMotion, along: Following | None, fingers: float
+        self, state: State, next_motion: JointMotion, along: Following | None, fingers: float
     ) -> Contact | None:
-        """Return the contact on the path to ``ahead`` and from there to rest; None if clear."""
+        """Return the contact on the path to ``next_motion`` and on to rest; None if it is clear."""
         assert self._world is not None
         if state.following is not None and along is not None:
-            met = self._follower.met(state.following, along, fingers)
-            if met is None:
+            contact = self._follower.met(state.following, along, fingers)
+            if contact is None:
                 return None
-            return measured(self._world, met, np.append(state.setpoint, fingers))
+            return measured(self._world, contact, np.append(state.setpoint, fingers))
         x = np.append(state.setpoint, fingers)
-        return met_before_rest(self._world, self.limiter(state), x, ahead)
+        return met_before_rest(self._world, self.limiter(state), x, next_motion)
 
     def _may_go_on(self, state: State) -> bool:
         """Return whether the first part of the path of a waiting arm is clear again."""

@@ -52,12 +52,12 @@ def take_all(
         if why:
             return state, refused(why)
         after = take(state, command)
-        taken = outcome(state, after)
-        if taken.verdict is Verdict.REFUSED:
+        command_outcome = outcome(state, after)
+        if command_outcome.verdict is Verdict.REFUSED:
             # A plan that begins elsewhere. It leaves no trace but the finding that says so.
             others = without_finding(state, Reason.NOT_AT_START).findings
-            after = replace(state, findings=(*others, *taken.findings))
-        return after, taken
+            after = replace(state, findings=(*others, *command_outcome.findings))
+        return after, command_outcome
     outcomes = []
     for part in command.commands:
         state, part_outcome = take_all(take, state, part)
@@ -112,15 +112,15 @@ def _why_refused(state: State, command: cmd.Command) -> str:
 
 def outcome(before: State, after: State) -> Outcome:
     """Return the outcome of a command that took ``before`` to ``after``."""
-    found = tuple(
-        each
-        for each in after.findings
-        if each.reason not in INTENDED_REASONS
-        and not any(each is known for known in before.findings)
+    findings = tuple(
+        finding
+        for finding in after.findings
+        if finding.reason not in INTENDED_REASONS
+        and not any(finding is known for known in before.findings)
     )
-    if any(each.reason is Reason.NOT_AT_START for each in found):
-        return Outcome(Verdict.REFUSED, found)
-    return Outcome(Verdict.LIMITED, found) if found else ACCEPTED
+    if any(finding.reason is Reason.NOT_AT_START for finding in findings):
+        return Outcome(Verdict.REFUSED, findings)
+    return Outcome(Verdict.LIMITED, findings) if findings else ACCEPTED
 
 
 def _held(state: State, name: str) -> str:
@@ -132,19 +132,19 @@ def _held(state: State, name: str) -> str:
 
 def reason(refusal: Outcome) -> str:
     """Return the reason of a refusal in words."""
-    return refusal.why or "; ".join(finding_text(each) for each in refusal.findings) + "."
+    return refusal.why or "; ".join(finding_text(finding) for finding in refusal.findings) + "."
 
 
 def _merged(batch: cmd.Batch, outcomes: list[Outcome]) -> Outcome:
     """Return the outcome of ``batch`` by those of its parts: refused if all are."""
-    findings = tuple(found for each in outcomes for found in each.findings)
+    findings = tuple(finding for combined in outcomes for finding in combined.findings)
     refusals = tuple(
-        PartRefusal(part, type(command).__name__, reason(each))
-        for part, (command, each) in enumerate(zip(batch.commands, outcomes, strict=True))
-        if each.verdict is Verdict.REFUSED
+        PartRefusal(part, type(command).__name__, reason(combined))
+        for part, (command, combined) in enumerate(zip(batch.commands, outcomes, strict=True))
+        if combined.verdict is Verdict.REFUSED
     )
     if refusals and len(refusals) == len(outcomes):
-        why = " ".join(dict.fromkeys(each.why for each in refusals))
+        why = " ".join(dict.fromkeys(combined.why for combined in refusals))
         return Outcome(Verdict.REFUSED, findings, why, refusals)
     limited = refusals or findings
     return Outcome(Verdict.LIMITED, findings, refused=refusals) if limited else ACCEPTED

@@ -47,9 +47,9 @@ class PlanFollower:
 
     def ahead(self, now: Following, dt: float, fraction: float) -> Following:
         """Return the place after ``dt`` [s], at most at ``fraction`` of the speed of the plan."""
-        here = now.turned_over()
-        pace = self._limiter(here).towards(here.pace, np.array([here.aim]), dt, fraction)
-        return replace(here, pace=pace)
+        place = now.turned_over()
+        pace = self._limiter(place).towards(place.pace, np.array([place.aim]), dt, fraction)
+        return replace(place, pace=pace)
 
     def braking(self, now: Following, dt: float) -> Following:
         """Return the place after ``dt`` [s] of braking along the plan; ``now`` itself at rest."""
@@ -66,27 +66,27 @@ class PlanFollower:
         """Return the time [s] that a brake which begins now takes to come to rest."""
         return self._limiter(now).stopping_time(now.pace)
 
-    def met(self, now: Following, ahead: Following, fingers: float) -> Contact | None:
-        """Return the contact on the path to ``ahead`` and from there to rest; None if it is clear.
+    def met(self, now: Following, next_place: Following, fingers: float) -> Contact | None:
+        """Return the contact on the path to ``next_place`` and on to rest; None if it is clear.
 
         fingers: the finger joint [rad or m].
         """
         # Segments meet at rest, so an arm on a new segment is still at its end.
-        here = now if now.number == ahead.number else ahead
-        return self._met(here, self.stopping_point(ahead), fingers)
+        place = now if now.number == next_place.number else next_place
+        return self._met(place, self.stopping_point(next_place), fingers)
 
     def may_go_on(self, now: Following, fingers: float) -> bool:
         """Return whether the first part of the path of a waiting arm is clear again.
 
         fingers: the finger joint [rad or m].
         """
-        here = now.turned_over()
-        reach = PROBE_FRACTION * here.segment.scaling.span
-        probe = min(max(here.aim, here.local - reach), here.local + reach)
-        return self._met(here, here.at(probe), fingers) is None
+        place = now.turned_over()
+        reach = PROBE_FRACTION * place.segment.scaling.span
+        probe = min(max(place.aim, place.local - reach), place.local + reach)
+        return self._met(place, place.at(probe), fingers) is None
 
-    def _met(self, here: Following, stopping_point: Following, fingers: float) -> Contact | None:
-        plan, segment = here.plan, here.segment
+    def _met(self, place: Following, stopping_point: Following, fingers: float) -> Contact | None:
+        plan, segment = place.plan, place.segment
         world = self._world
         if world is None or (
             plan.clear_of is not None
@@ -94,7 +94,9 @@ class PlanFollower:
             and plan.clear_of.differs_by(world.fingerprint) <= MAX_DISPLACEMENT
         ):
             return None
-        start, end = (segment.scaling.pace(each.local).sigma for each in (here, stopping_point))
+        start, end = (
+            segment.scaling.pace(end_place.local).sigma for end_place in (place, stopping_point)
+        )
         low, high = min(start, end), max(start, end)
         known = self._known
         if known is None or known[:2] != (segment, fingers) or not known[2] <= start <= known[3]:
@@ -103,11 +105,11 @@ class PlanFollower:
             return None
         swept = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
         for a, b in ((low, known[2]), (known[3], high)):
-            found = (
+            contact = (
                 segment.sweep.blocked(swept, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
             )
-            if found is not None:
-                return found.contact
+            if contact is not None:
+                return contact.contact
         # A path that leads out of a contact is clear only from here.
         if float(swept.minimum.min()) >= STOP:
             self._known = (segment, fingers, min(low, known[2]), max(high, known[3]))

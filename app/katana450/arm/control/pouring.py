@@ -40,7 +40,7 @@ def vessels_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
     cup = named(objects, CUP)
     if cup is None:
         return []
-    others = [each for each in objects if is_vessel(each) and each is not cup]
+    others = [vessel for vessel in objects if is_vessel(vessel) and vessel is not cup]
     return [cup, *others][:MAX_VESSELS]
 
 
@@ -78,9 +78,10 @@ class Pouring:
 
         ``volumes``: volumes [fl] by the names of vessels; others keep what they have.
         """
-        kept = {each.name: each.kept for each in water.vessels} | dict(volumes)
+        volume_of = {vessel.name: vessel.kept for vessel in water.vessels} | dict(volumes)
         vessels = tuple(
-            self._rest(each, objects, x, kept.get(each.name, 0)) for each in vessels_of(objects)
+            self._rest(vessel, objects, x, volume_of.get(vessel.name, 0))
+            for vessel in vessels_of(objects)
         )
         if not vessels:
             return None
@@ -98,40 +99,44 @@ class Pouring:
         vessels = vessels_of(objects)
         if not vessels:
             return None
-        if [each.name for each in vessels] != [each.name for each in poured.water.vessels]:
+        if [vessel.name for vessel in vessels] != [vessel.name for vessel in poured.water.vessels]:
             poured = self._with_vessels(poured, objects, x)
         water, flow = poured.water, self._flow(objects)
-        poses = [self._environment.pose(each, x) for each in vessels]
-        rests = [bool((each.T == T).all()) for each, T in zip(water.vessels, poses, strict=True)]
+        poses = [self._environment.pose(vessel, x) for vessel in vessels]
+        rests = [
+            bool((vessel.T == T).all()) for vessel, T in zip(water.vessels, poses, strict=True)
+        ]
         still = all(rests) and poured.still
         if dt <= 0.0 or (still and all(map(flow.film_rests, water.vessels))):
             return poured
         if (
             still
             and poured.waited + dt < FILM_STEP
-            and all(flow.margin_to_rim(each) > 0.0 for each in water.vessels)
+            and all(flow.margin_to_rim(vessel) > 0.0 for vessel in water.vessels)
         ):
             return replace(poured, waited=poured.waited + dt)
         if poured.waited:
             water = flow.step(water, {}, poured.waited)
         motions = list(zip(vessels, poured.motions, poses, strict=True))
-        if any(not rest and not each.carried for rest, each in zip(rests, vessels, strict=True)):
+        if any(
+            not rest and not vessel.carried for rest, vessel in zip(rests, vessels, strict=True)
+        ):
             # A vessel was moved by a command, which does not accelerate the water.
-            moves = {each.name: VesselMove(T) for each, _, T in motions}
+            moves = {vessel.name: VesselMove(T) for vessel, _, T in motions}
             placed = tuple(
-                VesselMotion(motion.course, self._middle(each, T, objects))
-                for each, motion, T in motions
+                VesselMotion(motion.course, self._middle(vessel, T, objects))
+                for vessel, motion, T in motions
             )
             return MotionWithWater(flow.step(water, moves, 0.0), placed)
         moves, after = {}, []
-        for each, motion, T in motions:
-            middle = self._middle(each, T, objects)
+        for vessel, motion, T in motions:
+            middle = self._middle(vessel, T, objects)
             velocity = scale(1.0 / dt, sub(middle, motion.middle))
             # The velocities are those in the middle of this step and of the one before, which is
             # shorter or longer where a STOP or a late tick came between.
             between = 0.5 * (dt + (motion.course.step or dt))
             acceleration = scale(1.0 / between, sub(velocity, motion.velocity))
-            moves[each.name] = VesselMove(T, acceleration)
+            moves[vessel.name] = VesselMove(T, acceleration)
             after.append(VesselMotion(motion.course.after(acceleration, dt), middle, velocity))
         return MotionWithWater(flow.step(water, moves, dt), tuple(after))
 
@@ -140,7 +145,7 @@ class Pouring:
 
         It is that of the vessel in the hand, or of the cup.
         """
-        held = next((each.name for each in objects if each.held), CUP)
+        held = next((scene_object.name for scene_object in objects if scene_object.held), CUP)
         return self._flow(objects).margin_to_rim(poured.water.vessel(held) or poured.water.cup)
 
     def water_environment(self, objects: Sequence[SceneObject]) -> WaterEnvironment:
@@ -152,14 +157,20 @@ class Pouring:
     ) -> MotionWithWater:
         """Return ``poured`` with the present vessels; the water of one that is gone is gone."""
         known = dict(
-            zip([each.name for each in poured.water.vessels], poured.motions, strict=False)
+            zip(
+                [scene_object.name for scene_object in poured.water.vessels],
+                poured.motions,
+                strict=False,
+            )
         )
         waters, motions = [], []
-        for each in vessels_of(objects):
-            vessel = poured.water.vessel(each.name) or self._rest(each, objects, x, 0)
+        for scene_object in vessels_of(objects):
+            vessel = poured.water.vessel(scene_object.name) or self._rest(
+                scene_object, objects, x, 0
+            )
             waters.append(vessel)
-            still = VesselMotion(Course(), self._middle(each, vessel.T, objects))
-            motions.append(known.get(each.name) or still)
+            still = VesselMotion(Course(), self._middle(scene_object, vessel.T, objects))
+            motions.append(known.get(scene_object.name) or still)
         water = replace(poured.water, vessels=tuple(waters))
         return replace(poured, water=water, motions=tuple(motions))
 
@@ -177,12 +188,12 @@ class Pouring:
         basin, vessels = named(objects, BASIN), vessels_of(objects)
         key = [basin, *vessels]
         if self._cache is None or self._cache[0] != key:
-            at = ABSENT_BASIN_AT if basin is None else vector(basin.T[:3, 3])
-            shapes = {each.name: self._shape(each) for each in vessels}
+            basin_point = ABSENT_BASIN_AT if basin is None else vector(basin.T[:3, 3])
+            shapes = {vessel.name: self._shape(vessel) for vessel in vessels}
             water_environment = replace(
                 self._water_environment,
                 vessels=shapes or self._water_environment.vessels,
-                basin=replace(self._water_environment.basin, at=at),
+                basin=replace(self._water_environment.basin, at=basin_point),
             )
             self._cache = (key, WaterFlow(water_environment))
         return self._cache[1]

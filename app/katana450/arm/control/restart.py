@@ -37,23 +37,23 @@ def at_rest(state: State) -> State:
     )
 
 
-def restarted(begun: State, kept: State | None) -> State:
-    """Return ``begun``, the first state of a new process, stopped and with the scene of ``kept``.
+def restarted(first_state: State, last_state: State | None) -> State:
+    """Return the first state of a new process, stopped and with the scene of the last state.
 
-    kept: the last known state of the process before; None if none is known. The place of the arm
-    is that of ``begun``, which its driver reports.
+    last_state: the last known one of the process before; None if none is known. The place of the
+    arm is that of ``first_state``, which its driver reports.
     """
-    stopped = at_rest(begun)
-    if kept is None:
+    stopped = at_rest(first_state)
+    if last_state is None:
         return stopped
     return replace(
         stopped,
-        tool=kept.tool,
-        priority=kept.priority,
-        speed=kept.speed,
-        objects=kept.objects,
-        grip=kept.grip,
-        squeeze=kept.squeeze,
-        poured=kept.poured,
-        appearance=kept.appearance,
+        tool=last_state.tool,
+        priority=last_state.priority,
+        speed=last_state.speed,
+        objects=last_state.objects,
+        grip=last_state.grip,
+        squeeze=last_state.squeeze,
+        poured=last_state.poured,
+        appearance=last_state.appearance,
     )

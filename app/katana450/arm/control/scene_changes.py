@@ -32,8 +32,8 @@ def with_scene_change(
             return with_appearance(state, command)
         case cmd.Attach(name=name, to=to):
             mounted = tuple(
-                environment.mounted(each, to, x) if each.name == name else each
-                for each in state.objects
+                environment.mounted(other, to, x) if other.name == name else other
+                for other in state.objects
             )
             return replace(state, objects=mounted)
         case cmd.ReplaceScene(objects=objects, volume=volume):
@@ -54,7 +54,11 @@ def with_water(pouring: Pouring | None, state: State, volume: float | None) -> S
 
 def removed(state: State, name: str) -> State:
     """Return ``state`` without the object of that name; a held object stays."""
-    objects = tuple(each for each in state.objects if each.held or each.name != name)
+    objects = tuple(
+        scene_object
+        for scene_object in state.objects
+        if scene_object.held or scene_object.name != name
+    )
     return replace(state, objects=objects)
 
 
@@ -92,7 +96,7 @@ def with_appearance(state: State, command: SetAppearance) -> State:
         appearance = _as_link(scene_object.appearance).having(command.trait, command.value)
         return replace(scene_object, appearance=_as_object(appearance))
 
-    if any(each.name == command.name for each in state.objects):
+    if any(other.name == command.name for other in state.objects):
         return replace(state, objects=tuple(map(changed, state.objects)))
     appearance = state.appearance.having(command.name, command.trait, command.value)
     return replace(state, appearance=appearance)

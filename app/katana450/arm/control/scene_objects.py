@@ -125,10 +125,10 @@ class SceneObject:
         smallest = self.scale * float(minimum)
         if smallest < MIN_SIZE * (1.0 - slack) or longest > MAX_SIZE * (1.0 + slack):
             actual = " by ".join(
-                digits_beyond(self.scale * each, MIN_SIZE, MAX_SIZE)
-                if not MIN_SIZE <= self.scale * each <= MAX_SIZE
-                else f"{self.scale * each:.4g}"
-                for each in size.tolist()
+                digits_beyond(self.scale * length, MIN_SIZE, MAX_SIZE)
+                if not MIN_SIZE <= self.scale * length <= MAX_SIZE
+                else f"{self.scale * length:.4g}"
+                for length in size.tolist()
             )
             hint = " Change its scale." if self.shape is Shape.MESH else ""
             raise InputError(
@@ -150,7 +150,7 @@ class SceneObject:
     @property
     def extent(self) -> tuple[float, ...]:
         """The size with the scale applied [m]."""
-        return tuple(self.scale * each for each in self.size)
+        return tuple(self.scale * length for length in self.size)
 
     @property
     def height(self) -> float:
@@ -208,25 +208,25 @@ def placed(objects: tuple[SceneObject, ...], scene_object: SceneObject) -> tuple
 
     An object with a new name is added if there is room. A held object stays.
     """
-    known = [each.name for each in objects]
+    known = [other.name for other in objects]
     if scene_object.name not in known:
         return (*objects, scene_object) if len(objects) < MAX_OBJECTS else objects
     return tuple(
-        scene_object if each.name == scene_object.name and not each.held else each
-        for each in objects
+        scene_object if other.name == scene_object.name and not other.held else other
+        for other in objects
     )
 
 
 def named(objects: Sequence[SceneObject], name: str) -> SceneObject | None:
     """Return the object of that name; None if there is none."""
-    return next((each for each in objects if each.name == name), None)
+    return next((scene_object for scene_object in objects if scene_object.name == name), None)
 
 
 def with_replaced(
     objects: tuple[SceneObject, ...], wanted: tuple[SceneObject, ...]
 ) -> tuple[SceneObject, ...]:
     """Return ``wanted`` in place of ``objects``; held objects stay."""
-    held = tuple(each for each in objects if each.held)
-    names = {each.name for each in held}
-    left = tuple(each for each in wanted if each.name not in names)
+    held = tuple(scene_object for scene_object in objects if scene_object.held)
+    names = {scene_object.name for scene_object in held}
+    left = tuple(scene_object for scene_object in wanted if scene_object.name not in names)
     return (*held, *left)[:MAX_OBJECTS]

@@ -184,10 +184,10 @@ class Session:
         newest: tuple[int, State] | None = None  # that may have changed the target, and before it
         for command in commands:
             self.check(command)
-            if not all(each.traits.passive for each in command.parts):
+            if not all(part.traits.passive for part in command.parts):
                 newest = len(outcomes), state
-            state, found = take_all(self._take, state, with_time(command, t))
-            outcomes.append(found)
+            state, command_outcome = take_all(self._take, state, with_time(command, t))
+            outcomes.append(command_outcome)
         if isinstance(state.intent, Tracking):
             state = tool_targets.tracked(self.require_arm(), state, state.intent)
             if newest is not None and outcomes[newest[0]] is ACCEPTED:

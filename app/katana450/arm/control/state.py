@@ -299,8 +299,10 @@ class State:
     @property
     def pause_cause(self) -> Finding | None:
         """Cause of a pause by the server from which a program may resume; None without one."""
-        kept = self.paused and not self.waits
-        return next((each for each in self.findings if kept and each.reason in CAUSES), None)
+        is_paused = self.paused and not self.waits
+        return next(
+            (finding for finding in self.findings if is_paused and finding.reason in CAUSES), None
+        )
 
     @property
     def intent(self) -> Idle | Positioning | Tracking | Jogging | Servoing | Following:
@@ -373,13 +375,15 @@ class State:
     @property
     def near(self) -> frozenset[str]:
         """The links and objects that are about to touch."""
-        met = (each.parts for each in self.findings if each.reason is Reason.CONTACT)
-        return frozenset(part for parts in met for part in parts or ())
+        contact_parts = (
+            finding.parts for finding in self.findings if finding.reason is Reason.CONTACT
+        )
+        return frozenset(part for parts in contact_parts for part in parts or ())
 
     @property
     def held(self) -> SceneObject | None:
         """The object that the fingers hold; None if there is none."""
-        return next((each for each in self.objects if each.held), None)
+        return next((scene_object for scene_object in self.objects if scene_object.held), None)
 
     @cached_property
     def under_way(self) -> bool:

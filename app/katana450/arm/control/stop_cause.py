@@ -35,6 +35,6 @@ WATCHDOG = StopCause()
 """Cause of a stop by the arm's process itself, which no longer hears the server."""
 
 
-def pressed(name: str, key: str, press: str | None, at: float) -> StopCause:
-    """Return the cause of a stop by the participant ``name`` at ``at`` [s since the epoch]."""
-    return StopCause(f"{name} pressed STOP.", name, key, press or "", at)
+def pressed(name: str, key: str, press: str | None, time: float) -> StopCause:
+    """Return the cause of a stop by the participant ``name`` at ``time`` [s since the epoch]."""
+    return StopCause(f"{name} pressed STOP.", name, key, press or "", time)

@@ -114,15 +114,15 @@ def held_where_measured(state: State, report: ArmReport) -> State:
         q = frozen(state.q)
         state = replace(state, motion=JointMotion.rest(q), goal=q)
     findings = tuple(
-        replace(each, amount=0.0, time=0.0) if each.reason is Reason.STOPPED else each
-        for each in state.findings
-        if each.reason is not Reason.MEASURED_STOP
-        and not (report.mode.follows and each.reason is Reason.NOT_FOLLOWING)
+        replace(other, amount=0.0, time=0.0) if other.reason is Reason.STOPPED else other
+        for other in state.findings
+        if other.reason is not Reason.MEASURED_STOP
+        and not (report.mode.follows and other.reason is Reason.NOT_FOLLOWING)
     )
     if report.measured_stop is not None and report.mode is ArmMode.HOLDING:
         measured = report.measured_stop
-        found = Finding(Reason.MEASURED_STOP, measured.angle, time=measured.time)
-        findings = (findings[0], found, *findings[1:]) if findings else (found,)
+        finding = Finding(Reason.MEASURED_STOP, measured.angle, time=measured.time)
+        findings = (findings[0], finding, *findings[1:]) if findings else (finding,)
     if not report.mode.follows and all(f.reason is not Reason.NOT_FOLLOWING for f in findings):
         findings = (*findings, Finding(Reason.NOT_FOLLOWING))
     return replace(

@@ -44,19 +44,20 @@ def check_carried(
     if table is None or scene_object.carried:
         return
     (x, y), lowest = scene_object.T_collision_shape[:2, 3], _lowest(scene_object)
-    tops = [each.T[2, 3] + each.height for each in objects if is_over(scene_object, each)]
+    tops = [other.T[2, 3] + other.height for other in objects if is_over(scene_object, other)]
     if table.x[0] <= x <= table.x[1] and table.y[0] <= y <= table.y[1]:
         tops.append(0.0)
     if any(lowest - top <= SUPPORT_GAP for top in tops):
         return
-    at = f"{scene_object.name} would be in the air at x {1e3 * x:.1f}, y {1e3 * y:.1f}"
+    refusal = f"{scene_object.name} would be in the air at x {1e3 * x:.1f}, y {1e3 * y:.1f}"
     if tops:
         gap = f"{1e3 * (lowest - max(tops)):.1f} mm"
-        raise InputError(f"{at} mm, {gap} above its support: put it {gap} lower.")
+        raise InputError(f"{refusal} mm, {gap} above its support: put it {gap} lower.")
     (left, right), (front, back) = 1e3 * np.array(table.x), 1e3 * np.array(table.y)
     raise InputError(
-        f"{at} mm: nothing carries it there. The table reaches from x {left:.0f} to {right:.0f} "
-        f"and from y {front:.0f} to {back:.0f} mm in the base frame; choose a place on it."
+        f"{refusal} mm: nothing carries it there. The table reaches from x {left:.0f} to "
+        f"{right:.0f} and from y {front:.0f} to {back:.0f} mm in the base frame; choose a place "
+        "on it."
     )
 
 
@@ -66,7 +67,7 @@ def surface_below(objects: Sequence[SceneObject], scene_object: SceneObject) -> 
     The object is where it would be released; the table is at 0.
     """
     lowest = _lowest(scene_object) + SUPPORT_GAP
-    tops = [each.T[2, 3] + each.height for each in objects if is_over(scene_object, each)]
+    tops = [other.T[2, 3] + other.height for other in objects if is_over(scene_object, other)]
     return max((float(top) for top in tops if top <= lowest), default=0.0)
 
 

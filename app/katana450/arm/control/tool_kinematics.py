@@ -116,7 +116,7 @@ class FiveAxisTool(FiveAxisKinematics):
     """The functions of the five-axis family as `ToolKinematics`."""
 
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = {
-        each: (name, PRIORITY_HINTS[each]) for each, name in PRIORITIES.items()
+        priority: (name, PRIORITY_HINTS[priority]) for priority, name in PRIORITIES.items()
     }
     freedoms: ClassVar[int] = 5
     turn: ClassVar[type[TurnCommand]] = Turn

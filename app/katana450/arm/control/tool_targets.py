@@ -59,22 +59,22 @@ class BranchMetrics:
     smallest_singular_value: float
 
     @staticmethod
-    def of(chain: Chain, found: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
-        """Return the metrics of `found`, seen from the joint angles `q` (n,) [rad].
+    def of(chain: Chain, posture: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
+        """Return the metrics of `posture`, seen from the joint angles `q` (n,) [rad].
 
         Between two postures inside the limits the straight path in joint space is inside too, so
         distance and time belong to a path that the arm can follow.
         """
-        turns = np.abs(found.q - chain.check_q(q))
+        turns = np.abs(posture.q - chain.check_q(q))
         return BranchMetrics(
-            branch=found.branch,
-            q=found.q,
-            within_limits=chain.within_limits(found.q),
-            position_error=found.position_error,
-            rotation_error=found.rotation_error,
+            branch=posture.branch,
+            q=posture.q,
+            within_limits=chain.within_limits(posture.q),
+            position_error=posture.position_error,
+            rotation_error=posture.rotation_error,
             distance=float(turns.max()),
             time=float((turns / chain.speed).max()),
-            smallest_singular_value=float(singular_values(chain, found.q)[-1]),
+            smallest_singular_value=float(singular_values(chain, posture.q)[-1]),
         )
 
 
@@ -132,21 +132,21 @@ def branch_options(
     world: the collision world; without one no contacts are reported.
     """
     chain = arm.chain_to(state.tool)
-    found = [(branch, branch_option(arm, state, branch)) for branch in arm.kinematics.branches]
+    candidates = [(branch, branch_option(arm, state, branch)) for branch in arm.kinematics.branches]
     return tuple(
         BranchOption(
             replace(BranchMetrics.of(chain, best, state.q), branch=branch),
             contact_at(world, best.q, state.gripper),
             branch_refusal(branch, best),
         )
-        for branch, best in found
+        for branch, best in candidates
     )
 
 
 def branch_refusal(branch: AnyBranch, best: Projection) -> str:
     """Return why the arm cannot take ``branch``, of which ``best`` is the option; else empty."""
-    taken = best.branch == branch or not best.limits
-    return "" if taken else excluded(branch, best.limits)
+    is_possible = best.branch == branch or not best.limits
+    return "" if is_possible else excluded(branch, best.limits)
 
 
 def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> Contact | None:
@@ -196,13 +196,15 @@ def stepped(arm: ArmModel, state: State, step: StepTool) -> State:
 def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
     """Return ``state`` with its goal moved towards the dragged target, as far as a tick allows."""
     kinematics = arm.kinematics_to(state.tool)
-    found = kinematics.track(state, tracking.target, tracking.since)
-    if found.since is not None:
-        return with_mode(replace(state, goal=found.best.q), replace(tracking, since=found.since))
-    target = JointTarget(found.best.q) if tracking.let_go else tracking.target
-    findings = kinematics.tracking_losses(state, found)
-    mode = Positioning(target, found.beyond_gap)
-    return with_goal(state, found.best.q, findings, mode)
+    progress = kinematics.track(state, tracking.target, tracking.since)
+    if progress.since is not None:
+        return with_mode(
+            replace(state, goal=progress.best.q), replace(tracking, since=progress.since)
+        )
+    target = JointTarget(progress.best.q) if tracking.let_go else tracking.target
+    findings = kinematics.tracking_losses(state, progress)
+    mode = Positioning(target, progress.beyond_gap)
+    return with_goal(state, progress.best.q, findings, mode)
 
 
 def gone(arm: ArmModel, state: State) -> State:
@@ -255,11 +257,11 @@ def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> S
     is not renewed.
     """
     kinematics, q = arm.kinematics_to(state.tool), state.setpoint
-    kept = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
+    other_findings = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
     V = kinematics.jog_twist(q, jogging.rates, jogging.frame)
     held = of_jog(kinematics.chain, q, V)
     branch = kinematics.branch_of(rest)
-    aimed = replace(state, goal=rest, branch=branch, findings=kept + held)
+    aimed = replace(state, goal=rest, branch=branch, findings=other_findings + held)
     if state.t < jogging.until:
         return aimed
     # The end of a jog brakes all joints in proportion, so the tool stays on its path.

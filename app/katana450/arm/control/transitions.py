@@ -96,7 +96,7 @@ TABLE: Mapping[type[cmd.Command], Row] = {
 
 def row_of(kind: type[cmd.Command]) -> Row:
     """Return the row of a class of commands: its own, or that of its nearest base."""
-    return next(TABLE[each] for each in kind.__mro__ if each in TABLE)
+    return next(TABLE[base] for base in kind.__mro__ if base in TABLE)
 
 
 def effect_of(command: cmd.Command, state: State) -> Effect:

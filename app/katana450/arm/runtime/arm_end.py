@@ -168,7 +168,7 @@ class ArmEnd:
             self._names.note(message.number, message.command.plan)
         with self._numbering:
             try:
-                moves = not all(each.traits.while_stopped for each in message.command.parts)
+                moves = not all(part.traits.while_stopped for part in message.command.parts)
                 if moves and message.seen < self._loop.paused_at:
                     raise InputError(OLDER_THAN_PAUSE)
                 ticket = self._mailbox.put(message.command, message.actor)
@@ -183,22 +183,22 @@ class ArmEnd:
 
     def _show(self) -> None:
         state_publisher = self._loop.state_publisher
-        seen, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
+        shown, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
         event_log = state_publisher.event_log
         timing, profile = state_publisher.loop_timing, self._loop.profile
-        self._send(StateMessage(self._named(seen), event_log, timing, profile=profile))
+        self._send(StateMessage(self._named(shown), event_log, timing, profile=profile))
         last = event_log[-1] if event_log else None
         while not self.cut.is_set():
-            snapshot = state_publisher.wait_for_change(seen, PULSE_INTERVAL)
+            snapshot = state_publisher.wait_for_change(shown, PULSE_INTERVAL)
             if self.cut.is_set():
                 # The stop of this end is no news for a front end that disconnects.
                 break
             now = time.monotonic()
-            if snapshot is seen and self._loop.ticks == ticks:
+            if snapshot is shown and self._loop.ticks == ticks:
                 # A loop that does not tick must give no pulse.
                 continue
             ticks = self._loop.ticks
-            if snapshot is seen and now - reported < REPORT_INTERVAL:
+            if snapshot is shown and now - reported < REPORT_INTERVAL:
                 self._pipe.send_bytes(PULSE)
                 continue
             if now - reported >= REPORT_INTERVAL:
@@ -214,7 +214,7 @@ class ArmEnd:
                     profile,
                 )
             )
-            seen = snapshot
+            shown = snapshot
         # A front end that hangs reads nothing, and its pipe may be full.
         if writable(self._pipe.fileno()):
             self._pipe.send(None)

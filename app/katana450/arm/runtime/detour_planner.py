@@ -59,33 +59,35 @@ class DetourPlanner:
         self._thread.join()
 
     def _run(self) -> None:
-        seen = self._state_publisher.snapshot
+        snapshot = self._state_publisher.snapshot
         while not self._stopping.is_set():
-            wanted = _wants_detour(seen.state)
+            wanted = _wants_detour(snapshot.state)
             new = self._state_publisher.wait_for_change(
-                seen, SETTLE_TIME if wanted else WAKE_INTERVAL, self._stopping.is_set
+                snapshot, SETTLE_TIME if wanted else WAKE_INTERVAL, self._stopping.is_set
             )
-            if new is seen and wanted:
-                self._offer(seen)
+            if new is snapshot and wanted:
+                self._offer(snapshot)
                 # Planned at most once for each state.
-                new = self._changed(seen)
-            seen = new
+                new = self._changed(snapshot)
+            snapshot = new
 
-    def _changed(self, seen: Snapshot) -> Snapshot:
-        """Return the next snapshot after ``seen``, or ``seen`` when the thread ends."""
-        new = seen
-        while new is seen and not self._stopping.is_set():
-            new = self._state_publisher.wait_for_change(seen, WAKE_INTERVAL, self._stopping.is_set)
+    def _changed(self, snapshot: Snapshot) -> Snapshot:
+        """Return the next snapshot after ``snapshot``, or ``snapshot`` when the thread ends."""
+        new = snapshot
+        while new is snapshot and not self._stopping.is_set():
+            new = self._state_publisher.wait_for_change(
+                snapshot, WAKE_INTERVAL, self._stopping.is_set
+            )
         return new
 
-    def _offer(self, seen: Snapshot) -> None:
-        """Plan the detour of ``seen`` and offer it."""
+    def _offer(self, snapshot: Snapshot) -> None:
+        """Plan the detour of ``snapshot`` and offer it."""
 
         def check() -> None:
-            if self._stopping.is_set() or self._state_publisher.snapshot is not seen:
+            if self._stopping.is_set() or self._state_publisher.snapshot is not snapshot:
                 raise CancelledError("The state of the arm has changed.")
 
-        state = seen.state
+        state = snapshot.state
         try:
             with checked_by(check):
                 world = self._session.world_at(state)

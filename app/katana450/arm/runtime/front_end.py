@@ -113,11 +113,13 @@ class FrontEnd:
         with self._sending:
             if isinstance(command, cmd.Stop):
                 # Unsent commands are dropped; an earlier stop is fulfilled together with this one.
-                unsent = (each for each in self._unsent if not isinstance(each.command, cmd.Stop))
-                self.state_publisher.outcomes.note((each.number, DROPPED) for each in unsent)
-                for each in self._unsent:
-                    if isinstance(each.command, cmd.Stop):
-                        command, actor = joined(each.command, command), each.actor
+                unsent = (
+                    waiting for waiting in self._unsent if not isinstance(waiting.command, cmd.Stop)
+                )
+                self.state_publisher.outcomes.note((waiting.number, DROPPED) for waiting in unsent)
+                for waiting in self._unsent:
+                    if isinstance(waiting.command, cmd.Stop):
+                        command, actor = joined(waiting.command, command), waiting.actor
                 self._unsent.clear()
             elif age > COMMAND_TIMEOUT or not self._connected:
                 raise InputError(
@@ -193,7 +195,9 @@ class FrontEnd:
         while not self.cut.wait(RECONNECT_INTERVAL):
             with self._sending:
                 # No command to the process that ended reaches the new one, which is stopped.
-                self.state_publisher.outcomes.note((each.number, DROPPED) for each in self._unsent)
+                self.state_publisher.outcomes.note(
+                    (unsent.number, DROPPED) for unsent in self._unsent
+                )
                 self._unsent.clear()
                 number = self._number
             with suppress(*PIPE_ERRORS):
@@ -225,24 +229,24 @@ class FrontEnd:
         if message is None:
             return False
         self.state_publisher.loop_timing = message.loop_timing
-        seen = self.state_publisher.snapshot
-        if message.snapshot.state.t != seen.state.t or message.snapshot.ticket != seen.ticket:
-            self.state_publisher.publish(_known(message.snapshot, seen), message.event_log)
+        last = self.state_publisher.snapshot
+        if message.snapshot.state.t != last.state.t or message.snapshot.ticket != last.ticket:
+            self.state_publisher.publish(_known(message.snapshot, last), message.event_log)
         # The state comes first: a client with an answer must find its command in the state.
         self.state_publisher.outcomes.note(message.outcomes)
-        if (message.snapshot.state.stopped is None) != (seen.state.stopped is None):
+        if (message.snapshot.state.stopped is None) != (last.state.stopped is None):
             self.on_stop_change()
         return True
 
 
-def _known(message: Snapshot, seen: Snapshot) -> Snapshot:
-    """Return ``message`` with the objects of ``seen`` if they are the same.
+def _known(message: Snapshot, last: Snapshot) -> Snapshot:
+    """Return ``message`` with the objects of ``last`` if they are the same.
 
     Objects from the pipe are new Python objects each time, which would be taken for a change.
     """
-    if not same(message.state.objects, seen.state.objects):
+    if not same(message.state.objects, last.state.objects):
         return message
-    return Snapshot(replace(message.state, objects=seen.state.objects), message.ticket)
+    return Snapshot(replace(message.state, objects=last.state.objects), message.ticket)
 
 
 def _loaded(data: bytes, plans: PlanStore) -> StateMessage | None:

@@ -75,8 +75,8 @@ class ControlLoop:
         self._load()
         t = clock.now()
         sent = driver.start(t)
-        begun = session.begin(sent.q, sent.gripper, t)
-        self._state = begun if first is None else first(begun)
+        first_state = session.begin(sent.q, sent.gripper, t)
+        self._state = first_state if first is None else first(first_state)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
@@ -85,7 +85,7 @@ class ControlLoop:
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Publisher of the states of the loop."""
         self.state_publisher.publish(
-            self.state_publisher.snapshot, entries_between(begun, self._state)
+            self.state_publisher.snapshot, entries_between(first_state, self._state)
         )
         self.ticks = 0
         """Number of completed ticks."""
@@ -113,9 +113,9 @@ class ControlLoop:
             # Commands apply from now on, and not since the last tick, which may be long ago.
             before = replace(before, t=max(before.t, t - self._period))
         commands, has_failed = drained.commands, False
-        given = drained.last != self.state_publisher.snapshot.ticket
+        is_given = drained.last != self.state_publisher.snapshot.ticket
         try:
-            if self._settled and not given:
+            if self._settled and not is_given:
                 state = waited(self._session, before, t, self._driver.send)
             else:
                 state = stepped(self._session, before, commands, t, self._driver.send)
@@ -133,7 +133,7 @@ class ControlLoop:
         if self.record is not None and state is not before:
             self.record(TickRecord(before.t, t, drained.submissions, has_failed, state))
         # A state that differs only in its time is not published.
-        changed = given or _differs(before, state)
+        changed = is_given or _differs(before, state)
         self._resting = not (changed or state.moving)
         # Only time has passed, and nothing waits for it, as a film of water does that drains.
         self._settled = self._resting and not (state.under_way or state.blocked)

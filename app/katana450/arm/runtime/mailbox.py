@@ -62,7 +62,7 @@ class Drained:
     @property
     def commands(self) -> list[Command]:
         """The commands of the submissions, oldest first."""
-        return [each.command for each in self.submissions]
+        return [submission.command for submission in self.submissions]
 
 
 class Mailbox:
@@ -104,9 +104,9 @@ class Mailbox:
                     self._repeated[self._tickets] = command.cause
                     return self._tickets
                 # Never refused. Waiting commands are dropped; an earlier stop is fulfilled.
-                for each, tickets in zip(self._waiting, self._of_waiting, strict=True):
-                    if isinstance(each.command, Stop):
-                        command, actor = joined(each.command, command), each.actor
+                for submission, tickets in zip(self._waiting, self._of_waiting, strict=True):
+                    if isinstance(submission.command, Stop):
+                        command, actor = joined(submission.command, command), submission.actor
                         replaced.extend(tickets)
                     else:
                         self._dropped.extend(tickets)

@@ -63,14 +63,14 @@ class PlanningWorker:
 
     def deliver(self, command: cmd.Command, actor: Actor | None) -> int:
         """Implement ``CommandSink``. A command that is planned first gets no ticket of its own."""
-        traits = [each.traits for each in command.parts]
+        traits = [part.traits for part in command.parts]
         self.failure = ""
-        if not all(each.passive for each in traits):
+        if not all(part.passive for part in traits):
             self.cancel()
             self.newest_actor = actor
         # The hold for a driver who has left. A run that another person ordered is still wanted.
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
-        if any(each.supersedes for each in traits) and not left:
+        if any(part.supersedes for part in traits) and not left:
             self.redirected()
         if isinstance(command, cmd.Branch):
             self._plan(command, actor)

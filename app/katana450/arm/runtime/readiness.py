@@ -74,4 +74,4 @@ def _polled(fd: int, event: int, *, unknown: bool, unless: int = 0) -> bool:
         return unknown
     poll = select.poll()
     poll.register(fd, event | unless)
-    return any(found & event and not found & unless for _, found in poll.poll(0))
+    return any(flags & event and not flags & unless for _, flags in poll.poll(0))

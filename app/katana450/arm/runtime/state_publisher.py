@@ -74,14 +74,14 @@ class StatePublisher:
             return outcomes
 
     def wait_for_change(
-        self, seen: Snapshot, timeout: float, ended: Callable[[], bool] = lambda: False
+        self, last: Snapshot, timeout: float, ended: Callable[[], bool] = lambda: False
     ) -> Snapshot:
-        """Return the newest snapshot once it is another than ``seen``, or after ``timeout`` [s].
+        """Return the newest snapshot once it is another than ``last``, or after ``timeout`` [s].
 
         ``ended``: whether the thread that waits is to end. Call ``wake`` when that changes.
         """
         with self._published:
-            self._published.wait_for(lambda: self._snapshot is not seen or ended(), timeout)
+            self._published.wait_for(lambda: self._snapshot is not last or ended(), timeout)
             return self._snapshot
 
     def wake(self) -> None:
@@ -89,7 +89,7 @@ class StatePublisher:
         with self._published:
             self._published.notify_all()
 
-    def wait_for_command(self, seen: Snapshot, timeout: float) -> None:
-        """Return once a command newer than ``seen`` is published, or after ``timeout`` [s]."""
+    def wait_for_command(self, last: Snapshot, timeout: float) -> None:
+        """Return once a command newer than ``last`` is published, or after ``timeout`` [s]."""
         with self._published:
-            self._published.wait_for(lambda: self._snapshot.ticket != seen.ticket, timeout)
+            self._published.wait_for(lambda: self._snapshot.ticket != last.ticket, timeout)

@@ -65,13 +65,13 @@ class StopEnd:
 
     def _report(self) -> None:
         publisher = self._loop.state_publisher
-        seen, reported, ticks, sent = None, 0.0, -1, None
+        last, reported, ticks, sent = None, 0.0, -1, None
         with GuardedPipe(self._pipe, PIPE):
             while not self._cut.is_set():
-                if seen is not None:
-                    publisher.wait_for_change(seen, STATUS_INTERVAL)
-                seen, now = publisher.snapshot, time.monotonic()
-                state = seen.state
+                if last is not None:
+                    publisher.wait_for_change(last, STATUS_INTERVAL)
+                last, now = publisher.snapshot, time.monotonic()
+                state = last.state
                 stopped = None if state.stopped is None else state.stopped.cause
                 status = StopStatus(stopped, state.presses)
                 due = now - reported >= STATUS_INTERVAL and self._loop.ticks != ticks

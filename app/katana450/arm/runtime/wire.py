@@ -70,17 +70,17 @@ class PlanStore:
 
 class _Pickler(pickle.Pickler):
     def __init__(
-        self, file: io.BytesIO, known: dict[int, tuple[int, Plan]], there: frozenset[str]
+        self, file: io.BytesIO, known: dict[int, tuple[int, Plan]], sent_keys: frozenset[str]
     ) -> None:
         super().__init__(file, pickle.HIGHEST_PROTOCOL)
         self._known = known
-        self._there = there
+        self._there = sent_keys
         self.solids: set[str] = set()
 
     def persistent_id(self, value: Any) -> Any:
         if isinstance(value, Plan):
-            found = self._known.get(id(value))
-            return None if found is None else found[0]
+            entry = self._known.get(id(value))
+            return None if entry is None else entry[0]
         if not isinstance(value, Solid):
             return None
         known = value.key in self._there or value.key in self.solids
@@ -89,10 +89,10 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    def __init__(self, file: io.BytesIO, sent: dict[int, Plan], here: dict[str, Solid]) -> None:
+    def __init__(self, file: io.BytesIO, sent: dict[int, Plan], solids: dict[str, Solid]) -> None:
         super().__init__(file)
         self._sent = sent
-        self._here = here
+        self._here = solids
         self.solids: dict[str, Solid] = {}
 
     def persistent_load(self, named: Any) -> Any:

@@ -275,7 +275,7 @@ class DrivenTool:
     def _best(
         self, projections: Sequence[Projection], state: State, T: FloatArray, branch: AnyBranch
     ) -> Projection:
-        """Return the nearest of ``found``, on ``branch`` if one is.
+        """Return the nearest of ``projections``, on ``branch`` if one is.
 
         If the limits exclude the branch for the pose `T` (4, 4), the posture is on another one, and
         its limits are those that do so.

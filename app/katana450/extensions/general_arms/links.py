@@ -236,12 +236,12 @@ def _normal(
     within: tuple[float, float],
     almost: float,
 ) -> tuple[float, float, float, float, FloatArray]:
-    """Return the common normal of an axis through `here` and the next one.
+    """Return the common normal of an axis through `place` and the next one.
 
-    The values are its distance along the axis from `here` [m], its length [m], the twist and the
+    The values are its distance along the axis from `place` [m], its length [m], the twist and the
     tilt [rad], and its direction (3,). `x` is used where the axes are one line. ``within`` is the
     angle [rad] and the length [m] that count as 0. Up to the sine ``almost`` of their angle, the
-    line across the first axis from `here` is in place of the normal.
+    line across the first axis from `place` is in place of the normal.
     """
     across = np.cross(z, z2)
     sine, cosine = float(np.linalg.norm(across)), float(z @ z2)

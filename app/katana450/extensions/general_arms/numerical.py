@@ -333,7 +333,7 @@ class Numerical(GeneralKinematics):
 
 
 def _turn(pose: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, float, float]:
-    """Return the rotation vector [rad] from the first nine numbers of `here` to those of `goal`.
+    """Return the rotation vector [rad] from the first nine numbers of `pose` to those of `goal`.
 
     Half the sum of x x x', y x y', z x z' is its axis times its sine.
     """

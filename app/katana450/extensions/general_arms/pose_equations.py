@@ -164,7 +164,7 @@ class PoseEquations:
     def solved(self, q: FloatArray, locked_jets: Sequence[Jet], pose: ToolJets) -> JointJets:
         """Return the joints as jets at N places of a curve of poses, from angles `q` (N, n) [rad].
 
-        ``given``: the locked joints. The angles may be off by little.
+        ``locked_jets``: the locked joints. The angles may be off by little.
         """
         inverse = np.linalg.inv(self._matrix(q))
         zeros = np.zeros(len(q))
