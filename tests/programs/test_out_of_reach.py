@@ -141,3 +141,12 @@ def test_object_out_of_reach_is_reported_in_the_frame_of_the_script(stage: Stage
     why = refusal(stage, "  - put: {object: cup, x: 650, y: 0}\n  - pick: cup\n")
     assert "(650.0, 0.0, " in why
     assert "mm in the base frame" in why
+
+
+def test_a_line_is_suggested_up_to_the_limit_before_the_end_of_the_reach(stage: Stage) -> None:
+    """At 78 % the arm is stretched; axis 2 is at its limit long before."""
+    line = "steps:\n  - line: "
+    with pytest.raises(ScriptError, match=r"78\.7 % along it") as refused:
+        compiled(parse(line + "{by: {z: -500}}"), stage.plan_context, stage.begin())
+    _, remedy, _ = str(refused.value).split("`")
+    compiled(parse(f"{line}{{{remedy}}}"), stage.plan_context, stage.begin())

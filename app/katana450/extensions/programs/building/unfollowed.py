@@ -13,7 +13,7 @@ from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.curve_path import LostPathError
 from katana450.extensions.programs.planning.curves import Curve, line_between
 from katana450.extensions.programs.planning.out_of_reach import farthest, near_points
-from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.arrays import frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.checkpoint import checkpoint
@@ -86,9 +86,11 @@ def line_remedies(
     if isinstance(refused, LostPathError):
         reached = refused.sigma
     else:
-        reached = _farthest(lambda fraction: possible(end.moved(_between(start, end, fraction))))
+        reached = _farthest(
+            lambda fraction: possible(end.moved(start.towards(end, fraction).position))
+        )
     if reached * length > MIN_LENGTH + LEFT:
-        last = _between(start, end, reached - LEFT / length)
+        last = start.towards(end, reached - LEFT / length).position
         for text, p in near_points(plan.frame, last):
             if possible(end.moved(frozen(p))):
                 yield f"as far as `to: {text}`"
@@ -133,11 +135,6 @@ def _farthest(possible: Callable[[float], bool]) -> float:
         middle = 0.5 * (reached + beyond)
         reached, beyond = (middle, beyond) if possible(middle) else (reached, middle)
     return reached
-
-
-def _between(start: ToolTarget, end: ToolTarget, fraction: float) -> FloatArray:
-    """Return the point (3,) [m] at ``fraction`` of the line."""
-    return frozen(start.position + fraction * (end.position - start.position))
 
 
 def _other_pitch(end: ToolTarget, possible: Callable[[ToolTarget], bool]) -> Iterator[float]:
