@@ -26,6 +26,8 @@ def server() -> Iterator[AppServer]:
 @pytest.fixture
 def client(server: AppServer) -> Iterator[katana450.Client]:
     with katana450.connect(server.url, name="Plan") as connected:
+        # A sample that left late on a busy machine stops the arm.
+        connected.clear_stop()
         yield connected
 
 
