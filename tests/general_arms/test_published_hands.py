@@ -18,7 +18,8 @@ from tests.general_arms.published_hands import (
     px150_urdf,
     so101_urdf,
 )
-from tests.general_arms.test_grasping import in_base, item, place, planned, played
+from tests.general_arms.test_grasping import in_base, item, planned, played
+from tests.programs.test_pick_place import place
 
 TOUCH = 1e-3
 """[m] Maximum gap between an object and the sides that hold it."""
