@@ -58,6 +58,7 @@ def controls(page: ViserPage, tab: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.long
 def test_every_control_of_the_panel_has_a_name_and_can_be_hit(page: ViserPage) -> None:
     for tab in TABS:
         found = controls(page, tab)

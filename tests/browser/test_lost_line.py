@@ -39,6 +39,7 @@ def wait_answered(page: ViserPage) -> None:
     page.wait_until(lambda: worker.evaluate(answered, last), "an answer")
 
 
+@pytest.mark.long
 def test_page_reports_a_killed_server_and_reconnects(
     page: ViserPage, server: AppServer, artefacts: Path
 ) -> None:

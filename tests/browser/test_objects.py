@@ -137,6 +137,7 @@ def test_clicked_object_is_removed_by_delete_and_returns(
     page.page.wait_for_selector("#selection", state="hidden")
 
 
+@pytest.mark.long
 def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> None:
     start = np.array(truth.status()["goal"])
     page.drag_arrow(MOVE, "y", 0.1)

@@ -140,6 +140,7 @@ def test_wsl_opens_the_browser_of_windows(
     assert not opened
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="the browser is a shell script")
 def test_start_does_not_wait_for_the_browser(tmp_path: Path) -> None:
     browser, page, never = (tmp_path / name for name in ("browser", "page", "never"))

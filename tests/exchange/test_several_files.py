@@ -190,6 +190,7 @@ def test_files_beyond_the_limit_are_not_read() -> None:
     assert asked == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
 
 
+@pytest.mark.long
 def test_serve_places_objects_of_several_files_and_with_a_scale(
     tmp_path: Path, session: object
 ) -> None:

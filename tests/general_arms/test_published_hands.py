@@ -123,6 +123,7 @@ def gaps(plan: Planned, before: State, held: State, jaw: str) -> list[float]:
     return [*sides, distance]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", EVERY)
 def test_box_is_picked_and_placed(name: str, tmp_path: Path) -> None:
     kind = KINDS[name]

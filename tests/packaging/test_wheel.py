@@ -57,6 +57,7 @@ def test_commands_run_beside_files_of_the_user(python: Path, folder: Path) -> No
         assert '"T": [[1.0, ' in run(folder, *command, "fk", text=LINE)
 
 
+@pytest.mark.long
 def test_server_runs_beside_files_of_the_user(
     python: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

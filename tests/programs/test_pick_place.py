@@ -80,7 +80,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
     assert place(end["b"]) == pytest.approx([*NEAR, 0.0], abs=1e-6)
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize(
     ("steps", "message"),
     [

@@ -42,6 +42,7 @@ ARMS = {
 LONG = pytest.mark.long
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=() if name.startswith("Open") else LONG) for name in ARMS],

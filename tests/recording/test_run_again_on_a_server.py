@@ -130,6 +130,7 @@ def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_pat
     assert caught.value.status_code == 409
 
 
+@pytest.mark.long
 def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -> None:
     with katana450.connect(server.url, "Ada") as client:
         arm = client.query(answers.Arm)

@@ -114,6 +114,7 @@ def _cost(lines_open: ExitStack) -> None:
     asyncio.run(act())
 
 
+@pytest.mark.long
 def test_goal_of_a_client_that_answers_no_ping_ends() -> None:
     async def act() -> None:
         with AppServer(SIMULATION_APP) as server:
