@@ -81,6 +81,7 @@ def _run(
     meshes = Meshes(config.folder)
     gateway = Gateway(config.settings, web, lines, meshes)
     gateway.hub.supervisor_problem = lambda: supervisor.problem
+    gateway.hub.replace_robot = supervisor.replace_robot
     supervisor.notify = gateway.announce
     senders: list[Callable[[], None]] = []
     try:

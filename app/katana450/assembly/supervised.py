@@ -15,6 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 from katana450.arm.runtime.arm_listener import RECORD, ArmAddress, Greeting, connect_when_ready
 from katana450.arm.runtime.readiness import writable
@@ -22,10 +23,11 @@ from katana450.assembly.log_output import start_log
 from katana450.errors import KatanaError
 from katana450.platform_support import name_process, stop_signals, unblock_stop_signals
 
-HEARTBEAT, REPORT, KEPT, SCENE, UNHEARD = b".", b"r", b"k", b"s", b"u"
+HEARTBEAT, REPORT, KEPT, SCENE, UNHEARD, ROBOT = b".", b"r", b"k", b"s", b"u", b"c"
 """First bytes of the messages to the supervisor: a heartbeat with the processor time that was used
 so far [s]; a status word or an error; the last known state of the arm, without and with its scene,
-which only the arm's process reads; and the name of a process from which this one hears nothing."""
+which only the arm's process reads; the name of a process from which this one hears nothing; and
+the file of another robot, with which all processes must start again."""
 
 END, NOTICE = b"e", b"n"
 """First bytes of the messages of the supervisor, beside heartbeats: the process must end; and a
@@ -94,6 +96,10 @@ class SupervisorPipe:
     def report_unheard(self, name: str) -> None:
         """Report that the process ``name``, if it runs at all, no longer reaches this one."""
         self._send(UNHEARD + name.encode())
+
+    def replace_robot(self, urdf: Path) -> None:
+        """Let the supervisor start all processes again, with the robot in the file ``urdf``."""
+        self._send(ROBOT + str(urdf).encode())
 
     def keep(self, kind: bytes, content: bytes) -> bool:
         """Let the supervisor keep ``content`` for the next process, in place of the last ``kind``.

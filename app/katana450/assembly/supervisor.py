@@ -18,6 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 from typing import Any
 
 from katana450.arm.runtime.readiness import writable
@@ -29,6 +30,7 @@ from katana450.assembly.supervised import (
     NOTICE,
     READY,
     REPORT,
+    ROBOT,
     SCENE,
     UNHEARD,
     SupervisorPipe,
@@ -124,6 +126,8 @@ class Child:
         self.error: KatanaError | None = None
         self.unheard = ""
         """Name of a process that the newest message says is not heard there; "" for none."""
+        self.robot: Path | None = None
+        """File of the robot with which all processes must start again; None for no other one."""
         self.kept: Kept = {}
         self.due: float | None = 0.0
         """Time of the next start [s]; None while a process runs."""
@@ -177,6 +181,8 @@ class Child:
                     self.used = float(content)
                 elif kind == UNHEARD:
                     self.unheard = content.decode()
+                elif kind == ROBOT:
+                    self.robot = Path(content.decode())
                 elif kind == REPORT:
                     self._note(pickle.loads(content))
 
@@ -312,11 +318,16 @@ class Supervisor:
                     raise ConfigurationError(f"{child.spec.title} did not start: it {why}.")
 
     def run(self) -> None:
-        """Watch all processes until ``stopping`` is set."""
-        while not self._stopping.is_set():
+        """Watch all processes until ``stopping`` is set, or until one asks for another robot."""
+        while not self._stopping.is_set() and self.robot is None:
             self._wait()
             for child in self._children.values():
                 self._watch(child)
+
+    @property
+    def robot(self) -> Path | None:
+        """File of the robot with which all processes must start again; None for no other one."""
+        return next(filter(None, (child.robot for child in self._children.values())), None)
 
     def stop(self) -> None:
         """End all processes."""

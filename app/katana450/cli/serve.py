@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import shutil
 import signal
+import socket
 import tempfile
 import threading
 from argparse import Namespace
 from contextlib import suppress
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -25,7 +27,7 @@ from katana450.assembly.stop_process import run_stop
 from katana450.assembly.supervised import READY
 from katana450.assembly.supervisor import ChildSpec, Supervisor, Work, child_spec
 from katana450.cli.open_page import show_page
-from katana450.errors import ConfigurationError
+from katana450.errors import ConfigurationError, KatanaError
 from katana450.extension import ExtraProcess, ServerFacts, ServerLog, results
 from katana450.platform_support import (
     claim_file,
@@ -37,6 +39,8 @@ from katana450.platform_support import (
 )
 from katana450.server.web.listen import LOOPBACK, listen, listen_beside, raise_descriptor_limit
 from katana450.settings import FIXED, Settings
+
+log = logging.getLogger(__name__)
 
 FRONT_END, STOP = "katana450 front", "katana450 stop"
 """Names of the processes beside that of the arm."""
@@ -80,60 +84,116 @@ def serve(options: Namespace) -> int:
     stopping_socket = listen_beside(listening, settings.host, settings.stop_port)
     port, stop_port = listening.getsockname()[1], stopping_socket.getsockname()[1]
     settings = replace(settings, stop_port=stop_port)
-    url = settings.public_url or local_url(settings, port)
     event_log: ServerLog = next(results("server_log", options, port), ServerLog())
-    folder, claimed = _private_folder()
-    address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
-    facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
-    front_end_work = _FrontendWork(facts, Sockets(listening, lines), event_log)
-    stop = partial(run_stop, facts, stopping_socket)
-    extra: list[ExtraProcess] = [*results("process", options, facts)]
-    specs = (
-        child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
-        ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
-        child_spec(ARM, "The arm's process", partial(run_arm, facts), ARM_DEADLINE, keeps=True),
-        *(
-            replace(
-                child_spec(
-                    process.name,
-                    process.title,
-                    partial(process.run, process.config),
-                    EXTRA_DEADLINE,
-                ),
-                late=True,
-            )
-            for process in extra
-        ),
-    )
-    supervisor = Supervisor(specs, stopping, event_log.restart)
+    server = _Server(settings, Sockets(listening, lines), stopping_socket, event_log, stopping)
+    again, before = False, None
     try:
-        supervisor.start()
-        supervisor.wait_for(ARM, READY)
-        supervisor.wait_for(FRONT_END, OPEN)
-        if not stopping.is_set():
-            say(f"Open {url} in a browser.")
-            # With access links each person has an address of their own.
-            if not options.no_browser and settings.access is None:
-                show_page(url, port, stop_port)
-        supervisor.wait_for(STOP, READY)
-        supervisor.wait_for(FRONT_END, READY)
-        if not stopping.is_set():
-            if lines is not None:
-                say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
-            for line in (*event_log.description, *(added.description for added in extra)):
-                say(line)
-            say(f"katana450 is ready: {url} (STOP also on port {stop_port}; Ctrl-C stops)")
-        supervisor.run()
+        while True:
+            try:
+                chosen = server.run(options, again=again)
+            except KatanaError as error:
+                if before is None:
+                    raise
+                # It was read without a fault before, so this is rare.
+                log.error("%s cannot be driven: %s", options.urdf.name, error)
+                options, before = before, None
+                options.robot_problem = str(error)
+                continue
+            if chosen is None:
+                return 0
+            again, before = True, options
+            # What belongs to the robot before is left out.
+            others = dict.fromkeys(("tool", "scene", "workspace", "xacro_arg", "robot_problem"))
+            options = Namespace(**{**vars(options), **others, "urdf": chosen, "objects": []})
     finally:
-        supervisor.stop()
-        # The event log is complete once the pipe of the last front end has ended.
-        front_end_work.close()
         listening.close()
         stopping_socket.close()
         event_log.close(requested=stopping.is_set())
-        os.close(claimed)
-        shutil.rmtree(folder, ignore_errors=True)
-    return 0
+
+
+@dataclass(frozen=True)
+class _Server:
+    """The parts of the server that stay while it changes its robot.
+
+    Attributes:
+        settings: settings of the server.
+        sockets: the sockets of the page and of programs, held by this process, so that the ports
+            stay taken.
+        stopping_socket: the socket for STOP.
+        event_log: the event log.
+        stopping: set when the server must end.
+    """
+
+    settings: Settings
+    sockets: Sockets
+    stopping_socket: socket.socket
+    event_log: ServerLog
+    stopping: threading.Event
+
+    def run(self, options: Namespace, *, again: bool) -> Path | None:
+        """Run all processes with the robot that ``options`` name.
+
+        Returns the file of another robot that a person chose meanwhile; None if the server must
+        end. ``again``: whether it drove another robot before.
+        """
+        settings, stopping, event_log = self.settings, self.stopping, self.event_log
+        port = self.sockets.pages.getsockname()[1]
+        url = settings.public_url or local_url(settings, port)
+        folder, claimed = _private_folder()
+        address = ArmAddress(pipe_address(folder, "arm"), os.urandom(32))
+        facts = ServerFacts(settings, options.urdf, options.tool, port, address, options, folder)
+        front_end_work = _FrontendWork(facts, self.sockets, event_log)
+        stop = partial(run_stop, facts, self.stopping_socket)
+        extra: list[ExtraProcess] = [*results("process", options, facts)]
+        specs = (
+            child_spec(STOP, "The process of STOP", stop, STOP_DEADLINE),
+            ChildSpec(FRONT_END, "The page's server", front_end_work, FRONT_END_DEADLINE),
+            child_spec(ARM, "The arm's process", partial(run_arm, facts), ARM_DEADLINE, keeps=True),
+            *(
+                replace(
+                    child_spec(
+                        process.name,
+                        process.title,
+                        partial(process.run, process.config),
+                        EXTRA_DEADLINE,
+                    ),
+                    late=True,
+                )
+                for process in extra
+            ),
+        )
+        supervisor = Supervisor(specs, stopping, event_log.restart)
+        try:
+            supervisor.start()
+            supervisor.wait_for(ARM, READY)
+            supervisor.wait_for(FRONT_END, OPEN)
+            if not (stopping.is_set() or again):
+                say(f"Open {url} in a browser.")
+                # With access links each person has an address of their own.
+                if not options.no_browser and settings.access is None:
+                    show_page(url, port, settings.stop_port or 0)
+            supervisor.wait_for(STOP, READY)
+            supervisor.wait_for(FRONT_END, READY)
+            if again and not stopping.is_set():
+                say(f"katana450 is ready with {options.urdf.name}: {url}")
+            elif not stopping.is_set():
+                lines = self.sockets.lines
+                if lines is not None:
+                    say(f"Programs: JSON lines on {LOOPBACK}:{lines.getsockname()[1]}.")
+                for line in (*event_log.description, *(added.description for added in extra)):
+                    say(line)
+                say(
+                    f"katana450 is ready: {url} (STOP also on port {settings.stop_port}; Ctrl-C "
+                    "stops)"
+                )
+            supervisor.run()
+            return supervisor.robot
+        finally:
+            supervisor.stop()
+            # The event log is complete once the pipe of the last front end has ended.
+            front_end_work.close()
+            os.close(claimed)
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 class _FrontendWork:

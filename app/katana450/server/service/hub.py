@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from katana450.arm.control import commands as cmd
@@ -79,6 +80,8 @@ class Hub:
         self._driver_watch = DriverWatch(self.gate, self._ticked)
         self.supervisor_problem: Callable[[], str | None] = lambda: None
         """Returns what is wrong with the supervisor of this process, in words."""
+        self.replace_robot: Callable[[Path], None] | None = None
+        """Starts the server again with the robot in a file; None where that is not possible."""
         self.shown: dict[str, Any] = {}
         """Entries of extensions in the status of all pages. It is replaced, never changed."""
 
