@@ -49,6 +49,11 @@ EXTENSIONS = (
         folder=f"{HERE}.programs.server.panel:programs_panel",
     ),
     Extension(
+        "robot_choice",
+        routes=f"{HERE}.robot_choice.serve_parts:robot_routes",
+        handler=f"{HERE}.robot_choice.choose_robot:RobotChoice",
+    ),
+    Extension(
         "importers",
         serve_options=f"{HERE}.importers.serve_parts:add_serve_options",
         initial_scene=f"{HERE}.importers.serve_parts:chosen_scene",

@@ -1,0 +1,1 @@
+"""The choice of the robot on the page, while the server runs."""

@@ -1,0 +1,74 @@
+"""A trial of reading a robot in a disposable process, before a server changes to it.
+
+``checked_robot`` starts it as ``python -m katana450.extensions.robot_choice.robot_check FILE
+NAME:=VALUE``. It limits its memory and time, reads the robot as the server will, and writes JSON to
+standard output: {"urdf": path}, or {"why": reason}.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from katana450.errors import InputError, KatanaError
+from katana450.platform_support import hanging_time, limit_resources
+
+SECONDS = 30.0
+"""[s] Maximum processor time of reading a robot."""
+
+MAX_MEMORY_BYTES = 4 << 30
+"""[bytes] Maximum memory for reading a robot."""
+
+
+def checked_robot(path: Path, arguments: Mapping[str, str]) -> Path:
+    """Return the URDF file of the robot at ``path``, which the server can drive.
+
+    ``arguments``: values of arguments of a xacro file. Raises InputError with the reason if the
+    server could not read it.
+    """
+    words = [f"{name}:={value}" for name, value in arguments.items()]
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", __name__, str(path.absolute()), *words],
+            # The parent folder of the package.
+            cwd=Path(__file__).resolve().parents[3],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=hanging_time(SECONDS),
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(f"{path.name} takes too long to read.") from error
+    if done.returncode:
+        raise InputError(
+            f"{path.name} cannot be read: it needs more than {SECONDS:g} s of processor time or "
+            f"{MAX_MEMORY_BYTES >> 30} GiB, or a file is corrupt. Try simpler meshes."
+        )
+    answer: dict[str, str] = json.loads(done.stdout)
+    if "why" in answer:
+        raise InputError(answer["why"].replace(f"{path.parent}/", ""))
+    return Path(answer["urdf"])
+
+
+def main(path: Path, arguments: Mapping[str, str]) -> None:
+    """Read the robot at ``path``, and print the answer."""
+    limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
+    from katana450.assembly.robot_session import find_robot
+    from katana450.extensions.xacro.xacro_file import expanded_file
+    from katana450.settings import Settings
+
+    try:
+        urdf = expanded_file(path, arguments) if arguments else path
+        find_robot(Settings(), urdf, None)
+    except KatanaError as error:
+        print(json.dumps({"why": str(error)}))
+    else:
+        print(json.dumps({"urdf": str(urdf)}))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), dict(word.split(":=", 1) for word in sys.argv[2:]))

@@ -1,0 +1,128 @@
+"""The routes of the list of robots, and of the upload of one."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from contextlib import suppress
+
+import msgspec
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route
+
+from katana450.arm.control.actor import CommandChannel
+from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.gallery.arms_command import listed_robots
+from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
+from katana450.extensions.robot_choice.choose_robot import OWN
+from katana450.extensions.robot_choice.uploaded_robots import keep_robot, uploaded_robots
+from katana450.server.api import answers
+from katana450.server.api.fields import ROOT
+from katana450.server.service.participants import actor_of
+from katana450.server.web.bodies import NOT_UNDERSTOOD, TOO_MANY, as_json, body_of
+from katana450.server.web.http_api import RouteContext
+from katana450.server.web.limits import TokenBucket
+
+UPLOAD_SECONDS, MIN_RATE = 60.0, 20_000.0
+"""Timeout of an upload [s], and its minimum mean rate [bytes/s]."""
+
+UPLOADS_PER_SECOND, BURST = 0.2, 5.0
+"""Robots that are uploaded per second, and in a burst, by all people together."""
+
+NOT_ALLOWED = 403
+
+ARGUMENT = re.compile(rb"""<xacro:arg\s+name\s*=\s*["']([\w.-]+)["']([^>]*)""")
+DEFAULT = re.compile(rb"""default\s*=\s*["']([^"']*)["']""")
+
+MAX_ARGUMENTS = 20
+
+
+class Choice(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A robot that can be chosen.
+
+    Attributes:
+        name: Its name in a request.
+        title: Its name for people.
+        maker: Its maker; empty if unknown.
+        licence: Licence of the description; empty if unknown.
+        kind: "own", "uploaded" or "gallery"; those of the gallery may have to be downloaded.
+        arguments: Arguments of a xacro file and their defaults.
+    """
+
+    name: str
+    title: str
+    kind: str
+    maker: str = ""
+    licence: str = ""
+    arguments: dict[str, str] = {}
+
+
+class Choices(msgspec.Struct, frozen=True):
+    """The robots that can be chosen."""
+
+    robots: list[Choice]
+
+
+class Kept(msgspec.Struct, frozen=True):
+    """The answer to an upload: the robot that is kept, to be chosen by its name."""
+
+    robot: Choice
+
+
+def choices() -> list[Choice]:
+    """Return the robots that can be chosen: ours, those that were uploaded, and the gallery."""
+    robots = [Choice(OWN, "Katana450", "own", "Neuronics", "MIT")]
+    robots += map(_uploaded, uploaded_robots())
+    # Without the extra there is no gallery.
+    with suppress(ConfigurationError):
+        robots += [
+            Choice(robot.name, robot.robot, "gallery", robot.maker, robot.licence)
+            for robot in listed_robots().values()
+            if robot.urdf
+        ]
+    return robots
+
+
+def _uploaded(name: str) -> Choice:
+    path = uploaded_robots()[name]
+    text = path.read_bytes()[:1_000_000]
+    arguments: dict[str, str] = {}
+    for key, more in ARGUMENT.findall(text)[:MAX_ARGUMENTS]:
+        default = DEFAULT.search(more)
+        arguments[key.decode()] = default[1].decode("utf-8", "replace") if default else ""
+    return Choice(name, path.name, "uploaded", arguments=arguments)
+
+
+def routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the routes of the list, and of the upload."""
+    hub = context.hub
+    uploads = TokenBucket(UPLOADS_PER_SECOND, BURST, hub.clock())
+
+    async def robots(request: Request) -> Response:
+        context.identity(request)
+        answer = Choices(await asyncio.to_thread(choices))
+        return Response(msgspec.json.encode(answer), media_type="application/json")
+
+    async def upload(request: Request) -> Response:
+        sender = context.identity(request)
+        if not sender.role.may_drive:
+            raise HTTPException(NOT_ALLOWED, "Your role may watch, but not upload files.")
+        if not uploads.take(hub.clock()):
+            return as_json(answers.Refused(why="Too many files. Wait a moment."), TOO_MANY)
+        name, main = (request.query_params.get(key, "")[:200] for key in ("name", "main"))
+        hub.recorder.note("upload", actor_of(sender, CommandChannel.HTTP), {"name": name})
+        data = await body_of(request, MAX_ARCHIVE_BYTES, UPLOAD_SECONDS, MIN_RATE)
+        try:
+            key = await asyncio.to_thread(keep_robot, data, name, main)
+        except ChoiceError as error:
+            refused = answers.Refused(why=str(error), choices=list(error.choices))
+            return as_json(refused, NOT_UNDERSTOOD)
+        except (InputError, ConfigurationError) as error:
+            return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
+        answer = Kept(await asyncio.to_thread(_uploaded, key))
+        return Response(msgspec.json.encode(answer), media_type="application/json")
+
+    path = f"{ROOT}/robots"
+    return [Route(path, robots), Route(path, upload, methods=["POST"])]
