@@ -15,6 +15,7 @@ const More = (() => {
   let kept = null;
   let wanted = ""; // name that was sent and not answered yet
   let known = ""; // name that the server shows
+  let robot = null; // the robot that the server drives
   let chosen = ""; // name that the server has taken, if the browser stores none
 
   const refuse = (words) => {
@@ -85,6 +86,7 @@ const More = (() => {
       const { keep } = await import("./more/keep.js");
       keep(toast, { last: RECORDED });
     });
+    byId("robots-button").addEventListener("click", () => chooseRobot());
     // In the bar, or in the menu for a finger.
     for (const id of ["phone-bar", "phone-button"])
       byId(id).addEventListener("click", async () => {
@@ -93,6 +95,20 @@ const More = (() => {
         toggle(toast);
       });
   }
+
+  // Show the choice of another robot; `file`: a description that was dropped on the page.
+  async function chooseRobot(file) {
+    if (dialog.open) dialog.close();
+    const { toggle } = await import("./more/robots.js");
+    toggle({ say, robot, file });
+  }
+
+  // All windows load again when the server has changed its robot.
+  window.addEventListener("status", ({ detail }) => {
+    if (!detail.robot) return;
+    if (robot && robot.key !== detail.robot.key) location.reload();
+    ({ robot } = detail);
+  });
 
   // Take the name in a status; use the kept one for a person whom the server has named.
   function draw(name) {
@@ -105,6 +121,10 @@ const More = (() => {
 
   // Take an answer; return whether it was for the menu.
   function hear(answer) {
+    if (answer.id === "robot") {
+      if (answer.is === "refused") import("./more/robots.js").then(({ refuse }) => refuse(answer.why));
+      return true;
+    }
     if (answer.id !== ID) return false;
     if (answer.is === "refused") {
       refuse(answer.why);
@@ -118,5 +138,5 @@ const More = (() => {
     return true;
   }
 
-  return { begin, draw, hear };
+  return { begin, draw, hear, chooseRobot };
 })();

@@ -155,6 +155,8 @@ const Objects = (() => {
   // Read files that were chosen or dropped: one object or several, or a scene in a .zip file. `entries` are the dropped
   // files and folders, `at` is the point of the table on which they were dropped.
   async function take(list, entries, at = null) {
+    const robot = [...list].find(({ name }) => /\.(urdf|xacro)$/i.test(name));
+    if (robot) return More.chooseRobot(robot);
     where = at;
     if (byId("objects").hidden) byId("objects-button").click();
     const { gathered, areAlone, excess, zipped, isScene } = await files();

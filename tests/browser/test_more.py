@@ -18,6 +18,8 @@ from tests.browser.server import APP, AppServer
 from tests.browser.session import Truth, bar
 from tests.browser.sight import contrast
 from tests.browser.sizes import PHONE, PORTRAIT
+from tests.browser.test_accessibility import AXE, findings
+from tests.extensions.test_robot_choice import urdf
 
 
 def test_server_that_records_nothing_says_so(own_page: ViserPage) -> None:
@@ -112,3 +114,31 @@ def assert_code_holds_the_address(page: ViserPage, server: AppServer, artefacts:
     code.wait_for(state="hidden")
     page.wait_until(lambda: button.get_attribute("aria-expanded") == "false", "it is closed")
     assert page.errors == []
+
+
+@pytest.mark.long
+def test_another_robot_is_opened_and_every_window_loads_again(
+    open_page: OpenPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, artefacts: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    arm = tmp_path / "small.urdf"
+    arm.write_bytes(urdf())
+    with AppServer(APP) as server:
+        windows = [open_page(server.url, drawing=Drawing.NONE) for _ in range(2)]
+        page = windows[0].page
+        page.click("#more-button")
+        page.click("#robots-button")
+        page.get_by_role("button", name="Katana450").wait_for()
+        page.get_by_label("Search a robot").fill("nothing")
+        page.get_by_text("No robot has this name or maker.").wait_for()
+        if AXE.exists():
+            assert findings(page) == []
+        windows[0].keep(artefacts / "robots.png")
+        begun = [window.page.evaluate("performance.timeOrigin") for window in windows]
+        page.set_input_files("#robots input[type=file]", arm)
+        for window, time_origin in zip(windows, begun, strict=True):
+            window.page.wait_for_function(
+                "(begun) => performance.timeOrigin > begun", arg=time_origin, timeout=40_000
+            )
+            window.page.wait_for_function("document.querySelector('#holder').textContent")
+        assert [window.errors for window in windows] == [[], []]
