@@ -140,5 +140,5 @@ def test_another_robot_is_opened_and_every_window_loads_again(
             window.page.wait_for_function(
                 "(begun) => performance.timeOrigin > begun", arg=time_origin, timeout=40_000
             )
-            window.page.wait_for_function("document.querySelector('#holder').textContent")
+            window.page.locator("#holder").filter(has_text="drives").wait_for()
         assert [window.errors for window in windows] == [[], []]
