@@ -146,11 +146,11 @@ class Limiter:
         wanted = np.clip(qd, -self.limits.speed, self.limits.speed)
         synchronization = Synchronization.Phase
         for _ in range(len(wanted) + 1):
-            ahead = self._rates(now, wanted, dt, synchronization)
-            stopping_point = self.stopping_point(ahead)
+            next_rates = self._rates(now, wanted, dt, synchronization)
+            stopping_point = self.stopping_point(next_rates)
             beyond = (stopping_point < self.limits.lower) | (stopping_point > self.limits.upper)
             if not beyond.any():
-                return ahead
+                return next_rates
             wanted = np.where(beyond, 0.0, wanted)
             synchronization = Synchronization.No
         return self.stop(now, dt)
@@ -224,8 +224,8 @@ class Limiter:
         The function is valid only until the next call of this limiter.
         """
         self._brake(now)
-        at = self._trajectory.at_time
-        return lambda t: JointMotion(*map(np.array, at(t))), self._trajectory.duration
+        state_at = self._trajectory.at_time
+        return lambda t: JointMotion(*map(np.array, state_at(t))), self._trajectory.duration
 
     def fastest(self, now: JointMotion) -> FloatArray:
         """Return the maximum rates (n,) [rad/s] while braking from now on: they may still rise."""
@@ -268,18 +268,18 @@ class Limiter:
         d = offset / length
         limits, line = self.limits, self._line
         v, a = float(now.qd @ d), float(now.qdd @ d)
-        beside = max(
+        deviation = max(
             float(np.max(np.abs(now.qd - v * d) / limits.speed)),
             float(np.max(np.abs(now.qdd - a * d) / limits.acceleration)),
         )
-        if beside > LINE_TOLERANCE:
+        if deviation > LINE_TOLERANCE:
             return None
         # A joint that hardly takes part bounds nothing.
         with np.errstate(divide="ignore", over="ignore"):
             of_axis = 1.0 / np.abs(d)
             speed, acceleration, jerk = (
-                float(np.min(each * of_axis))
-                for each in (limits.speed, limits.acceleration, limits.jerk)
+                float(np.min(limit * of_axis))
+                for limit in (limits.speed, limits.acceleration, limits.jerk)
             )
         line.current_position, line.target_position = [0.0], [length]
         line.current_velocity, line.current_acceleration = [v], [a]
@@ -338,15 +338,15 @@ class Limiter:
     def _inside(self) -> bool:
         extrema = self._trajectory.position_extrema
         return all(
-            lower - LIMIT_TOLERANCE <= each.min and each.max <= upper + LIMIT_TOLERANCE
-            for each, lower, upper in zip(
+            lower - LIMIT_TOLERANCE <= value.min and value.max <= upper + LIMIT_TOLERANCE
+            for value, lower, upper in zip(
                 extrema, self.limits.lower.tolist(), self.limits.upper.tolist(), strict=True
             )
         )
 
     def _at(self, dt: float, goal: FloatArray | None, *, to_rest: bool = False) -> JointMotion:
         ends = self._trajectory.duration <= dt
-        q, qd, qdd = (np.array(each) for each in self._trajectory.at_time(dt))
+        q, qd, qdd = (np.array(values) for values in self._trajectory.at_time(dt))
         if goal is not None and ends:
             return JointMotion.rest(goal)
         np.clip(q, self.limits.lower, self.limits.upper, out=q)

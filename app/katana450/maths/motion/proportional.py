@@ -58,15 +58,15 @@ def in_proportion(
     a = float(own @ d)
     old = own - a * d
     with np.errstate(divide="ignore"):
-        kept = max(0.0, 1.0 - OLD_FRACTION * dt * float(np.min(J / np.abs(old)))) * old
+        old_part = max(0.0, 1.0 - OLD_FRACTION * dt * float(np.min(J / np.abs(old)))) * old
         left, used = A - np.abs(old), np.sign(d) * drift
         faster, slower = (float(np.min(x / np.abs(d))) for x in (left - used, left + used))
-        j = float(np.min((J - np.abs(old - kept) / dt) / np.abs(d)))
+        j = float(np.min((J - np.abs(old - old_part) / dt) / np.abs(d)))
     # After this tick and one more, the jerk can still end the acceleration at the wanted speed.
-    ahead = size - 0.5 * dt * a
-    b = math.copysign(j * (math.sqrt(dt * dt + 2.0 * abs(ahead) / j) - dt), ahead)
+    remaining = size - 0.5 * dt * a
+    b = math.copysign(j * (math.sqrt(dt * dt + 2.0 * abs(remaining) / j) - dt), remaining)
     b = min(max(b, -slower, a - j * dt), max(faster, a - j * dt), a + j * dt)
-    first, last = a * d + old, b * d + kept
+    first, last = a * d + old, b * d + old_part
     q = now.q + dt * (0.5 * (now.qd + coasting) + dt * (first / 3.0 + last / 6.0))
     motion = JointMotion(
         frozen(q), frozen(coasting + 0.5 * dt * (first + last)), frozen(last + drift)

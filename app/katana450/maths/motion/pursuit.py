@@ -62,9 +62,9 @@ def pursued(
     limits = limiter.limits
     A, J, V = limits.acceleration, limits.jerk, max(fraction, MIN_SPEED_FRACTION) * limits.speed
     qd, qdd = np.clip(wanted.qd, -V, V), np.clip(wanted.qdd, -A, A)
-    here = braked(now.q, now.qd, now.qdd, A, J)
-    low = np.minimum(np.maximum(bounds[0], limits.lower), here)
-    high = np.maximum(np.minimum(bounds[1], limits.upper), here)
+    halt = braked(now.q, now.qd, now.qdd, A, J)
+    low = np.minimum(np.maximum(bounds[0], limits.lower), halt)
+    high = np.maximum(np.minimum(bounds[1], limits.upper), halt)
     dip, peak = _rates_ahead(now.qd, now.qdd, J)
     slowest, fastest = np.minimum(-V, dip), np.maximum(V, peak)
 

@@ -133,7 +133,7 @@ class Stream:
             return Stream.begin(t, q, qd)
         interval = t - self.t
         if interval < SPACING:
-            kept, period, jitter = slice(0, -1), self.period, self.jitter
+            newest, period, jitter = slice(0, -1), self.period, self.jitter
         else:
             period = self.period + AVERAGING * (interval - self.period) if self.period else interval
             weight = min(AVERAGING / 2.0 * max(period / READ_DELAY, 1.0), MAX_JITTER_WEIGHT)
@@ -144,17 +144,17 @@ class Stream:
                 else WINDOW + min(WINDOW_PER_JITTER * jitter, MAX_ADDED_WINDOW)
             )
             first = int(np.searchsorted(self.times, t - window))
-            kept = slice(max(min(first, len(self.times) - MIN_SAMPLES + 1), 0), None)
-        times = np.append(self.times[kept], t if interval >= SPACING else self.t)
-        samples = np.vstack((self.q[kept], q))
+            newest = slice(max(min(first, len(self.times) - MIN_SAMPLES + 1), 0), None)
+        times = np.append(self.times[newest], t if interval >= SPACING else self.t)
+        samples = np.vstack((self.q[newest], q))
         if rates is not None and qd is not None:
-            rates = np.vstack((rates[kept], qd))
+            rates = np.vstack((rates[newest], qd))
         parabola = _fitted(times, samples, rates)
         fading = math.exp(-max(interval, 0.0) / TURN_MEMORY)
         hardness = np.maximum(1.0 + fading * (self.hardness - 1.0), 1.0)
         if times[-1] - times[0] >= MIN_SPREAD:
-            seen = HARDNESS_MARGIN * np.abs(2.0 * parabola[2]) / acceleration
-            hardness = np.maximum(hardness, np.minimum(seen, MAX_HARDNESS))
+            measured_hardness = HARDNESS_MARGIN * np.abs(2.0 * parabola[2]) / acceleration
+            hardness = np.maximum(hardness, np.minimum(measured_hardness, MAX_HARDNESS))
         return Stream(
             times,
             samples,
@@ -169,8 +169,8 @@ class Stream:
 
     def at(self, now: float) -> JointMotion:
         """Return the motion of the stream at ``now`` [s]: q, qd, qdd (n,) a short lag ago."""
-        seen = min(now, self.sure_until)
-        late, known = now - seen, seen - self._lag - self.t
+        instant = min(now, self.sure_until)
+        late, known = now - instant, instant - self._lag - self.t
         c0, c1, c2 = self.parabola
         q, qd = c0 + known * (c1 + known * c2), c1 + 2.0 * known * c2
         qdd = 2.0 * c2 if late == 0.0 else 0.0 * c2
@@ -186,5 +186,5 @@ def _fitted(times: FloatArray, q: FloatArray, qd: FloatArray | None) -> FloatArr
         rows = np.concatenate((rows, RATES_WEIGHT * slopes))
         values = np.concatenate((values, RATES_WEIGHT * qd))
         degree = min(3, 1 + len(times))
-    found = np.linalg.lstsq(rows[:, :degree], values, rcond=None)[0]
-    return np.concatenate((found, np.zeros((3 - degree, q.shape[1]))))
+    coefficients = np.linalg.lstsq(rows[:, :degree], values, rcond=None)[0]
+    return np.concatenate((coefficients, np.zeros((3 - degree, q.shape[1]))))

@@ -85,7 +85,12 @@ class SweptClearance:
         return SweptClearance(world, minimum)
 
     def blocked(
-        self, at: At, turned: Turned, low: float = 0.0, high: float = 1.0, fine: float = FINE
+        self,
+        posture_at: At,
+        turned: Turned,
+        low: float = 0.0,
+        high: float = 1.0,
+        fine: float = FINE,
     ) -> Clearance | None:
         """Return a place on the path from `low` to `high` that is too near; None if it is clear.
 
@@ -97,7 +102,7 @@ class SweptClearance:
             checkpoint()
             low, high = pieces.pop()
             middle = 0.5 * (low + high)
-            x = at(middle)
+            x = posture_at(middle)
             placed = self.world.at(x)
             travel = self._travel(placed, x, turned, low, high)
             # If joints turn too far for a bound, only the place itself is checked.
@@ -126,7 +131,7 @@ class SweptClearance:
             lambda fraction: start + fraction * line, lambda a, b: (b - a) * np.abs(line)
         )
 
-    def nearest(self, at: At, turned: Turned) -> Clearance | None:
+    def nearest(self, posture_at: At, turned: Turned) -> Clearance | None:
         """Return the nearest place of the whole path, to FRACTION; None when no parts can meet."""
         best: Clearance | None = None
         pieces = [(0.0, 1.0)]
@@ -134,13 +139,13 @@ class SweptClearance:
             checkpoint()
             low, high = pieces.pop()
             middle = 0.5 * (low + high)
-            x = at(middle)
+            x = posture_at(middle)
             placed = self.world.at(x)
-            here = placed.nearest()
-            if here is None:
+            clearance = placed.nearest()
+            if clearance is None:
                 return None
-            if best is None or here.distance < best.contact.distance:
-                best = Clearance(here, middle)
+            if best is None or clearance.distance < best.contact.distance:
+                best = Clearance(clearance, middle)
             travel = self._travel(placed, x, turned, low, high)
             if travel is None:
                 pieces += [(low, middle), (middle, high)]
@@ -177,7 +182,7 @@ class Sweep:
         self._sigma = np.unique(np.concatenate((even, np.array(path.joins))))
         d = np.abs(joint_derivatives(path, self._sigma))
         h = np.diff(self._sigma)[:, None]
-        rate, jerk = (np.maximum(each[:-1], each[1:]) for each in (d[1], d[3]))
+        rate, jerk = (np.maximum(derivative[:-1], derivative[1:]) for derivative in (d[1], d[3]))
         # Between its ends a function is above its chord by at most h^2 / 8 of its second
         # derivative.
         turns = h * (rate + MAX_DERIVATIVE_RATIO * h * h / 8.0 * jerk)
@@ -186,7 +191,7 @@ class Sweep:
     def at(self, sigma: float, fingers: float) -> FloatArray:
         """Return the joints at `sigma` and the fixed angle of the `fingers`, (6,) [rad]."""
         joints = self._path.joints(Jet.variable(sigma))
-        return np.array([*(each.c0 for each in joints), fingers])
+        return np.array([*(joint.c0 for joint in joints), fingers])
 
     def nearest(self, room: SweptClearance, fingers: float) -> Clearance | None:
         """Return the nearest contact on the whole path; None when no parts can meet."""

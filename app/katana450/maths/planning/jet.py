@@ -34,9 +34,9 @@ class Jet:
         self.c3 = c3
 
     @staticmethod
-    def variable(at: Coefficient) -> Jet:
+    def variable(value: Coefficient) -> Jet:
         """Return the variable itself, at one place or at many (N,)."""
-        return Jet(at, 1.0, 0.0, 0.0)
+        return Jet(value, 1.0, 0.0, 0.0)
 
     @staticmethod
     def constant(value: Coefficient) -> Jet:

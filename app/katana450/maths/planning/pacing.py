@@ -74,7 +74,9 @@ def fastest(path: Path, bounds: Bounds) -> Scaling:
     even = np.ones(len(sampled.first) + 3)
     # Uniform slowness, or the slowness that each place needs by itself: either may end up better.
     starts = even, sampled.near(sampled.excess(even, a, j))
-    best = min((sampled.fitted(a, j, each, TRIAL_ROUNDS) for each in starts), key=lambda f: f.time)
+    best = min(
+        (sampled.fitted(a, j, start, TRIAL_ROUNDS) for start in starts), key=lambda f: f.time
+    )
     for factor in SEARCH_FACTORS:
         improved, back = True, (0, 0)
         while improved:
@@ -143,14 +145,14 @@ class SampledPath:
         zero = np.zeros_like(fraction)
         slopes = np.stack((zero, zero + count, 2.0 * count * fraction, 3.0 * count * fraction**2))
         bends = np.stack((zero, zero, zero + 2.0 * count**2, 6.0 * count**2 * fraction))
-        weights = np.stack([CUBIC.T @ each for each in (powers, slopes, bends)])
+        weights = np.stack([CUBIC.T @ samples for samples in (powers, slopes, bends)])
         # Joints and coordinates first: a maximum over them is then fast.
         q = joint_derivatives(path, sigma)[1:].transpose(0, 2, 1)
         p = point_derivatives(path, sigma)[1:3].transpose(0, 2, 1)
         limits = bounds.joints
         speed, acceleration, jerk = (
-            (LIMIT_FRACTION * each)[:, None]
-            for each in (limits.speed, limits.acceleration, limits.jerk)
+            (LIMIT_FRACTION * limit)[:, None]
+            for limit in (limits.speed, limits.acceleration, limits.jerk)
         )
         tool = np.sqrt(np.einsum("kn,kn->n", p[0], p[0])) / (LIMIT_FRACTION * bounds.tool_speed)
         pushed = bounds.tool_acceleration
@@ -251,18 +253,18 @@ class SampledPath:
         accelerating, jerky = self.slopes
         q1, q2 = self.pressing
         bend = np.abs(q2 + second * q1)
-        found = _quadratic(bend, 0.5 * a * accelerating).max(axis=0)
-        np.maximum(found, self.moving, out=found)
+        slowness = _quadratic(bend, 0.5 * a * accelerating).max(axis=0)
+        np.maximum(slowness, self.moving, out=slowness)
         q1, q2, q3 = self.jerking
         jerk = np.abs(q3 + second * q2 + third * q1)
         cubic = _cubic(jerk, a * self.ratio * bend, j * jerky)
-        np.maximum(found, cubic.max(axis=0), out=found)
+        np.maximum(slowness, cubic.max(axis=0), out=slowness)
         if self.pushing is not None:
             p1, p2 = self.pushing
             pushed = p2 + second * p1
-            push, pull = (np.sqrt(np.einsum("kn,kn->n", each, each)) for each in (pushed, p1))
-            np.maximum(found, _quadratic(push, 0.5 * a * pull), out=found)
-        return np.asarray(found / w)
+            push, pull = (np.sqrt(np.einsum("kn,kn->n", rows, rows)) for rows in (pushed, p1))
+            np.maximum(slowness, _quadratic(push, 0.5 * a * pull), out=slowness)
+        return np.asarray(slowness / w)
 
 
 def _quadratic(x: FloatArray, h: FloatArray) -> FloatArray:

@@ -59,8 +59,8 @@ class CurvePath:
     @property
     def joins(self) -> tuple[float, ...]:
         """The joins of the curve."""
-        found: tuple[float, ...] = self.curve.joins
-        return found
+        joins: tuple[float, ...] = self.curve.joins
+        return joins
 
     def joints(self, sigma: Jet) -> JointJets:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
@@ -93,8 +93,8 @@ def point_derivatives(path: Path | CurvePath, sigma: FloatArray) -> FloatArray:
 
 
 def _stacked(jets: tuple[Jet, ...], sigma: FloatArray) -> FloatArray:
-    found = np.empty((4, len(sigma), len(jets)))
+    stacked = np.empty((4, len(sigma), len(jets)))
     for number, jet in enumerate(jets):
         for order, values in enumerate(jet.derivatives()):
-            found[order, :, number] = values
-    return found
+            stacked[order, :, number] = values
+    return stacked

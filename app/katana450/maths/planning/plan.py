@@ -55,7 +55,7 @@ class Segment:
         pace = self.scaling.pace(tau)
         joints = self.path.joints(Jet.variable(pace.sigma))
         q, q1, q2 = (
-            np.array(each) for each in zip(*(j.derivatives()[:3] for j in joints), strict=True)
+            np.array(values) for values in zip(*(j.derivatives()[:3] for j in joints), strict=True)
         )
         if tau >= self.scaling.span:
             # The goal itself, not what rounding makes of it.
@@ -149,7 +149,9 @@ class Plan:
 
     def postures(self, count: int, tau: float = 0.0) -> FloatArray:
         """Return joint angles (count, n) [rad] evenly from `tau` [s] to the end, for a preview."""
-        return np.array([self.q(each) for each in np.linspace(tau, self.span, count).tolist()])
+        return np.array(
+            [self.q(instant) for instant in np.linspace(tau, self.span, count).tolist()]
+        )
 
 
 def plan(
@@ -192,13 +194,13 @@ def plan(
     timed = {key: Segment(path, timing(path, bounds)) for key, path in once.items()}
     clearances = [checked[id(path)] for path in paths]
     segments = tuple(timed[id(path)] for path in paths)
-    found = Plan(segments, None if world is None else world.fingerprint, fingers)
-    each = [
+    whole_plan = Plan(segments, None if world is None else world.fingerprint, fingers)
+    pieces = [
         Nearest(clearance.contact, begin + segment.scaling.tau(clearance.sigma))
-        for clearance, segment, begin in zip(clearances, segments, found.begins, strict=False)
+        for clearance, segment, begin in zip(clearances, segments, whole_plan.begins, strict=False)
         if clearance is not None
     ]
-    return replace(found, nearest=min(each, key=lambda n: n.contact.distance, default=None))
+    return replace(whole_plan, nearest=min(pieces, key=lambda n: n.contact.distance, default=None))
 
 
 def check_clear(path: Path, world: CollisionWorld, fingers: float) -> None:
@@ -212,13 +214,13 @@ def _clearance(
     """Return the nearest contact on `path` if `with_nearest`; raise BlockedError if too near."""
     sweep = Sweep(path)
     room = SweptClearance.about(world, margin, sweep.at(0.0, fingers), sweep.at(1.0, fingers))
-    met = sweep.blocked(room, fingers)
-    if met is None:
+    contact = sweep.blocked(room, fingers)
+    if contact is None:
         return sweep.nearest(room, fingers) if with_nearest else None
-    x = sweep.at(met.sigma, fingers)
+    x = sweep.at(contact.sigma, fingers)
     worst = room.worst(x)
     raise BlockedError(
-        f"The path is blocked {100.0 * met.sigma:.0f} % along it, with the tool at {{point}}: "
+        f"The path is blocked {100.0 * contact.sigma:.0f} % along it, with the tool at {{point}}: "
         f"{{parts}} would {apart(worst.distance)}, and {1e3 * margin:g} mm are required. Lead the "
         "path around the obstacle, or move it.",
         forward(path.chain, x[:-1])[:3, 3].tolist(),

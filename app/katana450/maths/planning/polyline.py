@@ -97,28 +97,28 @@ class Polyline(PiecewisePolynomial):
         rates = np.diff(vias, axis=0) / lengths[:, None]
         cut = np.zeros(len(vias))
         cut[1:-1] = 0.5 * self.blend * np.minimum(lengths[:-1], lengths[1:])
-        starts, terms, at = [], [], 0.0
+        starts, terms, station = [], [], 0.0
         for leg, (rate, length) in enumerate(zip(rates, lengths.tolist(), strict=True)):
             straight = length - cut[leg] - cut[leg + 1]
             if straight > tolerances.ROUNDING * length:
                 line = np.zeros((6, len(rate)))
                 line[0], line[1] = vias[leg] + cut[leg] * rate, rate
-                starts.append(at)
+                starts.append(station)
                 terms.append(line)
-                at += float(straight)
+                station += float(straight)
             if leg + 1 < len(rates):
                 reach, via = cut[leg + 1], vias[leg + 1]
                 before, after = via - reach * rate, via + reach * rates[leg + 1]
                 points = (before, 0.5 * (before + via), via, via, 0.5 * (via + after), after)
                 corner_length = STRETCH * float(reach)
-                starts.append(at)
+                starts.append(station)
                 terms.append(
                     (QUINTIC @ np.array(points)) / corner_length ** np.arange(6.0)[:, None]
                 )
-                at += corner_length
+                station += corner_length
         object.__setattr__(self, "_starts", starts)
         object.__setattr__(self, "_terms", frozen(terms))
-        object.__setattr__(self, "_total", at)
+        object.__setattr__(self, "_total", station)
 
 
 def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
@@ -126,7 +126,7 @@ def _polynomial(terms: list[float] | FloatArray, t: Jet) -> Jet:
 
     `terms` are floats or (k, N), the lowest power first.
     """
-    found = Jet.constant(terms[-1])
+    value = Jet.constant(terms[-1])
     for term in terms[-2::-1]:
-        found = found * t + term
-    return found
+        value = value * t + term
+    return value

@@ -70,7 +70,7 @@ def point_by_exponentials(chain: Chain, q: JointJets) -> ThreeJets:
     The product of exponentials acts on the point from the tool to the base: a turn by q about
     (omega, v) moves p by sin q (omega x p + v) + (1 - cos q) omega x (omega x p + v).
     """
-    x, y, z = (Jet.constant(float(each)) for each in chain.M[:3, 3])
+    x, y, z = (Jet.constant(float(coordinate)) for coordinate in chain.M[:3, 3])
     for angle, (wx, wy, wz, vx, vy, vz) in zip(q[::-1], chain.S.T[::-1].tolist(), strict=True):
         s, c = sin_cos(angle)
         ax, ay, az = wy * z - wz * y + vx, wz * x - wx * z + vy, wx * y - wy * x + vz

@@ -104,13 +104,13 @@ class _Search:
         """Return the contact on the straight path from `a` to `b`; None when it is clear."""
         if self.room is None:
             return None
-        found = self.room.blocked_line(np.append(a, self.fingers), np.append(b, self.fingers))
-        return None if found is None else found.contact
+        contact = self.room.blocked_line(np.append(a, self.fingers), np.append(b, self.fingers))
+        return None if contact is None else contact.contact
 
     def worst(self, q: FloatArray) -> Contact | None:
         """Return the contact at `q` that violates its minimum most; None when it is clear."""
-        met, room = self.met(q, q), self.room
-        return None if met is None or room is None else room.worst(np.append(q, self.fingers))
+        contact, room = self.met(q, q), self.room
+        return None if contact is None or room is None else room.worst(np.append(q, self.fingers))
 
     def connected(self, random: np.random.Generator) -> list[FloatArray] | None:
         """Return the vias of a clear path; None when MAX_POSTURES were not enough."""
@@ -142,11 +142,11 @@ class _Search:
 
     def _extended(self, tree: _Tree, number: int, towards: FloatArray) -> int | None:
         """Add a step from posture `number`; return None when it is not clear."""
-        here = tree.postures[number]
-        step = towards - here
+        posture = tree.postures[number]
+        step = towards - posture
         fraction = TREE_STEP / float((np.abs(step) / self.chain.speed).max())
-        q = towards if fraction >= 1.0 else here + fraction * step
-        return tree.grown(number, q) if self.clear(here, q) else None
+        q = towards if fraction >= 1.0 else posture + fraction * step
+        return tree.grown(number, q) if self.clear(posture, q) else None
 
     def same(self, a: FloatArray, b: FloatArray) -> bool:
         """Return True if two postures are next to each other."""
@@ -183,15 +183,15 @@ class _Search:
 
         Of two vias next to each other the one stays that keeps the path on the branch.
         """
-        kept = path[:1]
+        tidied = path[:1]
         for q, after in pairwise(path[1:]):
-            near = self.same(kept[-1], q) or self.same(path[-1], q)
-            if near and self._holds(kept[-1], after):
+            near = self.same(tidied[-1], q) or self.same(path[-1], q)
+            if near and self._holds(tidied[-1], after):
                 continue
-            if near and len(kept) > 1 and self._holds(kept[-2], q):
-                kept.pop()
-            kept.append(q)
-        return [*kept, path[-1]]
+            if near and len(tidied) > 1 and self._holds(tidied[-2], q):
+                tidied.pop()
+            tidied.append(q)
+        return [*tidied, path[-1]]
 
     def _duration(self, path: list[FloatArray]) -> float:
         """Return the duration [s] with every leg at full speed."""
@@ -227,11 +227,11 @@ def collision_free_paths(
     region = None if branch is None else BranchRegion(chain, branch)
     search = _Search(chain, world, fingers, start, end, region)
     for name, q in (("start", start), ("end", end)):
-        if (met := search.worst(q)) is not None:
+        if (contact := search.worst(q)) is not None:
             raise BlockedError(
-                f"At the {name}, {{parts}} would {apart(met.distance)}, and {1e3 * MARGIN:g} mm "
-                "are required. Choose another posture.",
-                parts=met.parts,
+                f"At the {name}, {{parts}} would {apart(contact.distance)}, and "
+                f"{1e3 * MARGIN:g} mm are required. Choose another posture.",
+                parts=contact.parts,
             )
     random = np.random.default_rng(seed)
     vias = search.connected(random)

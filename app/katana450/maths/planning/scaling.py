@@ -145,8 +145,10 @@ class Scaling:
         # fast.
         fraction = passed / ((starts[piece + 1] - starts[piece]) * count)
         for _ in range(8):
-            gone = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
-            step = (passed - gone) / (a + fraction * (b + fraction * (c + fraction * d)))
+            distance = fraction * (
+                a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0))
+            )
+            step = (passed - distance) / (a + fraction * (b + fraction * (c + fraction * d)))
             fraction = min(max(fraction + step, 0.0), 1.0)
             if abs(step) < 1e-15:
                 break
@@ -161,8 +163,8 @@ class Scaling:
         piece = min(max(int(sigma * count), 0), count - 1)
         a, b, c, d = self._pieces[piece]
         fraction = sigma * count - piece
-        gone = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
-        return self._starts[piece] + gone / count
+        distance = fraction * (a + fraction * (b / 2.0 + fraction * (c / 3.0 + fraction * d / 4.0)))
+        return self._starts[piece] + distance / count
 
 
 def rest_to_rest(distance: float, a: float, j: float) -> float:
