@@ -1,7 +1,7 @@
 // What the gripper feels, as vibration of gamepads and of the phone. Loaded when a person turns it on.
 
 const NEAR = 0.012; // m of clearance from which a moving arm is near a contact
-const STOP = 0.005; // m at which it stops
+const MIN_CLEARANCE = 0.005; // m at which it stops
 const NEAR_LIMIT = 0.05; // rad from a joint limit
 const FAINT = 0.1; // strength below which nothing is felt
 const AGAIN = 200; // ms between two pulses of what lasts
@@ -50,7 +50,7 @@ function strength({ touch }) {
 function nearness({ moving, findings, margins }) {
   if (findings.some(({ reason }) => reason === "contact")) return 1;
   if (!moving || !margins) return 0;
-  const contact = margins.clearance === null ? 0 : (NEAR - margins.clearance) / (NEAR - STOP);
+  const contact = margins.clearance === null ? 0 : (NEAR - margins.clearance) / (NEAR - MIN_CLEARANCE);
   return Math.min(1, Math.max(0, contact, 1 - margins.limit / NEAR_LIMIT));
 }
 

@@ -10,9 +10,9 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.collision.clearance import (
     MAX_UNCHECKED_PATH,
+    MIN_CLEARANCE,
     MIN_STOP_TIME,
     MIN_TRAVEL,
-    STOP,
     advance,
 )
 from katana450.maths.collision.linkage import Linkage, RigidGroup
@@ -65,7 +65,11 @@ def test_the_bar_stops_before_the_wall(bar: CollisionWorld, speed: float) -> Non
     contact = bar.nearest(last)
     assert contact is not None
     assert contact.parts == ("bar", "wall")
-    assert STOP - SLIGHTLY <= contact.distance < STOP + 10.0 * MIN_TRAVEL / (TICK / MIN_STOP_TIME)
+    assert (
+        MIN_CLEARANCE - SLIGHTLY
+        <= contact.distance
+        < MIN_CLEARANCE + 10.0 * MIN_TRAVEL / (TICK / MIN_STOP_TIME)
+    )
 
 
 def test_bar_slows_down_before_the_wall(bar: CollisionWorld) -> None:
@@ -84,7 +88,7 @@ def test_bar_does_not_jump_over_a_thin_reed(bar: CollisionWorld, speed: float) -
     contact = bar.nearest(last)
     assert contact is not None
     assert contact.parts == ("bar", "reed")
-    assert contact.distance >= STOP - SLIGHTLY
+    assert contact.distance >= MIN_CLEARANCE - SLIGHTLY
 
 
 def test_motion_away_is_not_slowed(bar: CollisionWorld) -> None:
@@ -98,10 +102,10 @@ def test_motion_away_is_not_slowed(bar: CollisionWorld) -> None:
 def test_from_too_near_only_motion_away_is_allowed(bar: CollisionWorld, depth: float) -> None:
     """Test a wall that was placed onto the bar, or a driver that overshot."""
     *_, last = turned(bar, 0.0, 3.0, 2.0)
-    x = last + (STOP - 0.004 + depth) / 1.1
+    x = last + (MIN_CLEARANCE - 0.004 + depth) / 1.1
     contact = bar.nearest(x)
     assert contact is not None
-    assert contact.distance < STOP
+    assert contact.distance < MIN_CLEARANCE
     inwards = advance(bar, x, x + 0.01, TICK)
     assert inwards.stopped
     assert (inwards.x == x).all()
@@ -113,7 +117,7 @@ def test_from_too_near_only_motion_away_is_allowed(bar: CollisionWorld, depth: f
         x = outwards.x
     away = bar.nearest(x)
     assert away is not None
-    assert away.distance > 2.0 * STOP
+    assert away.distance > 2.0 * MIN_CLEARANCE
 
 
 def test_step_with_room_is_unchanged(bar: CollisionWorld) -> None:
@@ -148,8 +152,8 @@ def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
                 end = world.nearest(step.x)
                 assert middle is not None
                 assert end is not None
-                assert middle.distance > 0.5 * STOP
-                assert end.distance >= STOP - SLIGHTLY
+                assert middle.distance > 0.5 * MIN_CLEARANCE
+                assert end.distance >= MIN_CLEARANCE - SLIGHTLY
             x = step.x
             if step.stopped:
                 stops += 1

@@ -7,7 +7,7 @@ from itertools import combinations, product
 import numpy as np
 
 from katana450.arm.robot.collision import pairs_that_meet
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.linkage import Linkage, RigidGroup
 from katana450.maths.collision.shape import box
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
@@ -69,7 +69,7 @@ def test_excluded_pairs_never_come_near(
                 x, nearest = best, distance(best)
             else:
                 reach *= 0.9
-        assert nearest > STOP, [alone.parts[number].name for number in pair]
+        assert nearest > MIN_CLEARANCE, [alone.parts[number].name for number in pair]
 
 
 def test_parts_that_overlap_by_design_are_excluded() -> None:

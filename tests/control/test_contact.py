@@ -11,7 +11,7 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -68,7 +68,7 @@ INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
 def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> None:
     start, commands, met = INTO[what]
     state, near = run(guarded, standing(guarded, start), commands)
-    assert min(near) >= STOP - SLIGHTLY
+    assert min(near) >= MIN_CLEARANCE - SLIGHTLY
     assert state.blocked
     assert state.status is Status.BLOCKED
     assert state.under_way
@@ -77,7 +77,7 @@ def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> 
     assert finding.parts is not None
     assert met & set(finding.parts)
     assert finding.amount == pytest.approx(near[-1], abs=1e-9)
-    assert STOP - SLIGHTLY <= finding.amount < 2.0 * STOP
+    assert MIN_CLEARANCE - SLIGHTLY <= finding.amount < 2.0 * MIN_CLEARANCE
 
 
 @pytest.mark.parametrize("what", INTO)
@@ -92,7 +92,7 @@ def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None
         Session(guarded.require_arm(), guarded.ready), standing(guarded, blocked.setpoint), [back]
     )
     assert state.t - blocked.t <= free.t + 2.0 * TICK
-    assert min(near) >= STOP - SLIGHTLY
+    assert min(near) >= MIN_CLEARANCE - SLIGHTLY
 
 
 def test_blocked_arm_stays_still_to_the_bit(guarded: Session) -> None:
@@ -138,12 +138,12 @@ def test_fingers_wait_before_a_cup_until_the_arm_moves_away(guarded: Session) ->
     state, near = run(guarded, at_cup, [cmd.Gripper(0.30)])
     assert state.blocked
     assert state.gripper_setpoint < 0.30
-    assert min(near) >= STOP - SLIGHTLY
+    assert min(near) >= MIN_CLEARANCE - SLIGHTLY
     assert "cup" in (state.findings[0].parts or ())
     state, near = run(guarded, state, [cmd.Joint(1, 0.5)])
     assert state.setpoint[0] == 0.5
     assert state.gripper_setpoint == 0.30
-    assert min(near) >= STOP - SLIGHTLY
+    assert min(near) >= MIN_CLEARANCE - SLIGHTLY
 
 
 def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWorld) -> None:
@@ -157,7 +157,7 @@ def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWo
     assert min(near) >= depth - SLIGHTLY
     state, near = run(guarded, deeper, [cmd.Joint(2, np.radians(-70.0))])
     assert state.status is Status.OK
-    assert near[-1] > STOP
+    assert near[-1] > MIN_CLEARANCE
 
 
 def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> None:
@@ -170,7 +170,7 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
     assert met
     for choice in met:
         assert choice.contact is not None
-        assert choice.contact.distance < STOP
+        assert choice.contact.distance < MIN_CLEARANCE
         taken, near = run(guarded, state, [cmd.Branch(name=str(choice.metrics.branch))], 2000)
         assert taken.status is Status.BLOCKED
         assert min(near) > 0.0

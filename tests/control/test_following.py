@@ -20,7 +20,7 @@ from katana450.arm.control.state import Reason, State, Status
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc, ToolLine
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
@@ -293,7 +293,7 @@ def test_plan_goes_around_the_cup_if_the_straight_path_is_blocked(
     assert (states[-1].setpoint == BEYOND_CUP).all()
     assert not any(each.blocked for each in states)
     near = min(clearance(world, each) for each in states)
-    assert near >= STOP
+    assert near >= MIN_CLEARANCE
     # The reported clearance is accurate to a tenth, and also holds between the ticks.
     assert 0.89 * plan.nearest.contact.distance - 1e-4 <= near
     assert near <= plan.nearest.contact.distance * 1.1 + 1e-3
@@ -310,13 +310,13 @@ def test_stop_beside_the_cup_keeps_clear_of_it(
     for at in range(60, len(states) - 40, 12):
         stopped = run(guarded, states[at], [cmd.Stop()])
         along += stopped[0].following is not None
-        assert min(clearance(world, each) for each in stopped) >= STOP - SLIGHTLY
+        assert min(clearance(world, each) for each in stopped) >= MIN_CLEARANCE - SLIGHTLY
         assert stopped[-1].motion.at_rest
         check_limits(guarded, [*states[at - 3 : at + 1], *stopped])
     assert along > 0
     for at in range(60, len(states) - 40, 60):
         away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)
-        assert min(clearance(world, each) for each in away) >= STOP - SLIGHTLY
+        assert min(clearance(world, each) for each in away) >= MIN_CLEARANCE - SLIGHTLY
         assert away[-1].following is None
 
 
@@ -333,7 +333,7 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     assert states[-1].status is Status.BLOCKED
     assert "cup" in (states[-1].findings[0].parts or ())
     # Where the plan is not known to be clear, no shorter piece of the path is checked.
-    assert min(clearance(world, each) for each in states) >= STOP - MAX_UNCHECKED_PATH
+    assert min(clearance(world, each) for each in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
     assert off_path(states, plan) <= 1e-15
     # The path back is clear, and so is the path onwards without the cup.
     back = run(guarded, states[-1], [cmd.GoAlong(0.0)])

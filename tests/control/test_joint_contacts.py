@@ -21,7 +21,7 @@ from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.robot.loader import load
 from katana450.errors import InputError
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.maths.collision.clearance import DISTANCE_ROUNDING, STOP
+from katana450.maths.collision.clearance import DISTANCE_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
@@ -82,7 +82,7 @@ def after(session: Session, state: State, seconds: float, *first: cmd.Command) -
 
 def excess(world: CollisionWorld, state: State) -> float:
     """Return the smallest distance of any pair beyond what it keeps [m]."""
-    placed, kept = world.at(state.x_setpoint), world.kept(STOP)
+    placed, kept = world.at(state.x_setpoint), world.kept(MIN_CLEARANCE)
     return float(min(placed.distance(pair) - kept[pair] for pair in range(len(kept))))
 
 
@@ -92,11 +92,11 @@ def test_carriages_on_one_rail_stop_before_each_other(make: Make) -> None:
     state = after(session, begun(session), 4.0, made.move(slide_left=0.4))
     # 0.2 m apart, 50 mm wide, and 5 mm stay between them.
     assert state.setpoint[0] == pytest.approx(0.144, abs=1.5e-3)
-    assert world.gap(state.x_setpoint, "left", "right") >= STOP - DISTANCE_ROUNDING
+    assert world.gap(state.x_setpoint, "left", "right") >= MIN_CLEARANCE - DISTANCE_ROUNDING
     assert (state.status, state.moving, state.goal[0]) == (Status.BLOCKED, False, 0.4)
     (finding,) = state.findings
     assert (finding.reason, set(finding.parts or ())) == (Reason.CONTACT, {"left", "right"})
-    assert finding.amount == pytest.approx(STOP, abs=3e-3)
+    assert finding.amount == pytest.approx(MIN_CLEARANCE, abs=3e-3)
     assert sentence(state).startswith("Left and right are ")
 
 
@@ -204,7 +204,7 @@ def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:
     made = make(rail())
     session, world = made.session, made.world
     state = session.begin(np.array((0.149, 0.0)), 0.0, 0.0)
-    assert world.gap(state.x_setpoint, "left", "right") < STOP
+    assert world.gap(state.x_setpoint, "left", "right") < MIN_CLEARANCE
     nearer = after(session, state, 1.0, made.move(slide_left=0.2))
     assert nearer.setpoint[0] == 0.149
     assert nearer.blocked
@@ -222,8 +222,8 @@ def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
     made = make(column(foot))
     seen = list(ticks(made.session, begun(made.session), 4.0, made.move(lift=-0.4)))
     state = seen[-1]
-    assert min(map(height, seen)) >= STOP - DISTANCE_ROUNDING
-    assert height(state) == pytest.approx(STOP, abs=1.5e-3)
+    assert min(map(height, seen)) >= MIN_CLEARANCE - DISTANCE_ROUNDING
+    assert height(state) == pytest.approx(MIN_CLEARANCE, abs=1.5e-3)
     (finding,) = state.findings
     assert (finding.reason, set(finding.parts or ())) == (Reason.CONTACT, {"beam", "table"})
     assert sentence(state).startswith("Beam and table are ")
@@ -235,12 +235,12 @@ def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
     state = after(session, begun(session), 0.05, cmd.PlaceObject(block(-0.3)))
     seen = list(ticks(session, state, 4.0, made.move(lift=-0.4)))
     state = seen[-1]
-    assert min(map(height, seen)) >= 0.1 + STOP - DISTANCE_ROUNDING
-    assert height(state) == pytest.approx(0.1 + STOP, abs=3e-3)
+    assert min(map(height, seen)) >= 0.1 + MIN_CLEARANCE - DISTANCE_ROUNDING
+    assert height(state) == pytest.approx(0.1 + MIN_CLEARANCE, abs=3e-3)
     assert (state.status, state.findings[0].parts) == (Status.BLOCKED, ("beam", "block"))
     # The goal stays, so the beam continues down to the table once the object is away.
     state = after(session, state, 3.0, cmd.Remove("block"))
-    assert height(state) == pytest.approx(STOP, abs=3e-3)
+    assert height(state) == pytest.approx(MIN_CLEARANCE, abs=3e-3)
     assert state.near == {"beam", "table"}
 
 

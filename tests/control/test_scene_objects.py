@@ -18,7 +18,7 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.free_place import free_place, girth
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE
@@ -103,7 +103,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
     (finding,) = states[-1].findings
     assert finding.reason is Reason.CONTACT
     assert "knot" in (finding.parts or ())
-    assert STOP - SLIGHTLY <= finding.amount < 2.0 * STOP
+    assert MIN_CLEARANCE - SLIGHTLY <= finding.amount < 2.0 * MIN_CLEARANCE
     dense = upright.subdivide().vertices
     points = 1.2 * (dense - (0.0, 0.0, dense[:, 2].min())) + scene_object.T[:3, 3]
     world = session.world_at(states[-1])

@@ -16,7 +16,7 @@ from katana450.arm.control.state import State
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.preview import Preview
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray
 from tests.general_arms.gripping_arms import gripping_urdf
 from tests.programs.test_pick_place import place
@@ -133,11 +133,11 @@ def test_held_object_keeps_clear_of_a_wall_as_the_arm_does(tmp_path: Path) -> No
         world = plan.session.world_at(state)
         assert world is not None
         gaps.append(world.gap(state.x_setpoint, "post", "wall"))
-    assert STOP < min(gaps) < 0.05
+    assert MIN_CLEARANCE < min(gaps) < 0.05
     over = [
         in_base(plan, state)[2, 3] for state in carried if abs(in_base(plan, state)[1, 3]) < 0.01
     ]
-    assert min(over) > 0.15 + STOP
+    assert min(over) > 0.15 + MIN_CLEARANCE
 
 
 def test_both_fingers_may_be_driven(tmp_path: Path) -> None:

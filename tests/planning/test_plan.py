@@ -11,7 +11,7 @@ from katana450.arm.control.arm import ArmModel
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
 from katana450.errors import BlockedError, InputError
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.shape import box, half_space
 from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry import se3
@@ -134,7 +134,7 @@ def test_path_out_of_a_contact_is_allowed_and_deeper_is_not(
     touching = np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
     contact = world.nearest(np.append(touching, 0.0))
     assert contact is not None
-    assert contact.distance < STOP
+    assert contact.distance < MIN_CLEARANCE
     away = np.radians([0.0, -110.0, 80.0, 10.0, 0.0])
     check_clear(JointPath(arm.chain, np.array([touching, away])), world, 0.0)
     with pytest.raises(BlockedError):

@@ -13,7 +13,7 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_arm, find_robot
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.settings import Settings
 from tests.exchange.trees import tree
@@ -149,7 +149,7 @@ def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Pa
     # Folded, the forearm is in the post; at Home it is not.
     for q, meet in ((np.zeros(4), True), (arm.ready(()), False)):
         nearest = world.nearest(np.append(q, 0.0))
-        assert (nearest is not None and nearest.distance < STOP) == meet
+        assert (nearest is not None and nearest.distance < MIN_CLEARANCE) == meet
     # Driven joint by joint the robot has no Home, so what touches at zero is not checked.
     world, notes, _ = robot_world(load(path))
     assert world is not None

@@ -23,7 +23,7 @@ from katana450.extensions.touch.pad_patches import (
     pressure_colours,
 )
 from katana450.extensions.touch.touch_model import TouchModel
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.resources import STATIC
 from tests.browser.server import free_port
 
@@ -111,4 +111,4 @@ def test_page_draws_pads_with_the_same_numbers(model: TouchModel) -> None:
         [1e3 * pad.length, 1e3 * pad.width], abs=0.05
     )
     rumble = (STATIC / "touch" / "rumble.js").read_text(encoding="utf-8")
-    assert f"const STOP = {STOP:g};" in rumble
+    assert f"const MIN_CLEARANCE = {MIN_CLEARANCE:g};" in rumble

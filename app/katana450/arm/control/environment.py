@@ -12,7 +12,7 @@ from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.scene_objects import Attachment, SceneObject
 from katana450.arm.control.state import State
 from katana450.caching import cached_property
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -138,7 +138,7 @@ class Environment:
             bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
             for a, b in zip(world.first.tolist(), world.second.tolist(), strict=True)
         ]
-        return np.where(touching, 0.0, STOP)
+        return np.where(touching, 0.0, MIN_CLEARANCE)
 
     def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
         """Return the pose (4, 4) of ``scene_object`` in the base frame.

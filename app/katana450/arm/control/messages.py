@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
@@ -68,8 +68,8 @@ def _contact(finding: Finding) -> str:
     one, other = finding.parts or ("a link", "another")
     # Parts that stand close at rest keep less, and parts in a contact may only part.
     why = (
-        f"the arm stops at {short(1e3 * STOP)} mm"
-        if finding.amount >= STOP
+        f"the arm stops at {short(1e3 * MIN_CLEARANCE)} mm"
+        if finding.amount >= MIN_CLEARANCE
         else "they must not come nearer"
     )
     return f"{part(one)} and {part(other)} are {short(1e3 * finding.amount)} mm apart: {why}"

@@ -21,7 +21,12 @@ from katana450.arm.control.modes import Leaving
 from katana450.arm.control.plan_follower import PlanFollower
 from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.control.tool_kinematics import ELBOW, ToolKinematics
-from katana450.maths.collision.clearance import MIN_STOP_TIME, STOP, advance, is_surely_clear
+from katana450.maths.collision.clearance import (
+    MIN_CLEARANCE,
+    MIN_STOP_TIME,
+    advance,
+    is_surely_clear,
+)
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -156,7 +161,7 @@ class MotionStepper:
         self._touching: frozenset[frozenset[str]] = frozenset()
         if world is not None and touch is not None:
             names = [world.parts[number].name for number in world.part_of.tolist()]
-            soft = np.flatnonzero(touch < STOP).tolist()
+            soft = np.flatnonzero(touch < MIN_CLEARANCE).tolist()
             self._touching = frozenset(
                 frozenset((names[world.first[pair]], names[world.second[pair]])) for pair in soft
             )

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from katana450.arm.control.following import Following
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.motion.limiter import Limiter, Limits
@@ -103,7 +103,7 @@ class PlanFollower:
             known = (segment, fingers, start, start)
         if known[2] <= low and high <= known[3]:
             return None
-        swept = SweptClearance.about(world, STOP, segment.sweep.at(start, fingers))
+        swept = SweptClearance.about(world, MIN_CLEARANCE, segment.sweep.at(start, fingers))
         for a, b in ((low, known[2]), (known[3], high)):
             contact = (
                 segment.sweep.blocked(swept, fingers, a, b, MAX_UNCHECKED_PATH) if a < b else None
@@ -111,7 +111,7 @@ class PlanFollower:
             if contact is not None:
                 return contact.contact
         # A path that leads out of a contact is clear only from here.
-        if float(swept.minimum.min()) >= STOP:
+        if float(swept.minimum.min()) >= MIN_CLEARANCE:
             self._known = (segment, fingers, min(low, known[2]), max(high, known[3]))
         return None
 

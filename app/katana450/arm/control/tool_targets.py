@@ -23,7 +23,7 @@ from katana450.arm.control.modes import (
 from katana450.arm.control.state import CAUSES, GRIPPER_REASONS, Reason, State
 from katana450.arm.control.tool_commands import StepTool, TurnCommand
 from katana450.errors import InputError
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -155,7 +155,7 @@ def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> C
     gripper: the finger joint [rad or m].
     """
     nearest = None if world is None else world.nearest(np.append(q, gripper))
-    return nearest if nearest is not None and nearest.distance < STOP else None
+    return nearest if nearest is not None and nearest.distance < MIN_CLEARANCE else None
 
 
 KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, Reason.WAITING, *CAUSES, *GRIPPER_REASONS)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.linkage import GROUND, Linkage
 from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.maths.geometry.arrays import FloatArray
@@ -65,13 +65,13 @@ def judged_at_rest(
     touching = [pair for pair, distance in nearest.items() if distance < TOUCH_DISTANCE]
     if home is not None and touching:
         then = _nearest(linkage, parts, touching, home)
-        touching = [pair for pair, distance in then.items() if distance < STOP]
+        touching = [pair for pair, distance in then.items() if distance < MIN_CLEARANCE]
     return RestPairs(
         [pair for pair in candidates if pair not in touching],
         {
             pair: 0.5 * distance
             for pair, distance in nearest.items()
-            if TOUCH_DISTANCE <= distance < STOP
+            if TOUCH_DISTANCE <= distance < MIN_CLEARANCE
         },
         touching,
     )
@@ -83,7 +83,7 @@ def _nearest(
     """Return the distance [m] of each pair at ``x`` (k,), or infinity from ``STOP`` on."""
     world = CollisionWorld(linkage, parts, pairs)
     placed, nearest = world.at(x), dict.fromkeys(pairs, np.inf)
-    for pair in placed.nearer_than(STOP)[0].tolist():
+    for pair in placed.nearer_than(MIN_CLEARANCE)[0].tolist():
         owner = int(world.part_of[world.first[pair]]), int(world.part_of[world.second[pair]])
         nearest[owner] = min(nearest[owner], placed.distance(pair))
     return nearest

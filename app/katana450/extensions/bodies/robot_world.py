@@ -30,7 +30,7 @@ from katana450.arm.control.joints import JointSet
 from katana450.arm.control.messages import UNCHECKED, short
 from katana450.extensions.bodies.estimated_shapes import drawn
 from katana450.extensions.bodies.pairs_at_rest import TOUCH_DISTANCE, RestPairs, judged_at_rest
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.linkage import GROUND
 from katana450.maths.collision.shape import half_space
 from katana450.maths.collision.world import obstacle
@@ -181,9 +181,11 @@ def standing(linkage: Linkage, parts: Sequence[Part], joints: JointSet) -> Stand
     lowest = min(float(heights.min()), 0.0)
     if lowest > -TOUCH_DISTANCE:
         lowest = 0.0
-    feet = [part for part, height in zip(parts, heights, strict=True) if height < lowest + STOP]
+    feet = [
+        part for part, height in zip(parts, heights, strict=True) if height < lowest + MIN_CLEARANCE
+    ]
     if lowest < 0.0:
-        lower = _lowered(linkage, feet, joints, lowest - STOP)
+        lower = _lowered(linkage, feet, joints, lowest - MIN_CLEARANCE)
         if lower:
             why = f"{lower} is its lowest part at rest and can move farther down"
             return Standing(

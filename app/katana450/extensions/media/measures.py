@@ -21,7 +21,7 @@ from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.script.measures import motion_measures, water_measures
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.steps.pouring import POURING
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
@@ -117,7 +117,7 @@ def measurements(program: Program, arm: ArmModel, trace: Trace) -> dict[str, flo
         if isinstance(task.action, FollowPlan)
         and task.action.plan.nearest is not None
         # An object to be lifted touches the table at first.
-        and task.action.plan.nearest.contact.distance >= STOP
+        and task.action.plan.nearest.contact.distance >= MIN_CLEARANCE
     ]
     return {
         "max_position_error_mm": _maximum(1e3 * errors),

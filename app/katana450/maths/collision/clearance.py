@@ -10,13 +10,13 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import PATH_LENGTH_FACTOR, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
 
-STOP = 0.005
+MIN_CLEARANCE = 0.005
 """Distance [m] that the arm keeps from itself and from everything else."""
 
 MIN_STOP_TIME = 0.04
-"""Minimum time [s] in which the distance beyond STOP may shrink to zero, at any speed. The arm
-slows down like a body in oil, and begins farther away the faster it is (Faverjon and Tournassoud, A
-local based approach for path planning, ICRA 1987).
+"""Minimum time [s] in which the distance beyond MIN_CLEARANCE may shrink to zero, at any speed. The
+arm slows down like a body in oil, and begins farther away the faster it is (Faverjon and
+Tournassoud, A local based approach for path planning, ICRA 1987).
 """
 
 DISTANCE_ROUNDING = 1e-7
@@ -67,15 +67,15 @@ def advance(
     """Move from ``x`` (k,) [rad or m] straight to ``towards``, as far as clearance allows.
 
     The step is the path of one tick of ``dt`` [s]. For a pair of bodies at the distance d, the step
-    may reduce d - STOP by the fraction dt / MIN_STOP_TIME. For a pair nearer than STOP it may not
+    may reduce d - MIN_CLEARANCE by the fraction dt / MIN_STOP_TIME. For a nearer pair it may not
     reduce the distance; motion away from a contact is always allowed. Bodies must not pass each
     other between the ends of a step either. A distance changes by no more than the bodies travel,
     so a case that the ends leave open is checked in the middle, and again in the halves. ``keep``
-    (p,) [m] is the distance that each pair keeps, in place of STOP or that of close pairs.
+    (p,) [m] is the distance that each pair keeps, in place of MIN_CLEARANCE or that of close pairs.
     """
     if (towards == x).all():
         return Advance(x)
-    minimum = world.kept(STOP) if keep is None else keep
+    minimum = world.kept(MIN_CLEARANCE) if keep is None else keep
     start = world.at(x)
     travel = world.travel(start, x, towards)
     part = min(dt / MIN_STOP_TIME, 1.0)
@@ -125,7 +125,7 @@ def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -
         return False
     placed = world.at(x)
     needed = (
-        world.kept(STOP)
+        world.kept(MIN_CLEARANCE)
         + world.travel(placed, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
     )
     pairs, _ = placed.nearer_than(needed)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, STOP
+from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -71,10 +71,10 @@ class SweptClearance:
         """Return the room for a path from `start` (k,) to `end` (k,) with `margin` [m].
 
         Pairs that are nearer at the start come no nearer, so a path may lead out of a contact.
-        Pairs that are nearer at the end may be as near as there, but not below STOP.
+        Pairs that are nearer at the end may be as near as there, but not below MIN_CLEARANCE.
         """
         minimum = world.kept(margin)
-        for x, lowest in ((start, -np.inf), (end, STOP)):
+        for x, lowest in ((start, -np.inf), (end, MIN_CLEARANCE)):
             if x is None:
                 continue
             placed = world.at(x)

@@ -11,7 +11,7 @@ import numpy as np
 
 from katana450.caching import cached_property
 from katana450.errors import BlockedError, InputError
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld, Fingerprint
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -22,7 +22,7 @@ from katana450.maths.planning.pacing import fastest
 from katana450.maths.planning.path import Path, point_derivatives
 from katana450.maths.planning.scaling import Bounds, Scaling
 
-MARGIN = STOP + 1e-3
+MARGIN = MIN_CLEARANCE + 1e-3
 """Distance [m] that a plan keeps: more than the distance at which the arm stops, so that rounding
 never stops it.
 """

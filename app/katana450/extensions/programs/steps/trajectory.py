@@ -31,7 +31,7 @@ from katana450.extensions.programs.language.kinds import (
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import YamlValue
 from katana450.extensions.programs.planning.trajectory_path import TrajectoryPath, recorded_scaling
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.clearance import Sweep, SweptClearance
@@ -39,9 +39,9 @@ from katana450.maths.planning.plan import apart
 from katana450.maths.planning.plan import plan as timed_plan
 from katana450.maths.planning.scaling import Bounds
 
-CLEARANCE = STOP - 2e-4
-"""[m] Distance that a trajectory keeps. A moving arm keeps STOP by itself, and the spline through
-its recorded setpoints may pass a little nearer."""
+CLEARANCE = MIN_CLEARANCE - 2e-4
+"""[m] Distance that a trajectory keeps. A moving arm keeps MIN_CLEARANCE by itself, and the spline
+through its recorded setpoints may pass a little nearer."""
 
 MAX_POSTURES = 1200
 """Maximum number of postures of one step; the script's own size bounds their sum."""

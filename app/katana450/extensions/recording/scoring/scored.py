@@ -35,7 +35,7 @@ from katana450.extensions.recording.scoring.smoothness import (
     dimensionless_jerk,
     sparc,
 )
-from katana450.maths.collision.clearance import STOP
+from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.batch import forward_batch
@@ -261,7 +261,7 @@ def _clearance(session: Session, states: Sequence[State]) -> float | None:
         due = state.t + CLEARANCE_PERIOD
         world = session.world_at(state)
         contact = None if world is None else world.nearest(state.x_setpoint)
-        if contact is None or (contact.distance < STOP and _of_held(state, contact)):
+        if contact is None or (contact.distance < MIN_CLEARANCE and _of_held(state, contact)):
             continue
         nearest = contact.distance if nearest is None else min(nearest, contact.distance)
     return None if nearest is None else 1e3 * nearest
