@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from katana450.extensions.leader.packets import (
+from katana450.extensions.leader.motor_bus import (
     BROADCAST,
     HOMING_OFFSET,
     PRESENT_POSITION,

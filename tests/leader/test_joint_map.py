@@ -11,12 +11,23 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.leader.calibration import decoded_calibration, read_calibration
-from katana450.extensions.leader.joint_map import JointMap
-from katana450.extensions.leader.layout import SO101, Layout, read_layout
+from katana450.extensions.leader.joint_map import (
+    SO101,
+    JointMap,
+    Layout,
+    decoded_calibration,
+    read_calibration,
+    read_layout,
+)
 from katana450.extensions.leader.leader_command import prepare
-from katana450.extensions.leader.motor_bus import MotorBus, SilentLeaderError
-from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, MotorError, Packet
+from katana450.extensions.leader.motor_bus import (
+    HOMING_OFFSET,
+    PRESENT_POSITION,
+    MotorBus,
+    MotorError,
+    Packet,
+    SilentLeaderError,
+)
 from katana450.server.api import answers
 from tests.leader.emulated_leader import OFFSETS, RANGE, EmulatedMotors, calibration
 

@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 
 from katana450.client import Client, connect
-from katana450.extensions.leader.calibration import decoded_calibration
-from katana450.extensions.leader.joint_map import JointMap
-from katana450.extensions.leader.layout import SO101
+from katana450.extensions.leader.joint_map import SO101, JointMap, decoded_calibration
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 from tests.waiting import until

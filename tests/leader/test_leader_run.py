@@ -8,9 +8,7 @@ from typing import Any
 
 import msgspec
 
-from katana450.extensions.leader.calibration import decoded_calibration
-from katana450.extensions.leader.joint_map import JointMap
-from katana450.extensions.leader.layout import SO101
+from katana450.extensions.leader.joint_map import SO101, JointMap, decoded_calibration
 from katana450.extensions.leader.leader_command import LeaderRun
 from katana450.extensions.leader.motor_bus import MotorBus
 from katana450.server.api import answers, requests

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.extensions.leader import packets
-from katana450.extensions.leader.packets import (
+from katana450.extensions.leader import motor_bus
+from katana450.extensions.leader.motor_bus import (
     HOMING_OFFSET,
     PRESENT_POSITION,
     TORQUE_ENABLE,
@@ -20,10 +20,10 @@ from katana450.extensions.leader.packets import (
 
 WORKED = (
     # The first two are examples of Feetech's protocol manual.
-    (packets.ping(1), "ff ff 01 02 01 fb"),
-    (packets.read(1, PRESENT_POSITION), "ff ff 01 04 02 38 02 be"),
-    (packets.write(1, TORQUE_ENABLE, 0), "ff ff 01 04 03 28 00 cf"),
-    (packets.sync_read((1, 2), Register(56, 8)), "ff ff fe 06 82 38 08 01 02 36"),
+    (motor_bus.ping_request(1), "ff ff 01 02 01 fb"),
+    (motor_bus.read_request(1, PRESENT_POSITION), "ff ff 01 04 02 38 02 be"),
+    (motor_bus.write_request(1, TORQUE_ENABLE, 0), "ff ff 01 04 03 28 00 cf"),
+    (motor_bus.sync_read_request((1, 2), Register(56, 8)), "ff ff fe 06 82 38 08 01 02 36"),
     (Packet(1, 0, bytes((0x18, 0x05))), "ff ff 01 04 00 18 05 dd"),
 )
 
@@ -53,10 +53,10 @@ def test_packets_are_found_in_any_split_of_a_stream_with_garbage() -> None:
 
 
 def test_wrong_checksum_is_no_packet_and_hides_none() -> None:
-    good = packets.ping(3).encoded
-    wrong = bytearray(packets.read(2, PRESENT_POSITION).encoded)
+    good = motor_bus.ping_request(3).encoded
+    wrong = bytearray(motor_bus.read_request(2, PRESENT_POSITION).encoded)
     wrong[-1] ^= 0x10
-    assert PacketReader().feed(bytes(wrong) + good) == [packets.ping(3)]
+    assert PacketReader().feed(bytes(wrong) + good) == [motor_bus.ping_request(3)]
 
 
 @settings(max_examples=50)
@@ -65,7 +65,7 @@ def test_any_bytes_raise_nothing_and_keep_little(data: bytes) -> None:
     reader = PacketReader()
     for packet in reader.feed(data):
         assert packet.encoded in data
-    assert len(reader._rest) <= packets.MAX_LENGTH + 4
+    assert len(reader._rest) <= motor_bus.MAX_LENGTH + 4
 
 
 @given(st.integers(-2047, 2047), st.integers(-32767, 32767))

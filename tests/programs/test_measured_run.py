@@ -14,8 +14,8 @@ from katana450.extensions.programs.run.simulation import (
 )
 from katana450.extensions.programs.script.measures import MEASURES, OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.real_arm.plant.axis import KATANA450
 from katana450.extensions.real_arm.plant.driver import PlantDriver
-from katana450.extensions.real_arm.plant.profile import KATANA450
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives

@@ -11,9 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
-from katana450.extensions.real_arm.codec.replies import FirmwareError
+from katana450.extensions.real_arm.codec.codecs import RequestReceived
+from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
     AxisSegment,
@@ -25,8 +24,7 @@ from katana450.extensions.real_arm.codec.requests import (
 )
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
-from katana450.extensions.real_arm.link.arm_link import ArmLink
-from katana450.extensions.real_arm.link.tcp import TcpTransport
+from katana450.extensions.real_arm.link import ArmLink, TcpTransport
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -9,8 +9,7 @@ import numpy as np
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode, ArmReport
 from katana450.extensions.real_arm.codec import replies
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
+from katana450.extensions.real_arm.codec.replies import ArmReply, AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ALL_AXES,
     ArmRequest,
@@ -25,8 +24,7 @@ from katana450.extensions.real_arm.codec.requests import (
     SendSplines,
 )
 from katana450.extensions.real_arm.driver.machine import ArmMachine
-from katana450.extensions.real_arm.encoders import EncoderMap
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
 from katana450.maths.geometry.arrays import FloatArray
 
 MAP = EncoderMap(DEFAULT_VARIANT)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Self
 
-from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec, RequestReceived
+from katana450.extensions.real_arm.codec.codecs import FirmwareCodec, RequestReceived
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 
 Piece = bytes | float | None

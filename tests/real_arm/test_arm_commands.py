@@ -15,13 +15,11 @@ import pytest
 from katana450.arm.control.arm_commands import ArmAct, OperateArm
 from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.commands.exchange_lines import ExchangeDecoder
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.axis import AxisMode
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
-from katana450.extensions.real_arm.link.arm_link import ArmLink
-from katana450.extensions.real_arm.link.logged import ExchangeLog, LoggedTransport
-from katana450.extensions.real_arm.link.tcp import TcpTransport
+from katana450.extensions.real_arm.exchange_lines import ExchangeDecoder
+from katana450.extensions.real_arm.link import ArmLink, ExchangeLog, LoggedTransport, TcpTransport
 from katana450.server.api import answers
 from katana450.server.api.answers import MeasuredArm
 from tests.browser.server import APP, AppServer, free_port

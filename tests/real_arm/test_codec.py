@@ -11,24 +11,27 @@ from hypothesis import strategies as st
 
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies, requests
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus, status_words
-from katana450.extensions.real_arm.codec.crc import crc16, with_crc
-from katana450.extensions.real_arm.codec.error_codes import CRC_ERROR, INVALID_ARGUMENT
-from katana450.extensions.real_arm.codec.firmware_codec import (
+from katana450.extensions.real_arm.codec.codecs import (
     FirmwareCodec,
     FirmwareEvent,
-    RequestInvalid,
-    RequestReceived,
-    refusal_bytes,
-    reply_bytes,
-)
-from katana450.extensions.real_arm.codec.host_codec import (
     HostCodec,
     HostEvent,
     OutOfStep,
     ReplyReceived,
+    RequestInvalid,
+    RequestReceived,
     RequestRefused,
+    crc16,
+    refusal_bytes,
+    reply_bytes,
     request_bytes,
+    with_crc,
+)
+from katana450.extensions.real_arm.codec.replies import (
+    CRC_ERROR,
+    INVALID_ARGUMENT,
+    AxisStatus,
+    status_words,
 )
 from tests.conftest import LONG
 

@@ -14,11 +14,11 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import requests
-from katana450.extensions.real_arm.codec.firmware_codec import refusal_bytes, reply_bytes
+from katana450.extensions.real_arm.codec.codecs import refusal_bytes, reply_bytes
 from katana450.extensions.real_arm.codec.replies import FirmwareError
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.driver.machine import ArmMachine
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link import ArmUrl
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, JOINTS, PaperArm
 from tests.real_arm.small_firmware import Piece, SmallFirmware

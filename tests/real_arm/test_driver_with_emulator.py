@@ -14,12 +14,12 @@ import pytest
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.extensions.real_arm.codec import requests
-from katana450.extensions.real_arm.codec.firmware_codec import RequestReceived
+from katana450.extensions.real_arm.codec.codecs import RequestReceived
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link import ArmUrl
 from tests.conftest import LONG
 from tests.real_arm.control_loop import SmallLoop, swing
 from tests.real_arm.paper_arm import ENDS, JOINTS

@@ -8,13 +8,16 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.replies import AxisStatus
 from katana450.extensions.real_arm.codec.requests import AxisSegment
-from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.posture import joints_at, loads_of_robot
-from katana450.extensions.real_arm.emulator.sensors import encoder_at_gap
-from katana450.extensions.real_arm.emulator.spline_buffer import DEPTH, SplineBuffer
-from katana450.extensions.real_arm.plant.profile import STIFF
+from katana450.extensions.real_arm.emulator.arm import (
+    EmulatedArm,
+    encoder_at_gap,
+    joints_at,
+    loads_of_robot,
+)
+from katana450.extensions.real_arm.emulator.axis import DEPTH, SplineBuffer
+from katana450.extensions.real_arm.plant.axis import STIFF
 from tests.real_arm.emulated import HOLDS, Bench, at_rest
 
 CALIBRATED = (30500, -30500, -30500, 30500, 30500, 30500)

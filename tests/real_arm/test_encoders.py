@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.arm import ArmModel
 from katana450.errors import ConfigurationError
-from katana450.extensions.real_arm.encoders import EncoderMap
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
 
 MAP = EncoderMap(DEFAULT_VARIANT)
 CALIBRATED = np.array([30500, -30500, -30500, 30500, 30500, 30500])

@@ -13,16 +13,14 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies, requests
-from katana450.extensions.real_arm.codec.crc import with_crc
-from katana450.extensions.real_arm.codec.firmware_codec import (
+from katana450.extensions.real_arm.codec.codecs import (
     FirmwareCodec,
     RequestReceived,
     refusal_bytes,
     reply_bytes,
+    with_crc,
 )
-from katana450.extensions.real_arm.link.arm_link import ArmLink
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
+from katana450.extensions.real_arm.link import ArmLink, ArmRefusalError, ArmUrl, LinkLostError
 from tests.real_arm.small_firmware import Piece, SmallFirmware
 
 POSITIONS = replies.AxisPositions((1, -2, 3, -4, 5, -6))

@@ -7,8 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.arm.control.arm_commands import ArmAct
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.replies import FirmwareError
+from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
     CommandMotor,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm_report import ArmMode
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
+from katana450.extensions.real_arm.codec.replies import AxisStatus
 from katana450.extensions.real_arm.codec.requests import More, MotorFlag, SendSplines
 from tests.real_arm.paper_arm import ENDS, JOINTS, MAP, Conversation, sway
 

@@ -14,10 +14,8 @@ from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.real_arm.plant.axis import PlantAxis
-from katana450.extensions.real_arm.plant.driver import PlantDriver
-from katana450.extensions.real_arm.plant.gravity import GravityLoads
-from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES, STIFF
+from katana450.extensions.real_arm.plant.axis import KATANA450, PROFILES, STIFF, PlantAxis
+from katana450.extensions.real_arm.plant.driver import GravityLoads, PlantDriver
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 

@@ -17,9 +17,13 @@ from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.codec.replies import ArmReply, FirmwareError
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
+from katana450.extensions.real_arm.driver.spline_motion import (
+    SEGMENT_TIME,
+    SplineSegment,
+    SplineStream,
+)
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.firmware import Firmware, RequestError
-from katana450.extensions.real_arm.splines import SEGMENT_TIME, SplineSegment, SplineStream
 from katana450.extensions.real_arm.variants import DEFAULT_VARIANT
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

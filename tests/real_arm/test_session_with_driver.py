@@ -23,10 +23,9 @@ from katana450.extensions.programs.run.simulation import plan_script, run_by_clo
 from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
-from katana450.extensions.real_arm.emulator.arm import EmulatedArm
-from katana450.extensions.real_arm.emulator.posture import joints_at
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm, joints_at
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
+from katana450.extensions.real_arm.link import ArmUrl
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.real_arm.paper_arm import ENDS, JOINTS

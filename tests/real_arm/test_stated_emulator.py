@@ -8,8 +8,7 @@ import time
 import pytest
 
 from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.codec.crc import crc16, with_crc
-from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec
+from katana450.extensions.real_arm.codec.codecs import FirmwareCodec, crc16, with_crc
 from katana450.extensions.real_arm.codec.requests import REQUESTS
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.axis import COLLISION_LIMIT

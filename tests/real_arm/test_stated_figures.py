@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from katana450.arm.control.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
-from katana450.extensions.real_arm.plant.profile import KATANA450, STIFF
-from katana450.extensions.real_arm.splines import SplineStream
+from katana450.extensions.real_arm.driver.spline_motion import SplineStream
+from katana450.extensions.real_arm.plant.axis import KATANA450, STIFF
 from tests.conftest import LONG
 from tests.real_arm.paper_arm import JOINTS, MAP
 from tests.real_arm.test_programs_with_emulator import PERIOD, EmulatorOnPaper

@@ -16,7 +16,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.real_arm.commands.serve_parts import view_layer
+from katana450.extensions.real_arm.options import view_layer
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.scenery import Scenery
 from tests.viser_bridge.internals import nodes

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
-from katana450.extensions.real_arm.plant.profile import PROFILES
+from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.resources import URDF_PATH
 
 URL = "http://127.0.0.1:8080"

@@ -34,8 +34,8 @@ from katana450.extensions.programs.run.simulation import (
 from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun
+from katana450.extensions.real_arm.plant.axis import profile_named
 from katana450.extensions.real_arm.plant.driver import PlantDriver
-from katana450.extensions.real_arm.plant.profile import profile_named
 from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile

@@ -13,7 +13,6 @@ from katana450.client.asynchronous import AsyncClient, aconnect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.experiments.keyboard import Keyboard
-from katana450.extensions.leader.calibration import Calibration, read_calibration
 from katana450.extensions.leader.follower import (
     Action,
     Ease,
@@ -25,15 +24,23 @@ from katana450.extensions.leader.follower import (
     Sample,
     Say,
 )
-from katana450.extensions.leader.joint_map import JointMap, LeaderPosture
-from katana450.extensions.leader.layout import SO101, read_layout
+from katana450.extensions.leader.joint_map import (
+    SO101,
+    Calibration,
+    JointMap,
+    LeaderPosture,
+    read_calibration,
+    read_layout,
+)
 from katana450.extensions.leader.motor_bus import (
     BAUD,
+    HOMING_OFFSET,
+    PRESENT_POSITION,
+    TORQUE_ENABLE,
     MotorBus,
     SilentLeaderError,
     UnpluggedError,
 )
-from katana450.extensions.leader.packets import HOMING_OFFSET, PRESENT_POSITION, TORQUE_ENABLE
 from katana450.extensions.serial_port import SerialPort
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.sdk import answers, requests

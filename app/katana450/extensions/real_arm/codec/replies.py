@@ -1,14 +1,171 @@
-"""Replies of the arm. Bytes whose meaning is not known are kept as they are."""
+"""Messages as typed values, and the replies of the arm with their numbers in words.
+
+Bytes whose meaning is not known are kept as they are.
+"""
 
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
-from typing import ClassVar, Self
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any, ClassVar, Final, Self
 
 from katana450.errors import InputError
-from katana450.extensions.real_arm.codec.error_codes import error_sentence
-from katana450.extensions.real_arm.codec.wire_message import WireMessage
+
+
+@dataclass(frozen=True)
+class WireMessage:
+    """A message: fixed bytes, then the fields of the class in the order of their definition.
+
+    Attributes:
+        HEAD: Bytes with which the payload begins: the letter of the command, and for some commands
+            a second byte that chooses among several layouts.
+        LAYOUT: Fields after it, as ``struct`` counts them, big endian. A field that is a tuple is
+            the last one and holds all remaining numbers.
+    """
+
+    HEAD: ClassVar[bytes] = b""
+    LAYOUT: ClassVar[struct.Struct] = struct.Struct(">")
+
+    @classmethod
+    def length(cls) -> int:
+        """Return the number of bytes of the payload."""
+        return len(cls.HEAD) + cls.LAYOUT.size
+
+    @property
+    def payload(self) -> bytes:
+        """Bytes without header and checksum. Raises InputError for numbers that do not fit."""
+        try:
+            return self.HEAD + self.LAYOUT.pack(*self._numbers())
+        except struct.error as error:
+            raise InputError(f"{self} does not fit into its message: {error}.") from None
+
+    @classmethod
+    def read(cls, payload: bytes) -> Self:
+        """Return the message in ``payload``. Raises InputError for another head or length."""
+        if not payload.startswith(cls.HEAD) or len(payload) != cls.length():
+            raise InputError(
+                f"{payload[:8].hex(' ')} ({len(payload)} bytes) is no {cls.__name__}: that begins "
+                f"with {cls.HEAD.hex(' ')} and has {cls.length()} bytes."
+            )
+        return cls._of(cls.LAYOUT.unpack_from(payload, len(cls.HEAD)))
+
+    def _numbers(self) -> list[Any]:
+        numbers: list[Any] = []
+        for field in fields(self):
+            value = getattr(self, field.name)
+            numbers += value if isinstance(value, tuple) else (value,)
+        return numbers
+
+    @classmethod
+    def _of(cls, numbers: tuple[Any, ...]) -> Self:
+        create: Callable[..., Self] = cls
+        count = len(fields(cls))
+        if len(numbers) == count:
+            return create(*numbers)
+        return create(*numbers[: count - 1], numbers[count - 1 :])
+
+
+class AxisStatus(IntEnum):
+    """Known values of the status byte of an axis. Others occur and have no known meaning."""
+
+    OFF = 0
+    CALIBRATING = 4
+    FIXED = 8
+    MOVING = 16
+    MOVING_TO_TARGET = 24
+    COLLIDED = 40
+    SPLINES_DONE = 88
+    DATA_INVALID = 128
+    SPLINE_BUFFER_FULL = 152
+
+
+IN_MOTION = frozenset(
+    (AxisStatus.MOVING, AxisStatus.MOVING_TO_TARGET, AxisStatus.SPLINE_BUFFER_FULL)
+)
+"""Values of an axis that moves by itself."""
+
+AT_REST = frozenset((AxisStatus.FIXED, AxisStatus.SPLINES_DONE))
+"""Values of an axis that holds its position and accepts a motion."""
+
+STATUS_WORDS = {
+    AxisStatus.OFF: "its motor is off",
+    AxisStatus.CALIBRATING: "it calibrates",
+    AxisStatus.FIXED: "it holds its position",
+    AxisStatus.MOVING: "it moves",
+    AxisStatus.MOVING_TO_TARGET: "it moves to a target",
+    AxisStatus.COLLIDED: "a collision stopped it",
+    AxisStatus.SPLINES_DONE: "its motion is finished",
+    AxisStatus.DATA_INVALID: "its data are invalid",
+    AxisStatus.SPLINE_BUFFER_FULL: "it moves and its buffer is full",
+}
+
+
+def status_words(status: int) -> str:
+    """Return a status byte in words, as the end of a sentence on the axis."""
+    if status in STATUS_WORDS:
+        return STATUS_WORDS[AxisStatus(status)]
+    return f"it reports the unknown status {status}"
+
+
+CRC_ERROR: Final = -12
+"""Code for a request whose checksum is wrong. Real arms may answer otherwise: not known."""
+
+INVALID_ARGUMENT: Final = -2
+"""Code for a request with a command, a length or a value that the firmware does not know."""
+
+COLLISION_ERROR: Final = -10
+"""Code for a collision."""
+
+CAUSES = {
+    -1: "it failed",
+    INVALID_ARGUMENT: "an argument is invalid",
+    -3: "the arm is not in the right state",
+    -4: "the type is wrong",
+    -5: "a value is out of range",
+    -6: "the axis sends no heartbeat",
+    -7: "the axis is not operational",
+    -8: "the axis cannot move",
+    -9: "the axis cannot follow its polynomial",
+    COLLISION_ERROR: "the axis collided",
+    -11: "an axis failed",
+    CRC_ERROR: "the checksum of the request was wrong",
+    -13: "a peripheral failed",
+}
+
+COMMANDS = {
+    "A": "collision detection",
+    "B": "master firmware",
+    "C": "motor command",
+    "D": "axis state",
+    "E": "sensors",
+    "H": "polynomials",
+    "N": "states or positions",
+    "S": "axis parameter",
+    "T": "digital inputs",
+    "V": "slave firmware",
+    "X": "command table",
+    "Y": "identity",
+    "Z": "echo",
+}
+
+
+def error_sentence(command: int, code: int, axis: int, text: str) -> str:
+    """Return a firmware error as a sentence for people.
+
+    Args:
+        command: First byte of the refused request.
+        code: Number of the error.
+        axis: Axis as the firmware counts, 0 for none. Real arms also send numbers above 6.
+        text: Words of the firmware, which may be empty.
+    """
+    name = COMMANDS.get(chr(command), f"0x{command:02X}")
+    where = f", axis {axis}" if 1 <= axis <= 6 else ""
+    cause = CAUSES.get(code, f"error {code}")
+    words = f" ({text!r})" if text else ""
+    return f"The arm refused a request ({name}{where}): {cause}{words}."
+
 
 AXES = 6
 """Axes of the protocol: five of the arm, and the gripper."""

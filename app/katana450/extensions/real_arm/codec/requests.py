@@ -9,8 +9,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import replies
-from katana450.extensions.real_arm.codec.replies import AXES, ArmReply
-from katana450.extensions.real_arm.codec.wire_message import WireMessage
+from katana450.extensions.real_arm.codec.replies import AXES, ArmReply, WireMessage
 
 ALL_AXES = 0
 """Number that stands for all axes in a motor command."""

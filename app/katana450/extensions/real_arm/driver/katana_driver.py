@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from argparse import Namespace
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,15 +17,21 @@ from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.driver import DriverAnswer
+from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.real_arm.codec.requests import ArmRequest
 from katana450.extensions.real_arm.driver.machine import ArmMachine
-from katana450.extensions.real_arm.encoders import EncoderMap
-from katana450.extensions.real_arm.link.arm_link import ArmLink
-from katana450.extensions.real_arm.link.arm_url import ArmUrl
-from katana450.extensions.real_arm.link.transport import ArmRefusalError, LinkLostError
-from katana450.extensions.real_arm.tool_travel import Travel
-from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, Variant
+from katana450.extensions.real_arm.link import (
+    ArmLink,
+    ArmRefusalError,
+    ArmUrl,
+    ExchangeLog,
+    LinkLostError,
+    LoggedArmUrl,
+)
+from katana450.extensions.real_arm.tool_travel import Travel, tool_travel
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap, Variant
+from katana450.extras import require
 from katana450.maths.geometry.arrays import FloatArray
 
 IDLE_TIME = 0.01
@@ -264,3 +271,27 @@ class KatanaDriver:
             log.log(
                 logging.WARNING if bad else logging.INFO, "%s. %s", after.mode.value, after.note
             )
+
+
+def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> KatanaDriver:
+    """Return the driver of the arm at ``options.arm``, without a connection.
+
+    q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError
+    for a wrong address, a missing extra, a log that cannot be written, and a robot that is not this
+    arm.
+    """
+    url = ArmUrl.parse(options.arm)
+    if url.port is None:
+        # Before the server starts: the driver tries to connect until it is ended.
+        require("serial", "serial", "Serial ports")
+    if options.arm_log is not None:
+        url = LoggedArmUrl(url.host, url.port, ExchangeLog(options.arm_log))
+    arm = robot.require_arm()
+    bounds = np.array(
+        [
+            [*arm.limits.lower, arm.gripper.lower],
+            [*arm.limits.upper, arm.gripper.upper],
+        ]
+    )
+    joints = np.array([*q, gripper])
+    return KatanaDriver(url, bounds, joints, travel=tool_travel(robot))

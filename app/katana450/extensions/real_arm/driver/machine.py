@@ -13,8 +13,13 @@ import numpy as np
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.arm_report import ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
-from katana450.extensions.real_arm.codec.axis_status import IN_MOTION, AxisStatus
-from katana450.extensions.real_arm.codec.replies import ArmReply, AxisStates, FirmwareError
+from katana450.extensions.real_arm.codec.replies import (
+    IN_MOTION,
+    ArmReply,
+    AxisStates,
+    AxisStatus,
+    FirmwareError,
+)
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,
     CommandMotor,
@@ -25,6 +30,7 @@ from katana450.extensions.real_arm.codec.requests import (
 )
 from katana450.extensions.real_arm.driver.arm_motion import FINGER, ArmMotion
 from katana450.extensions.real_arm.driver.procedures import (
+    ArmReadings,
     Procedure,
     ProcedureEnd,
     calibrate,
@@ -33,11 +39,9 @@ from katana450.extensions.real_arm.driver.procedures import (
     identify,
     release,
 )
-from katana450.extensions.real_arm.driver.readings import ArmReadings
-from katana450.extensions.real_arm.encoders import EncoderMap
-from katana450.extensions.real_arm.link.transport import ArmRefusalError
+from katana450.extensions.real_arm.link import ArmRefusalError
 from katana450.extensions.real_arm.tool_travel import Travel
-from katana450.extensions.real_arm.variants import Variant
+from katana450.extensions.real_arm.variants import EncoderMap, Variant
 from katana450.maths.geometry.arrays import FloatArray, frozen
 
 POLLS = ((ReadPositions(), 0.04), (ReadStates(), 0.1), (ReadSensors(), 0.25))

@@ -1,21 +1,169 @@
-"""The emulated arm: six axes in motion and its gripper, without I/O."""
+"""The emulated arm without I/O: six axes in motion, their calibration, and the gripper."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.emulator.axis import AxisMode, EmulatedAxis
-from katana450.extensions.real_arm.emulator.calibration import CalibrationRun
-from katana450.extensions.real_arm.emulator.motors import (
+import numpy as np
+
+from katana450.arm.robot.robot import Robot
+from katana450.extensions.real_arm.codec.replies import AxisStatus
+from katana450.extensions.real_arm.emulator.axis import (
     CALIBRATED_AT,
     CALIBRATION_ORDER,
     MOTORS,
     POWER_UP_POSTURE,
+    AxisMode,
+    EmulatedAxis,
+    TargetMove,
 )
-from katana450.extensions.real_arm.emulator.sensors import encoder_at_gap, sensor_values
-from katana450.extensions.real_arm.plant.axis import STEP
-from katana450.extensions.real_arm.plant.profile import KATANA450, PlantProfile
+from katana450.extensions.real_arm.plant.axis import KATANA450, STEP, PlantProfile
+from katana450.extensions.real_arm.plant.driver import GravityLoads
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap
+from katana450.maths.geometry.arrays import FloatArray
+
+SEARCH_SPEED, SLOW_SPEED = 6000.0, 1000.0
+"""[counts/s] Speeds of the first and the second search. Assumed; all axes then take about 30 s."""
+
+ACCELERATION = 10000.0
+"""[counts/s^2] Acceleration of all motions of a calibration."""
+
+PRESS, SLOW_PRESS = 150.0, 60.0
+"""[counts] Deviation from the setpoint by which the stop is recognised, in each search."""
+
+GAP = 250.0
+"""[counts] Half the distance by which the axis leaves the stop between the searches."""
+
+REST_SPEED = 50.0
+"""[counts/s] Speed below which an axis that presses has reached its stop."""
+
+FARTHEST = 200_000.0
+"""[counts] A distance that no axis can travel."""
+
+
+class CalibrationRun:
+    """A calibration in progress.
+
+    Attributes:
+        is_done: whether all axes are calibrated.
+    """
+
+    def __init__(self, axes: Sequence[EmulatedAxis]) -> None:
+        """Begin with the first of ``axes``, in their order."""
+        self._axes = tuple(axes)
+        for axis in axes:
+            axis.begin_calibration()
+        self._steps = self._all()
+        self.is_done = False
+
+    def step(self) -> None:
+        """Move the setpoint of the axis in turn for one step of the plant."""
+        self.is_done = next(self._steps, None) is None
+        if self.is_done:
+            for axis in self._axes:
+                axis.freeze()
+
+    def _all(self) -> Iterator[EmulatedAxis]:
+        for axis in self._axes:
+            yield from _search(axis, SEARCH_SPEED, PRESS)
+            _set_stop(axis)
+            yield from _travel(axis, axis.setpoint - axis.facts.sign * 2.0 * GAP)
+            yield from _search(axis, SLOW_SPEED, SLOW_PRESS)
+            _set_stop(axis)
+            axis.is_calibrated = True
+            yield from _travel(axis, axis.facts.sign * CALIBRATED_AT - axis.offset)
+
+
+def _search(axis: EmulatedAxis, speed: float, press: float) -> Iterator[EmulatedAxis]:
+    """Move towards the stop until the axis stays behind its setpoint and stands."""
+    plant, speed = axis.plant, speed / axis.facts.halving
+    move = TargetMove(axis.setpoint, 0.0, axis.setpoint + axis.facts.sign * FARTHEST)
+    while (
+        abs(move.position - plant.position) < press / axis.facts.halving
+        or abs(plant.speed) > REST_SPEED
+    ):
+        move.advance(STEP, speed, ACCELERATION)
+        axis.lead(move.position, move.speed)
+        yield axis
+    axis.lead(plant.position, 0.0)
+
+
+def _travel(axis: EmulatedAxis, target: float) -> Iterator[EmulatedAxis]:
+    move = TargetMove(axis.setpoint, 0.0, target)
+    while not move.is_done:
+        move.advance(STEP, SEARCH_SPEED / axis.facts.halving, ACCELERATION)
+        axis.lead(move.position, move.speed)
+        yield axis
+
+
+def _set_stop(axis: EmulatedAxis) -> None:
+    """Give the place where the axis stands the count of its stop."""
+    axis.offset = axis.facts.stop - round(axis.plant.position)
+
+
+OPEN_ENCODER, CLOSED_ENCODER = 30770, 12240
+"""Counts of the open and the closed gripper."""
+
+GAPS = (
+    (-0.44, 0.4),
+    (-0.30, 25.5),
+    (-0.20, 43.0),
+    (-0.10, 60.0),
+    (0.00, 76.4),
+    (0.10, 92.0),
+    (0.20, 106.8),
+    (0.30, 120.4),
+)
+"""Finger joint [rad] and the gap between the finger tips [mm], measured on the meshes."""
+
+CLOSED_ANGLE, OPEN_ANGLE = GAPS[0][0], GAPS[-1][0]
+
+SENSORS = 16
+"""Number of bytes in an answer."""
+
+FORCE_SENSORS = (6, 7, 14, 15)
+"""Places of the force sensors: rear and front of the right finger, then of the left one."""
+
+
+def encoder_at_gap(gap: float) -> float:
+    """Return the counts of axis 6 at which the finger tips are ``gap`` [mm] apart."""
+    place = min(max(bisect_right(GAPS, gap, key=lambda row: row[1]), 1), len(GAPS) - 1)
+    (low, start), (high, end) = GAPS[place - 1], GAPS[place]
+    angle = low + (gap - start) / (end - start) * (high - low)
+    turned = (angle - CLOSED_ANGLE) / (OPEN_ANGLE - CLOSED_ANGLE)
+    return CLOSED_ENCODER + turned * (OPEN_ENCODER - CLOSED_ENCODER)
+
+
+def sensor_values(squeeze: float) -> tuple[int, ...]:
+    """Return the bytes (16,) of all sensors. The others read 0: how they behave is not known.
+
+    ``squeeze``: force on the object, as a fraction of the whole effort of the motor.
+    """
+    force = min(round(255 * squeeze), 255)
+    return tuple(force if place in FORCE_SENSORS else 0 for place in range(SENSORS))
+
+
+ENCODERS = EncoderMap(DEFAULT_VARIANT)
+
+
+def joints_at(counts: Sequence[float]) -> tuple[FloatArray, float]:
+    """Return joint angles (5,) and finger angle [rad] at ``counts`` (6,) of the calibrated arm."""
+    joints = ENCODERS.joints(np.array(counts))
+    return joints[:-1], float(joints[-1])
+
+
+def loads_of_robot(robot: Robot) -> Callable[[Sequence[float]], Sequence[float]]:
+    """Return the function that finds the weights on the axes at counts; see ``EmulatedArm``."""
+    gravity = GravityLoads(robot)
+    directions = np.sign(ENCODERS.scale[:-1]).tolist()
+
+    def loads(counts: Sequence[float]) -> Sequence[float]:
+        weights = gravity.at(joints_at(counts)[0])
+        return (*(a * b for a, b in zip(weights, directions, strict=True)), 0.0)
+
+    return loads
+
 
 GRIPPER = 5
 """Number of the axis of the gripper, from 0."""

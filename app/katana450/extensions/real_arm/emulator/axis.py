@@ -2,14 +2,187 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+from dataclasses import dataclass
 from enum import Enum
 
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.emulator.motors import MAX_ACCELERATION, MotorFacts
-from katana450.extensions.real_arm.emulator.spline_buffer import TICK, SplineBuffer
-from katana450.extensions.real_arm.emulator.target_move import TargetMove
-from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis
-from katana450.extensions.real_arm.plant.profile import PlantProfile
+from katana450.extensions.real_arm.codec.replies import AxisStatus
+from katana450.extensions.real_arm.codec.requests import AxisSegment, More
+from katana450.extensions.real_arm.plant.axis import STEP, PlantAxis, PlantProfile
+from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, MAX_SPEED, AxisFacts
+
+
+@dataclass(frozen=True)
+class MotorFacts:
+    """One motor as its controller knows it after power-up.
+
+    Attributes:
+        axis: encoder and joint.
+        speed: speed limit [counts / 10 ms], as the motor counts.
+        collision_limit: deviation from the setpoint that counts as a collision [counts].
+    """
+
+    axis: AxisFacts
+    speed: int
+    collision_limit: int
+
+    @property
+    def counts_per_radian(self) -> float:
+        """Encoder counts in a radian of the joint's motor."""
+        return self.axis.encoders_per_turn / math.tau
+
+    @property
+    def stops(self) -> tuple[int, int]:
+        """Mechanical stops in counts of the calibrated arm, the lower one first."""
+        return self.axis.encoder_min, self.axis.encoder_max
+
+    @property
+    def stop(self) -> int:
+        """Counts of the stop that the calibration searches."""
+        return self.axis.encoder_offset
+
+    @property
+    def sign(self) -> int:
+        """Direction of that stop: 1 or -1."""
+        return 1 if self.stop > 0 else -1
+
+    @property
+    def halving(self) -> float:
+        """Counts of the motor in a count of the protocol; its limits are in those of the motor."""
+        return MAX_SPEED / self.axis.speed
+
+
+CONFIGURED = ((30, 250), (25, 200), (20, 250), (25, 200), (25, 100), (25, 100))
+"""Speed and collision limits of the axes, from the configuration of this arm."""
+
+MOTORS = tuple(
+    MotorFacts(axis, *limits) for axis, limits in zip(DEFAULT_VARIANT.axes, CONFIGURED, strict=True)
+)
+
+CALIBRATION_ORDER = (2, 3, 4, 5, 6, 1)
+"""Axes in the order in which they are calibrated."""
+
+CALIBRATED_AT = 30500
+"""Counts, with the sign of the stop, at which the calibration leaves an axis of a real arm."""
+
+MAX_ACCELERATION = 20000.0
+"""[counts/s^2] Larger of the two acceleration limits, 2 counts / (10 ms)^2."""
+
+POWER_UP_POSTURE = (12000, -24000, -22000, 20000, 12000, 24000)
+"""Counts where the emulated arm stands before its first calibration."""
+
+
+DEPTH = 16
+"""Polynomials that fit. Reported by people who drove real arms, as a guess."""
+
+TICK = 0.01
+"""[s] Unit of time of the polynomials."""
+
+
+class SplineBuffer:
+    """The waiting polynomials of an axis, and the one that is executed.
+
+    A polynomial stays in the buffer until it ends. When the next one is late, the setpoint waits at
+    the end of the last.
+
+    Attributes:
+        position: the setpoint [counts].
+        speed: its speed [counts/s].
+    """
+
+    def __init__(self) -> None:
+        self.position = 0.0
+        self.speed = 0.0
+        self._waiting: deque[tuple[AxisSegment, bool]] = deque()
+        self._tick = 0.0
+        self._is_last = False
+        self.is_running = False
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    @property
+    def is_full(self) -> bool:
+        """True if no further polynomial fits."""
+        return len(self._waiting) >= DEPTH
+
+    def store(self, segment: AxisSegment, more: int) -> None:
+        """Append ``segment``. The caller has checked ``is_full``."""
+        self._waiting.append((segment, more == More.LAST))
+
+    def start(self, more: int) -> None:
+        """Execute what is stored. The newest polynomial is the end of the motion for LAST."""
+        if more == More.LAST and self._waiting:
+            self._waiting[-1] = (self._waiting[-1][0], True)
+        if not self.is_running and self._waiting:
+            self.is_running, self._is_last, self._tick = True, False, 0.0
+            self.position = float(self._waiting[0][0].p0)
+
+    def flush(self) -> None:
+        """Drop all polynomials but the one that is executed, which ends the motion then."""
+        kept = self._waiting[0][0] if self.is_running and self._waiting else None
+        self._waiting.clear()
+        if kept is not None:
+            self._waiting.append((kept, True))
+        self._is_last = True
+
+    def clear(self) -> None:
+        """Drop everything and end the motion."""
+        self._waiting.clear()
+        self.is_running = False
+        self.speed = 0.0
+
+    def advance(self, dt: float) -> None:
+        """Move the setpoint for ``dt`` [s]; ``is_running`` is False after the end."""
+        self._tick += dt / TICK
+        while self._waiting:
+            segment, is_last = self._waiting[0]
+            if self._tick < segment.ticks:
+                self.position = segment.at(self._tick)
+                self.speed = segment.speed_at(self._tick) / TICK
+                return
+            self._waiting.popleft()
+            self._tick -= max(segment.ticks, 0)
+            self.position, self.speed = float(segment.target), 0.0
+            self._is_last = is_last
+        self._tick = 0.0
+        self.is_running = self.is_running and not self._is_last
+
+
+class TargetMove:
+    """A setpoint that speeds up, travels, and slows down to rest at its target.
+
+    Attributes:
+        position: the setpoint [counts].
+        speed: its speed [counts/s].
+        target: where it ends [counts].
+    """
+
+    def __init__(self, position: float, speed: float, target: float) -> None:
+        self.position = position
+        self.speed = speed
+        self.target = target
+
+    @property
+    def is_done(self) -> bool:
+        """True once the setpoint rests at the target."""
+        return self.position == self.target and self.speed == 0.0
+
+    def advance(self, dt: float, max_speed: float, acceleration: float) -> None:
+        """Move the setpoint for ``dt`` [s] within limits [counts/s] and [counts/s^2]."""
+        distance = self.target - self.position
+        # The fastest speed from which the rest of the way is enough to brake.
+        allowed = min(math.sqrt(2.0 * acceleration * abs(distance)), max_speed)
+        wanted = math.copysign(allowed, distance)
+        change = acceleration * dt
+        speed = self.speed + min(max(wanted - self.speed, -change), change)
+        if abs(distance) <= abs(speed) * dt and abs(speed) <= change + allowed:
+            self.position, self.speed = self.target, 0.0
+            return
+        self.position += speed * dt
+        self.speed = speed
+
 
 SPEED_LIMIT, ACCELERATION_LIMIT, COLLISION_LIMIT, SPLINE_COLLISION_LIMIT = 3, 4, 5, 6
 """Numbers of parameters of an axis."""

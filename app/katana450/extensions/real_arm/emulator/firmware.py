@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from katana450.extensions.real_arm.codec import replies
 from katana450.extensions.real_arm.codec import requests as req
-from katana450.extensions.real_arm.codec.axis_status import AxisStatus
-from katana450.extensions.real_arm.codec.error_codes import (
-    COLLISION_ERROR,
-    CRC_ERROR,
-    INVALID_ARGUMENT,
-)
-from katana450.extensions.real_arm.codec.firmware_codec import (
+from katana450.extensions.real_arm.codec.codecs import (
     FirmwareEvent,
     RequestInvalid,
     refusal_bytes,
     reply_bytes,
 )
+from katana450.extensions.real_arm.codec.replies import (
+    COLLISION_ERROR,
+    CRC_ERROR,
+    INVALID_ARGUMENT,
+    AxisStatus,
+)
 from katana450.extensions.real_arm.emulator.arm import GRIPPER, EmulatedArm
-from katana450.extensions.real_arm.emulator.axis import AxisMode, EmulatedAxis
-from katana450.extensions.real_arm.emulator.spline_buffer import TICK
+from katana450.extensions.real_arm.emulator.axis import TICK, AxisMode, EmulatedAxis
 
 VERSION = (2, 1)
 """Version of the master's firmware; clients of the maker accept 2 and 3 for this arm."""

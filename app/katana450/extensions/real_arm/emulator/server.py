@@ -1,18 +1,24 @@
-"""The emulated arm behind a TCP port, in real time."""
+"""``katana450 emulate``: the emulated arm behind a TCP port, in real time."""
 
 from __future__ import annotations
 
 import select
+import signal
 import socket
 import struct
 import threading
 import time
+from argparse import Namespace
 from collections.abc import Callable
 from contextlib import suppress
 
-from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec
-from katana450.extensions.real_arm.emulator.arm import EmulatedArm
+from katana450.arm.robot.loader import load
+from katana450.assembly.log_output import say
+from katana450.extensions.real_arm.codec.codecs import FirmwareCodec
+from katana450.extensions.real_arm.emulator.arm import EmulatedArm, loads_of_robot
 from katana450.extensions.real_arm.emulator.firmware import Firmware
+from katana450.extensions.real_arm.plant.axis import profile_named
+from katana450.platform_support import raise_priority, stop_signals
 from katana450.sdk import listen
 
 IDLE = 0.01
@@ -183,3 +189,31 @@ class EmulatorServer:
         if self._client is not None:
             self._client.close()
             self._client = None
+
+
+CHECK_INTERVAL = 1.0
+"""[s] Interval at which the emulator is looked after."""
+
+
+def emulate(options: Namespace) -> int:
+    """Run ``katana450 emulate`` until Ctrl-C and return the exit status. Raises KatanaError."""
+    ending = threading.Event()
+    for number in stop_signals():
+        signal.signal(number, lambda *_: ending.set())
+    arm = EmulatedArm(
+        profile_named(options.plant),
+        loads_of_robot(load()),
+        calibrated=options.calibrated,
+        calibration_scale=options.calibration_scale,
+        object_width=options.object,
+    )
+    raise_priority()
+    emulator = EmulatorServer(arm, options.host, options.port)
+    emulator.start()
+    say(f"Emulated arm: tcp://{options.host}:{emulator.port} (Ctrl-C stops)")
+    try:
+        while not ending.wait(CHECK_INTERVAL) and emulator.is_running:
+            pass
+    finally:
+        emulator.stop()
+    return 0 if ending.is_set() else 1

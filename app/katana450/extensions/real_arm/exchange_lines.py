@@ -9,16 +9,16 @@ from pathlib import Path
 
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError
-from katana450.extensions.real_arm.codec.firmware_codec import FirmwareCodec, RequestReceived
-from katana450.extensions.real_arm.codec.host_codec import (
+from katana450.extensions.real_arm import link
+from katana450.extensions.real_arm.codec.codecs import (
+    FirmwareCodec,
     HostCodec,
     OutOfStep,
     ReplyReceived,
+    RequestReceived,
     RequestRefused,
 )
-from katana450.extensions.real_arm.codec.replies import FirmwareError
-from katana450.extensions.real_arm.codec.wire_message import WireMessage
-from katana450.extensions.real_arm.link import logged
+from katana450.extensions.real_arm.codec.replies import FirmwareError, WireMessage
 
 
 class ExchangeDecoder:
@@ -38,13 +38,13 @@ class ExchangeDecoder:
             return [f"This is not a line of a log: {printable(line.strip())}"]
         shown = time.strftime("%H:%M:%S", time.localtime(at)) + f"{at % 1.0:.3f}"[1:]
         match mark:
-            case logged.CONNECTED:
+            case link.CONNECTED:
                 self._firmware, self._host = FirmwareCodec(), HostCodec()
                 found = ["connected"]
-            case logged.SENT:
+            case link.SENT:
                 self._sent_at = at
                 found = self._requests(data)
-            case logged.RECEIVED:
+            case link.RECEIVED:
                 found = self._replies(data, at - self._sent_at)
             case _:
                 found = [f"unknown mark {mark}"]

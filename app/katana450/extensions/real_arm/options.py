@@ -1,14 +1,25 @@
-"""Options of ``katana450 emulate`` and ``katana450 arm``; reading them loads nothing heavy."""
+"""Options of ``katana450 emulate``, ``arm`` and ``serve``, and the choice of driver and view.
+
+Nothing heavy is loaded before it is used.
+"""
 
 from __future__ import annotations
 
 import argparse
+from argparse import Namespace
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from katana450.extensions.real_arm.plant.profile import KATANA450, PROFILES
+from katana450.errors import ConfigurationError
+from katana450.extensions.real_arm.plant.axis import KATANA450, PROFILES
+
+if TYPE_CHECKING:
+    from katana450.arm.drivers.driver import Driver
+    from katana450.arm.robot.robot import Robot
+    from katana450.maths.geometry.arrays import FloatArray
+    from katana450.server.view.layer import ViewLayer
 
 N = TypeVar("N", int, float)
 
@@ -127,3 +138,42 @@ def _between(what: str, read: Callable[[str], N], lower: N, upper: N) -> Callabl
         raise argparse.ArgumentTypeError(f"{what} from {lower:g} to {upper:g}, not {text!r}")
 
     return checked
+
+
+def arm(options: Namespace) -> int:
+    """Execute ``katana450 arm``; return the exit status."""
+    if options.act == "probe":
+        from katana450.extensions.real_arm.probe import probe
+
+        return probe(options)
+    from katana450.extensions.real_arm.exchange_lines import show_log
+
+    return show_log(options)
+
+
+def driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
+    """Return the driver of a real arm or a plant; None if the options choose neither.
+
+    q: (n,) [rad] and gripper [rad] are reported before the first measurement. Raises KatanaError.
+    """
+    if options.arm is not None:
+        from katana450.extensions.real_arm.driver.katana_driver import driver_of
+
+        return driver_of(options, robot, q, gripper)
+    if options.arm_log is not None:
+        raise ConfigurationError("--arm-log needs an arm: add --arm URL.")
+    if options.plant is None:
+        return None
+    from katana450.extensions.real_arm.plant.axis import profile_named
+    from katana450.extensions.real_arm.plant.driver import PlantDriver
+
+    return PlantDriver(robot, q, gripper, profile_named(options.plant))
+
+
+def view_layer(options: Namespace) -> ViewLayer | None:
+    """Return the layer of a real arm whose posture may be unknown; None for a simulated one."""
+    if options.arm is None:
+        return None
+    from katana450.extensions.real_arm.unknown_posture import UnknownPosture
+
+    return UnknownPosture()

@@ -1,1 +1,0 @@
-"""The commands ``katana450 emulate`` and ``katana450 arm``."""

@@ -1,1 +1,0 @@
-"""Connections to an arm: TCP and serial, with a deadline for each exchange."""
