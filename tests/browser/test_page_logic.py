@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import TaughtPose, taught
-from katana450.extensions.recording.playback.spans import Span, at_place, place_of
+from katana450.extensions.recording.playback.run import Span, at_place, place_of
 from tests.browser.bare_page import bare_page, load, module
 
 

@@ -12,9 +12,8 @@ import pytest
 
 import katana450
 from katana450.client import connect
-from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.playback.run import PlaybackRun
-from katana450.extensions.recording.playback.spans import at_place
+from katana450.extensions.recording.folders import recordings_in
+from katana450.extensions.recording.playback.run import PlaybackRun, at_place
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
 from tests.browser.camera import Drawing

@@ -29,7 +29,7 @@ ALLOWED = {
     # Queries the kernel about one socket, and has an answer for systems without that call.
     "arm/runtime/readiness.py": {"TCP_INFO", "poll", "POLLIN", "POLLOUT"},
     # Asks a library of numpy and the system what they are, and reports "unknown" without an answer.
-    "extensions/recording/files/fingerprint.py": {"ctypes", "/proc/cpuinfo"},
+    "extensions/recording/files/header.py": {"ctypes", "/proc/cpuinfo"},
 }
 MODULES = {"curses", "fcntl", "grp", "msvcrt", "pty", "pwd", "resource", "syslog", "termios", "tty"}
 MODULES |= {"ctypes", "winreg", "_winapi"}

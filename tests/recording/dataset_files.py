@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.messages import COMMANDS, EPISODES
 from tests.recording.recorded import Commands, random_commands, record
 

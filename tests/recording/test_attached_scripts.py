@@ -24,11 +24,12 @@ from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.programs.script.script_files import script_text
 from katana450.extensions.recording.files.keeping import whole_copy
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import FOLDER, script_runs
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.live.running_scripts import (
@@ -36,7 +37,6 @@ from katana450.extensions.recording.live.running_scripts import (
     RunningScripts,
     ScriptNote,
 )
-from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.run import PlaybackRun
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.recording.recorded import header, run, swinging

@@ -46,12 +46,12 @@ from katana450.extensions.recording.codec import (
     form_of,
     json_form,
     json_text,
+    key_of,
     recorded_classes,
 )
-from katana450.extensions.recording.digest import Digester
 from katana450.extensions.recording.former_forms import target_content
 from katana450.extensions.recording.forms import FormError
-from katana450.extensions.recording.shared_values import key_of
+from katana450.extensions.recording.ticks import Digester
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward

@@ -22,8 +22,8 @@ from katana450.extensions.media.options import CAMERAS
 from katana450.extensions.media.rendering_pool import Shot
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
+from katana450.extensions.recording.datasets.lerobot_writer import QUANTILES, PixelCounts
 from katana450.extensions.recording.datasets.sampling import RecordedStates
-from katana450.extensions.recording.datasets.statistics import QUANTILES, PixelCounts
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.options import VIEWS
 from katana450.server.viser_bridge.presets import Preset

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import katana450
-from katana450.extensions.recording.places import (
+from katana450.extensions.recording.folders import (
     default_episodes_folder,
     default_folder,
     recordings_in,

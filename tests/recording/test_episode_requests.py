@@ -15,14 +15,14 @@ import pytest
 
 from katana450.client.files import EpisodeClient, LostError, RefusedError, Site
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes import interrupted
+from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.episodes.routes import EpisodeRoutes
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.messages import EPISODES
-from katana450.extensions.recording.places import recordings_in
 from katana450.server.web.http_api import RouteContext
 from tests.recording.episode_bench import Bench
 
@@ -115,18 +115,18 @@ def test_interrupted_episode_is_finished_while_others_are_recorded(
     bench.ask(do="start", task="long")
     bench.move(60)
     bench.ring.sync()
-    may_finish, cut_out = threading.Event(), interrupted.cut_out
+    may_finish, cut_out = threading.Event(), running_episode.cut_out
 
     def slow(*given: Any) -> Episode:
         assert may_finish.wait(20.0)
         return cut_out(*given)
 
-    monkeypatch.setattr(interrupted, "cut_out", slow)
+    monkeypatch.setattr(running_episode, "cut_out", slow)
     run = bench.header.metadata["utc_offset_ns"]
     bench.keeper = EpisodeKeeper(bench.folder, bench.ring, bench.ring_folder, run, lambda: bench.t)
     # It has returned although the first episode is not saved yet, and still holds its files.
     first = bench.ring.held
-    monkeypatch.setattr(interrupted, "cut_out", cut_out)
+    monkeypatch.setattr(running_episode, "cut_out", cut_out)
     assert bench.ask(do="start", task="next")["number"] == 2
     assert bench.ring.held == first
     may_finish.set()

@@ -23,20 +23,21 @@ from katana450.extensions.recording.episodes.episode import (
     Episode,
     EpisodeOutcome,
     episode_of,
+    episode_request,
     episodes_of,
     message_of,
 )
-from katana450.extensions.recording.episodes.episode_file import (
+from katana450.extensions.recording.episodes.episode_folder import (
+    EpisodeFolder,
+    episode_files,
     episode_in,
     with_episode,
     write_episode,
 )
-from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episode_files
-from katana450.extensions.recording.episodes.episode_requests import episode_request
 from katana450.extensions.recording.episodes.keeper import UNDO_SECONDS
-from katana450.extensions.recording.files.checking import session_for, verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.simulation import session_for, verify_recording
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import EPISODES, STATE
 from tests.recording.episode_bench import ADA, Bench, motion

@@ -27,9 +27,9 @@ from mcap.records import (
 
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.files.trimming import trim
 from tests.conftest import LONG

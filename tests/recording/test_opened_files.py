@@ -17,9 +17,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from katana450.arm.control.lease import Role
-from katana450.extensions.recording import claimed_folder as claims
-from katana450.extensions.recording.claimed_folder import CLAIM, remove_abandoned
-from katana450.extensions.recording.datasets.new_folder import new_folder
+from katana450.extensions.recording import folders
+from katana450.extensions.recording.folders import CLAIM, new_folder, remove_abandoned
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback import routes as routes_module
 from katana450.extensions.recording.playback.routes import OTHER, PlaybackRoutes
@@ -171,7 +170,7 @@ def test_folder_that_another_process_takes_for_abandoned_is_not_used(
             remove_abandoned(raced)
         claim_file(number)
 
-    monkeypatch.setattr(claims, "claim_file", claim_late)
+    monkeypatch.setattr(folders, "claim_file", claim_late)
     with new_folder(out) as folder:
         (folder / "content").write_text("whole")
     assert len(raced) == 1

@@ -30,16 +30,15 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import checked_size, utc_offset_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live.ring import Ring
-from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback import chunks, opened_run
 from katana450.extensions.recording.playback import run as run_module
 from katana450.extensions.recording.playback.chunks import ChunkIndex
-from katana450.extensions.recording.playback.difference import difference
-from katana450.extensions.recording.playback.routes import PlaybackRoutes
+from katana450.extensions.recording.playback.routes import PlaybackRoutes, difference
 from katana450.extensions.recording.playback.rows import still_flying
-from katana450.extensions.recording.playback.run import PlaybackRun
-from katana450.extensions.recording.playback.spans import (
+from katana450.extensions.recording.playback.run import (
+    PlaybackRun,
     Span,
     at_place,
     length_of,

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from katana450.extensions.recording.files import checking
-from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
+from katana450.extensions.recording.files import simulation
+from katana450.extensions.recording.files.header import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.messages import COMMANDS
 from katana450.portable_rounding import portable_rounding, rounds_portably
@@ -108,8 +108,8 @@ def test_another_kind_of_processor_simulates_in_this_process(
     # A process of its own would not round otherwise, and start one more for the same reason.
     monkeypatch.setattr(platform, "machine", lambda: "aarch64")
     monkeypatch.delenv("OPENBLAS_CORETYPE", raising=False)
-    monkeypatch.setattr(checking, "_verified_apart", None)
-    assert checking.verified(path).ticks > TICKS // 2
+    monkeypatch.setattr(simulation, "_verified_apart", None)
+    assert simulation.verified(path).ticks > TICKS // 2
 
 
 def test_tunables_of_the_user_are_kept_and_ours_come_last() -> None:

@@ -25,13 +25,12 @@ from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import record_end, ring
 from katana450.extensions.recording.live.jobs import RecordingJob, RecordingRoutes
-from katana450.extensions.recording.live.record_end import RecordEnd
-from katana450.extensions.recording.live.record_wire import LostTicks, RecordDeserializer
+from katana450.extensions.recording.live.record_end import LostTicks, RecordDeserializer, RecordEnd
 from katana450.extensions.recording.live.ring import Ring
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, STATE
-from katana450.extensions.recording.places import recordings_in
 from katana450.extensions.recording.playback.store import RecordingStore
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.identity import Identity

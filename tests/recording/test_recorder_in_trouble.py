@@ -24,9 +24,9 @@ from katana450.cli.main import main
 from katana450.client import RefusedError, connect
 from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import record_end, ring
 from katana450.extensions.recording.messages import COMMANDS
-from katana450.extensions.recording.places import recordings_in
 from katana450.server.api import answers, requests
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG

@@ -12,7 +12,7 @@ import pytest
 
 from katana450.arm.runtime.guarded_pipe import disconnect
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes.episode_requests import StartEpisode, StopEpisode
+from katana450.extensions.recording.episodes.episode import StartEpisode, StopEpisode
 from katana450.extensions.recording.live import recorder_link
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,

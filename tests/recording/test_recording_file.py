@@ -23,19 +23,21 @@ from katana450.errors import InputError
 from katana450.extension import ServerFacts
 from katana450.extensions.export.playback import load_motion
 from katana450.extensions.recording.codec import json_text
-from katana450.extensions.recording.files import message_writer
-from katana450.extensions.recording.files.checking import verify_recording
-from katana450.extensions.recording.files.fingerprint import RELEVANT, differences, fingerprint
+from katana450.extensions.recording.files import recording_writer
 from katana450.extensions.recording.files.header import (
     MAX_SCENE_BYTES,
     METADATA,
+    RELEVANT,
     attached_scene,
+    differences,
+    fingerprint,
 )
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.recording_writer import MessageWriter, RecordingWriter
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
+from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import recorder
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.extensions.recording.messages import (
@@ -47,7 +49,6 @@ from katana450.extensions.recording.messages import (
     TF,
     TOPICS,
 )
-from katana450.extensions.recording.places import recordings_in
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.platform_support import claim_file
@@ -118,7 +119,7 @@ def test_index_is_that_of_the_mcap_library(tmp_path: Path, file: RecordingFile) 
             writer.add_attachment(0, 0, each.name, each.media_type, each.data)
         ours = tmp_path / "ours.mcap"
         with ours.open("wb") as target, pytest.MonkeyPatch.context() as patch:
-            patch.setattr(message_writer, "CHUNK_BYTES", 2000)
+            patch.setattr(recording_writer, "CHUNK_BYTES", 2000)
             mine = MessageWriter(target, file.metadata, list(file.attachments()))
             for message in file.messages(*file.counts()):
                 mine.add(message.topic, message.number, message.log_time, message.data)

@@ -24,8 +24,8 @@ import katana450
 from katana450.arm.control.lease import Role
 from katana450.cli.main import main
 from katana450.extensions import progress
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.playback.store import PREFIX, RecordingStore

@@ -23,15 +23,20 @@ from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.recording.files.checking import session_for, verify_recording
-from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.simulation import (
+    recorded_states,
+    session_for,
+    verify_recording,
+)
 from katana450.extensions.recording.messages import COMMANDS, STATE
-from katana450.extensions.recording.run_again.again_command import part_and_script
-from katana450.extensions.recording.run_again.again_script import again_script
-from katana450.extensions.recording.run_again.path_difference import path_difference
-from katana450.extensions.recording.run_again.recorded_part import RecordedPart, read_part
+from katana450.extensions.recording.run_again.again_command import part_and_script, path_difference
+from katana450.extensions.recording.run_again.again_script import (
+    RecordedPart,
+    again_script,
+    read_part,
+)
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH

@@ -29,18 +29,24 @@ from katana450.extensions.recording.episodes.episode import (
     EpisodeOutcome,
     message_of,
 )
-from katana450.extensions.recording.episodes.episode_file import (
+from katana450.extensions.recording.episodes.episode_folder import (
     append_message,
     shown_part,
     with_episode,
     write_episode,
 )
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.messages import EPISODES
+from katana450.extensions.recording.messages import EPISODES, nanoseconds
 from katana450.extensions.recording.scoring.score_command import Leaderboard, score_file, shown
-from katana450.extensions.recording.scoring.scored import HIGHER_IS_BETTER, MEASURES, Scored, scored
-from katana450.extensions.recording.scoring.smoothness import RATE, dimensionless_jerk, sparc
-from katana450.extensions.recording.state_message import nanoseconds
+from katana450.extensions.recording.scoring.scored import (
+    HIGHER_IS_BETTER,
+    MEASURES,
+    RATE,
+    Scored,
+    dimensionless_jerk,
+    scored,
+    sparc,
+)
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.programs.lagging_driver import LaggingDriver

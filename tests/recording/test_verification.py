@@ -26,16 +26,14 @@ from katana450.assembly.robot_session import find_robot
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.export.playback import load_motion
-from katana450.extensions.recording.digest import Digester
-from katana450.extensions.recording.files.checking import TickReader, verify_recording
-from katana450.extensions.recording.files.fingerprint import fingerprint
-from katana450.extensions.recording.files.header import header_of
+from katana450.extensions.recording.files.header import fingerprint, header_of
 from katana450.extensions.recording.files.record_command import same_setpoints
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
+from katana450.extensions.recording.files.simulation import TickReader, verify_recording
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS
-from katana450.extensions.recording.replay import Difference, Verification
+from katana450.extensions.recording.ticks import Difference, Digester, Verification
 from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.recording.dataset_files import write_copy

@@ -15,8 +15,8 @@ from katana450.arm.control.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_nodes import VrmlNodes
-from katana450.extensions.recording.files.checking import verify_recording
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.touch.squeeze import FORCE_LIMIT
 from katana450.server.api import requests
 from tests.control.test_grip import OPEN

@@ -8,9 +8,8 @@ from pathlib import Path
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import TickReader
-from katana450.extensions.recording.files.recorded_states import MOMENT
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import MOMENT, TickReader
 from katana450.extensions.recording.files.table import rows_from
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,

@@ -18,24 +18,24 @@ from katana450.caching import cached_property
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.recording.datasets.recorded_robot import orientations
 from katana450.extensions.recording.episodes.episode import Episode
-from katana450.extensions.recording.episodes.episode_file import episodes_in, shown_part
-from katana450.extensions.recording.files.checking import (
+from katana450.extensions.recording.episodes.episode_folder import episodes_in, shown_part
+from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.script_runs import script_runs, sha256
+from katana450.extensions.recording.files.simulation import (
     TickReader,
     content_of,
     session_for,
     verified,
 )
-from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
-from katana450.extensions.recording.replay import Verification
 from katana450.extensions.recording.run_again.again_command import (
     check_same_arm,
     part_and_script,
 )
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
+from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
 
 if TYPE_CHECKING:

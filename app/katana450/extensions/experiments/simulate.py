@@ -36,9 +36,8 @@ from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun
 from katana450.extensions.real_arm.plant.axis import profile_named
 from katana450.extensions.real_arm.plant.driver import PlantDriver
-from katana450.extensions.recording.files.checking import session_for
-from katana450.extensions.recording.files.recorded_states import recorded_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import recorded_states, session_for
 from katana450.extensions.recording.live.run_fetcher import fetch_run
 from katana450.extras import MissingExtraError
 from katana450.server.api import answers

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.robot import Robot
     from katana450.maths.geometry.arrays import FloatArray
-    from katana450.server.view.layer import ViewLayer
+    from katana450.sdk import ViewLayer
 
 N = TypeVar("N", int, float)
 

@@ -47,8 +47,8 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
         if options.episodes:
             raise ConfigurationError("--episodes needs the recording: leave out --no-record.")
         return None
+    from katana450.extensions.recording.folders import default_folder
     from katana450.extensions.recording.live.recorder import RecorderConfig, run_recorder
-    from katana450.extensions.recording.places import default_folder
 
     folder = options.record or default_folder(facts.port)
     # An option of the extension ``importers``.
@@ -67,7 +67,7 @@ def process(options: Namespace, facts: ServerFacts) -> ExtraProcess | None:
 
 def _episodes_folder(options: Namespace, port: int) -> Path:
     """Return the folder of the episodes of the server on ``port``."""
-    from katana450.extensions.recording.places import default_episodes_folder
+    from katana450.extensions.recording.folders import default_episodes_folder
 
     folder: Path = options.episodes or default_episodes_folder(port)
     # Each process of the server may have another working directory.
@@ -77,7 +77,7 @@ def _episodes_folder(options: Namespace, port: int) -> Path:
 def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of recordings, play back and episodes."""
     from katana450.extensions.late_routes import LateRoutes
-    from katana450.extensions.recording.places import default_folder
+    from katana450.extensions.recording.folders import default_folder
     from katana450.server.api.fields import ROOT
 
     options = context.options

@@ -1,4 +1,4 @@
-"""Orders to the gripper, which moves to targets: polynomials do not move it."""
+"""Motion of arm and gripper from setpoints: what to send next, and where both should be."""
 
 from __future__ import annotations
 

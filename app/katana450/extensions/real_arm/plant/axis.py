@@ -1,4 +1,11 @@
-"""Profiles of a simulated plant: the numbers of its position control, friction and play."""
+"""One axis of a simulated plant: a motor under position control that turns a link.
+
+The control is a spring and a damper towards a moving setpoint, with its speed fed forward. The
+motor's acceleration is bounded, friction opposes the motion, and the weight of the arm pulls.
+Steps are semi-implicit Euler steps of a fixed length, so the motion is the same on each run.
+Source: Lynch & Park, Modern Robotics (2017), ch. 11.4 (control with torque inputs) and 8.9.1
+(reflected inertia and friction of geared motors).
+"""
 
 from __future__ import annotations
 

@@ -9,8 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.extensions.media.film import VideoEncoder
-from katana450.extensions.recording.datasets.lerobot_form import VIDEO_MB, VIDEO_PATH, place
-from katana450.extensions.recording.datasets.statistics import PixelCounts
+from katana450.extensions.recording.datasets.lerobot_writer import (
+    VIDEO_MB,
+    VIDEO_PATH,
+    PixelCounts,
+    place,
+)
 
 CRF = 18
 """Quality of the encoding, from 0 (exact) to 51."""

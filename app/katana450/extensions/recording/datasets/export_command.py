@@ -11,17 +11,18 @@ from pathlib import Path
 
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
-from katana450.extensions.recording.datasets.episode_cuts import DEFAULT_OUTCOMES, files_of
 from katana450.extensions.recording.datasets.lerobot_export import (
+    DEFAULT_OUTCOMES,
     Exported,
     LerobotOptions,
     export_lerobot,
+    files_of,
 )
 from katana450.extensions.recording.datasets.parquet_table import write_parquet
 from katana450.extensions.recording.datasets.ros_bag import write_bag
 from katana450.extensions.recording.datasets.sampling import frame_times
-from katana450.extensions.recording.files.checking import session_for
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import session_for
 from katana450.extensions.recording.files.table import write_csv
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.options import (

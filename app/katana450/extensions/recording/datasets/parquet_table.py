@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 from katana450.atomic import write_files
-from katana450.extensions.recording.datasets.arrow import arrow
 from katana450.extensions.recording.datasets.recorded_robot import recorded_robot
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.table import setpoint_table
+from katana450.extras import library
+
+
+def arrow() -> tuple[Any, Any]:
+    """Return the modules ``pyarrow`` and ``pyarrow.parquet``.
+
+    Raises MissingExtraError if pyarrow is not installed.
+    """
+    what = "Parquet files and LeRobot datasets"
+    return library("pyarrow", "datasets", what), library("pyarrow.parquet", "datasets", what)
+
 
 COPIED = ("robot", "urdf", "urdf_sha256", "utc_offset_ns", "version")
 """Metadata of the recording that the file has too."""

@@ -13,24 +13,26 @@ from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.progress import report
-from katana450.extensions.recording.datasets.new_folder import new_folder
 from katana450.extensions.recording.datasets.recorded_robot import attached_urdf, recorded_robot
-from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import (
     Message,
     RecordingFile,
     utc_offset_ns,
 )
 from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
+from katana450.extensions.recording.files.simulation import content_of
 from katana450.extensions.recording.files.table import LEAST
+from katana450.extensions.recording.folders import new_folder
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     EVENTS,
+    NANO,
     STATE,
     ObjectPose,
+    Pose,
     StateRow,
+    pose_of,
 )
-from katana450.extensions.recording.state_message import NANO, Pose, pose_of
 from katana450.extras import library
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 

@@ -15,8 +15,8 @@ import numpy as np
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.errors import InputError
-from katana450.extensions.recording.files.recorded_states import MOMENT, simulated_states
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import MOMENT, simulated_states
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import (
     STATE,

@@ -20,15 +20,11 @@ import msgspec
 
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import (
+    DescribeEpisode,
+    DiscardEpisode,
     Episode,
     EpisodeGiver,
     EpisodeOutcome,
-    message_of,
-)
-from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, EpisodeMarker
-from katana450.extensions.recording.episodes.episode_requests import (
-    DescribeEpisode,
-    DiscardEpisode,
     EpisodeRequest,
     JudgeEpisode,
     RerecordEpisode,
@@ -37,9 +33,14 @@ from katana450.extensions.recording.episodes.episode_requests import (
     StopEpisode,
     TrimEpisode,
     UndoEpisode,
+    message_of,
 )
-from katana450.extensions.recording.episodes.interrupted import finish_interrupted
-from katana450.extensions.recording.episodes.running_episode import MAX_SECONDS, RunningEpisode
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, EpisodeMarker
+from katana450.extensions.recording.episodes.running_episode import (
+    MAX_SECONDS,
+    RunningEpisode,
+    finish_interrupted,
+)
 from katana450.extensions.recording.live.ring import Ring
 
 UNDO_SECONDS = 10.0

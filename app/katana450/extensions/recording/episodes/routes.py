@@ -19,14 +19,12 @@ from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import (
     MAX_NUMBER,
-    EpisodeGiver,
-)
-from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
-from katana450.extensions.recording.episodes.episode_requests import (
     MAX_REQUEST_BYTES,
+    EpisodeGiver,
     StartEpisode,
     episode_request,
 )
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
     RecorderLink,

@@ -1,23 +1,158 @@
-"""The beginning of a recording: what it is of, what made it, and the files that belong to it."""
+"""The beginning of a recording: what it is of, what made it, and the files that belong to it.
+
+A fingerprint names the machine and the libraries. The same commands give the same bits with the
+same libraries, if the process rounds alike on every processor. Otherwise BLAS and libm choose other
+code, with another order of rounding.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import logging
+import math
+import platform
 import secrets
+import struct
+import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
+import numpy as np
 
 from katana450.arm.control.environment import Environment
 from katana450.arm.robot.robot import Robot
+from katana450.cli.version import version
 from katana450.errors import InputError
-from katana450.extensions.recording.files.fingerprint import fingerprint
+from katana450.portable_rounding import ROUNDS_PORTABLY
 from katana450.settings import Settings
+
+DISTANCES = "distances"
+"""Entry that tells what measured the distances of bodies. Recordings by coal or FCL have none."""
+
+RELEVANT = (
+    *("version", "python", "numpy", DISTANCES, "blas", "blas_core", "libc", "machine", "cpu"),
+    *("libm_rounding", "blas_rounding", "numpy_rounding"),
+)
+"""Entries that show why a simulation may not give the same bits."""
+
+OF_PROCESS = ("blas_core", "libm_rounding", "blas_rounding", "numpy_rounding")
+"""The entries that depend on the environment variables of the process, not on the machine."""
+
+PROBES = 2000
+"""Number of arguments with which the rounding of functions is tried."""
+
+ROUNDING, PORTABLE = "rounding", "portable"
+"""Entry that tells whether the process rounded alike on all x86-64 processors, and its value."""
+
+HASH_DIGITS = 12
+UNKNOWN = "unknown"
+
+
+def fingerprint() -> dict[str, str]:
+    """Return the versions of program and libraries, and the kind of the processor."""
+    return {
+        "version": version(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        DISTANCES: f"MuJoCo {metadata.version('mujoco-core')}",
+        "blas": _blas(),
+        "blas_core": _blas_core(),
+        "libc": " ".join(platform.libc_ver()).strip() or UNKNOWN,
+        "machine": f"{sys.platform} {platform.machine()}",
+        "cpu": _cpu(),
+        ROUNDING: PORTABLE if ROUNDS_PORTABLY else "of the processor",
+        "libm_rounding": _libm_rounding(),
+        "blas_rounding": _blas_rounding(),
+        "numpy_rounding": _numpy_rounding(),
+    }
+
+
+def differences(recorded: Mapping[str, str], left_out: Collection[str] = ()) -> list[str]:
+    """Return in words what in ``recorded`` differs from this machine, of the relevant entries.
+
+    ``left_out``: entries that do not count.
+    """
+    here = fingerprint()
+    return [
+        f"{name}: {recorded.get(name, UNKNOWN)} there, {here[name]} here"
+        for name in RELEVANT
+        if name not in left_out and recorded.get(name, UNKNOWN) != here[name]
+    ]
+
+
+def _libm_rounding() -> str:
+    """Return a hash of results of libm, which differ in the last bit between processors."""
+    digest = hashlib.sha256()
+    for number in range(1, PROBES):
+        x = number / 317.0
+        results = (math.sin(x), math.cos(x), math.atan2(x, 3.0), math.exp(-x), x**0.3)
+        digest.update(struct.pack("<5d", *results))
+    return digest.hexdigest()[:HASH_DIGITS]
+
+
+def _blas_rounding() -> str:
+    """Return a hash of products and a least-squares fit by BLAS, of the sizes that are used."""
+    numbers = np.arange(1.0, 1.0 + PROBES) % 0.7
+    digest = hashlib.sha256()
+    for n in (3, 4, 5, 6, 16):
+        A = numbers[: 20 * n].reshape(20, n)
+        for result in (A @ A.T, A[:n] @ A[:n], A.T @ A, A @ A[0], A[0] @ A[1]):
+            digest.update(np.ascontiguousarray(result).tobytes())
+        digest.update(np.linalg.lstsq(A, numbers[:20], rcond=None)[0].tobytes())
+    return digest.hexdigest()[:HASH_DIGITS]
+
+
+def _numpy_rounding() -> str:
+    """Return a hash of functions of whole arrays, for which numpy has code of its own."""
+    x = np.arange(1.0, 1.0 + PROBES) / 317.0
+    results = (np.sin(x), np.cos(x), np.tan(x), np.arctan2(x, 3.0), np.exp(-x), np.log(x), x**0.3)
+    return hashlib.sha256(b"".join(each.tobytes() for each in results)).hexdigest()[:HASH_DIGITS]
+
+
+def _blas() -> str:
+    config: Any = np.show_config(mode="dicts")
+    with suppress(KeyError, TypeError):
+        found = config["Build Dependencies"]["blas"]
+        return f"{found['name']} {found['version']}"
+    return UNKNOWN
+
+
+def _blas_core() -> str:
+    """Return the kind of processor for which OpenBLAS has chosen its code."""
+    for path in _libraries():
+        with suppress(OSError, AttributeError):
+            library = ctypes.CDLL(str(path))
+            for name in ("scipy_openblas_get_corename64_", "openblas_get_corename"):
+                with suppress(AttributeError):
+                    core = getattr(library, name)
+                    core.restype = ctypes.c_char_p
+                    return str(core().decode())
+    return UNKNOWN
+
+
+def _libraries() -> Iterator[Path]:
+    """Yield the files of OpenBLAS that numpy has loaded."""
+    package = Path(np.__file__).parent
+    for folder in (package.parent / "numpy.libs", package / ".dylibs"):
+        if folder.is_dir():
+            yield from sorted(folder.glob("*openblas*"))
+
+
+def _cpu() -> str:
+    with suppress(OSError):
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        for line in text.splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or UNKNOWN
+
 
 METADATA: Final = "katana450"
 """Name of the metadata record."""

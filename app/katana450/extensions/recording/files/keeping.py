@@ -11,7 +11,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import is_whole, recover
 from katana450.extensions.recording.files.trimming import Trimmed, trim
-from katana450.extensions.recording.places import recordings_in
+from katana450.extensions.recording.folders import recordings_in
 
 ALL = -math.inf, math.inf
 

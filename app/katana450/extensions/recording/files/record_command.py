@@ -1,4 +1,4 @@
-"""``katana450 record``: list, describe, repair, verify, cut and export recordings."""
+"""``katana450 record``: list, describe, repair, verify, cut and export recordings and episodes."""
 
 from __future__ import annotations
 
@@ -17,10 +17,13 @@ from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
-from katana450.extensions.recording.episodes.episode_command import episodes
-from katana450.extensions.recording.episodes.episode_file import episodes_in
-from katana450.extensions.recording.files.checking import simulates_apart, verified
-from katana450.extensions.recording.files.fingerprint import (
+from katana450.extensions.recording.episodes.episode_folder import (
+    DISCARDED,
+    EpisodeFolder,
+    episodes_in,
+)
+from katana450.extensions.recording.episodes.running_episode import finish_interrupted
+from katana450.extensions.recording.files.header import (
     DISTANCES,
     OF_PROCESS,
     differences,
@@ -30,9 +33,53 @@ from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recovery import recover
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
+from katana450.extensions.recording.files.simulation import simulates_apart, verified
 from katana450.extensions.recording.files.trimming import Trimmed, trim
-from katana450.extensions.recording.places import recordings_in
-from katana450.extensions.recording.replay import Verification
+from katana450.extensions.recording.folders import recordings_in
+from katana450.extensions.recording.ticks import Verification
+
+
+def episodes(options: Namespace) -> int:
+    """Run ``katana450 record episodes`` and return the exit status. Raises KatanaError."""
+    path: Path = options.folder
+    if not path.is_dir():
+        raise InputError(f"There is no folder {path}.")
+    return _list_episodes(path) if options.episode_act == "list" else _recover_episodes(path)
+
+
+def _list_episodes(path: Path) -> int:
+    """Print the episodes in the folder ``path``."""
+    folder = EpisodeFolder(path)
+    for each in folder.kept():
+        found = each.episode
+        missing = found.missing_ticks
+        remarks = (f"{missing} ticks of 10 ms are missing" if missing else "", found.note)
+        remark = "; ".join(filter(None, remarks))
+        remark = f"  ({remark})" if remark else ""
+        length, outcome = f"{found.length:7.1f} s", f"{found.outcome.value:10}"
+        print(printable(f"{found.number:4}  {length}  {outcome}  {found.task}{remark}"))
+    for why in folder.unreadable():
+        print(printable(why))
+    gone = len(folder.discarded())
+    if gone:
+        print(f"{gone} discarded, in {path / DISCARDED}")
+    for marker in folder.markers():
+        print(f"Episode {marker.episode.number} runs, or was interrupted.")
+    return 0
+
+
+def _recover_episodes(path: Path) -> int:
+    """Finish interrupted episodes in the folder ``path``, which no server may use."""
+    folder = EpisodeFolder(path)
+    folder.claim()
+    try:
+        said = finish_interrupted(folder, folder.markers())
+    finally:
+        folder.release()
+    for each in said or ["No episode was interrupted."]:
+        print(printable(each))
+    return 0
+
 
 PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""

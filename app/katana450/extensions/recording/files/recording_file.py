@@ -25,7 +25,7 @@ from mcap.summary import Summary
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordedSettings
-from katana450.extensions.recording.state_message import NANO, nanoseconds
+from katana450.extensions.recording.messages import NANO, nanoseconds
 
 MAX_CHUNK_BYTES = 64_000_000
 """Maximum size of an unpacked chunk. The writer makes chunks of 1 MB and one message more."""

@@ -18,7 +18,6 @@ from katana450.atomic import write_files
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files.header import METADATA, Attachment
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import (
     FAULTS,
     HEAD,
@@ -28,6 +27,7 @@ from katana450.extensions.recording.files.recording_file import (
     records_at,
     unpacked,
 )
+from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.trimming import KEY
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,

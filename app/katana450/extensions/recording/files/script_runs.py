@@ -16,8 +16,7 @@ import msgspec
 
 from katana450.extensions.recording.files.header import Attachment
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.messages import EVENTS
-from katana450.extensions.recording.state_message import nanoseconds
+from katana450.extensions.recording.messages import EVENTS, nanoseconds
 
 FOLDER: Final = "scripts/"
 """Start of the names of attached scripts."""

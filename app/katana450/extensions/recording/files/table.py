@@ -14,8 +14,8 @@ from msgspec import structs
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.progress import report
-from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import content_of
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     STATE,

@@ -11,13 +11,13 @@ from typing import BinaryIO
 
 from katana450.atomic import write_files
 from katana450.errors import InputError
-from katana450.extensions.recording.files.message_writer import MessageWriter
 from katana450.extensions.recording.files.recording_file import (
     PART_START,
     Message,
     RecordingFile,
     nanoseconds_of,
 )
+from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.script_runs import begun_before, scripts_in
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
@@ -29,8 +29,8 @@ from katana450.extensions.recording.messages import (
     SOLIDS,
     STATE,
     TF,
+    nanoseconds,
 )
-from katana450.extensions.recording.state_message import nanoseconds
 
 KEY = re.compile(rb'"([0-9a-f]{32})"')
 """Pattern of the keys of shared values in messages."""

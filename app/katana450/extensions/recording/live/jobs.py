@@ -29,7 +29,7 @@ from starlette.types import Receive, Scope, Send
 
 from katana450.errors import InputError
 from katana450.extensions.recording.playback.store import RING, RecordingStore
-from katana450.extensions.recording.replay import Verification
+from katana450.extensions.recording.ticks import Verification
 from katana450.server.api.fields import ROOT
 from katana450.server.web.bodies import NOT_NOW, TOO_MANY
 from katana450.server.web.http_api import RouteContext

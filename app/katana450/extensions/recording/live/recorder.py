@@ -146,7 +146,7 @@ def _listener(
 
 def _receive(pipe: Connection, ring: Ring) -> None:
     """Write what comes by ``pipe`` until the other end closes it."""
-    from katana450.extensions.recording.live.record_wire import LostTicks, RecordDeserializer
+    from katana450.extensions.recording.live.record_end import LostTicks, RecordDeserializer
 
     deserializer, synced = RecordDeserializer(), time.monotonic()
     try:

@@ -21,9 +21,9 @@ from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
+from katana450.extensions.recording.folders import SUFFIX, recordings_in
 from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.extensions.recording.live.running_scripts import RunningScripts
-from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.platform_support import claim_file, create_file
 
 MAX_FILE_TICKS = 6000

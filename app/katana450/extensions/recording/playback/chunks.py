@@ -27,7 +27,7 @@ from katana450.extensions.recording.files.recording_file import (
     unreadable,
     utc_offset_of,
 )
-from katana450.extensions.recording.state_message import NANO
+from katana450.extensions.recording.messages import NANO
 
 MAX_UNPACKED = 16_000_000
 """Maximum size of an unpacked chunk [bytes]; one holds a second of motion, half a megabyte."""

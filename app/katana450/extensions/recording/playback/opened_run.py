@@ -26,8 +26,7 @@ from katana450.errors import InputError
 from katana450.extensions.recording.messages import StateRow
 from katana450.extensions.recording.playback.marks import Mark
 from katana450.extensions.recording.playback.rows import RecordedMoment
-from katana450.extensions.recording.playback.run import PlaybackRun
-from katana450.extensions.recording.playback.spans import Span
+from katana450.extensions.recording.playback.run import PlaybackRun, Span
 from katana450.platform_support import limit_resources, without_interrupts
 
 TIMEOUT = 30.0

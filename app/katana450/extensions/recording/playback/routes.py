@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
+import numpy as np
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response
@@ -19,11 +20,10 @@ from starlette.routing import BaseRoute, Route
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.messages import StateRow
-from katana450.extensions.recording.playback.difference import difference, times_of
 from katana450.extensions.recording.playback.drawing import PlaybackWindows
 from katana450.extensions.recording.playback.folder import CONTEXTS
 from katana450.extensions.recording.playback.rows import RecordedMoment
-from katana450.extensions.recording.playback.spans import at_place, length_of, place_of
+from katana450.extensions.recording.playback.run import at_place, length_of, place_of
 from katana450.extensions.recording.playback.store import (
     MAX_FILE_BYTES,
     RING,
@@ -40,6 +40,62 @@ from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.web.admission import client_of
 from katana450.server.web.bodies import NOT_NOW, NOT_UNDERSTOOD, TOO_LONG, TOO_MANY, TOO_SLOW
 from katana450.server.web.http_api import RouteContext
+
+MAX_POINTS = 200
+"""Number of points of a plot."""
+
+
+class RunDifference(NamedTuple):
+    """Differences at times ``t`` [s] since the start of both runs.
+
+    Attributes:
+        t: the times [s].
+        joints: largest difference of a joint that turns [deg]; empty if none does.
+        slides: largest difference of a joint that slides [mm]; empty if none does.
+        tool: distance of the tool points [mm]; empty for robots without a tool.
+    """
+
+    t: list[float]
+    joints: list[float]
+    slides: list[float]
+    tool: list[float]
+
+
+def times_of(length: float) -> list[float]:
+    """Return the times of the points of a plot over ``length`` [s]."""
+    found: list[float] = np.linspace(0.0, max(length, 0.0), MAX_POINTS).tolist()
+    return found
+
+
+def difference(
+    times: Sequence[float],
+    first: Sequence[StateRow | None],
+    second: Sequence[StateRow | None],
+    slides: Sequence[bool],
+) -> RunDifference:
+    """Return the differences of the states of two runs at ``times`` [s].
+
+    Times at which one of them has no state are left out. ``slides`` says of each joint whether it
+    slides. Raises InputError for robots with other joints.
+    """
+    found = RunDifference([], [], [], [])
+    sliding = np.array(slides, dtype=bool)
+    for t, a, b in zip(times, first, second, strict=True):
+        if a is None or b is None:
+            continue
+        counts = len(a.joints), len(b.joints), len(sliding)
+        if len(set(counts)) > 1:
+            raise InputError("The runs have {} and {} joints, the robot {}.".format(*counts))
+        away = np.abs(np.subtract(a.joints, b.joints))
+        found.t.append(t)
+        if not sliding.all():
+            found.joints.append(float(np.degrees(away[~sliding].max())))
+        if sliding.any():
+            found.slides.append(1e3 * float(away[sliding].max()))
+        if a.position is not None and b.position is not None:
+            found.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
+    return found
+
 
 AT_ONCE, WAITING = 2, 8
 """Maximum number of requests that are worked on, and that wait, at the same time."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from katana450.arm.control.pouring import CUP
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import TickReader, content_of
 from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
+from katana450.extensions.recording.files.simulation import TickReader, content_of
 from katana450.extensions.recording.messages import (
     ObjectPose,
     StateRow,

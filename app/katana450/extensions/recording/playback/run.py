@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from bisect import bisect_right
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from katana450.errors import InputError
-from katana450.extensions.recording.files.checking import content_of
 from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.files.simulation import content_of
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     EPISODES,
@@ -28,7 +28,57 @@ from katana450.extensions.recording.playback.rows import (
     Description,
     RecordedMoment,
 )
-from katana450.extensions.recording.playback.spans import Span, spans_of
+
+MAX_PAUSE = 2.0
+"""[s] Time without a record from which on a new span begins."""
+
+
+class Span(NamedTuple):
+    """A time with records, from ``start`` to ``end`` [s]."""
+
+    start: float
+    end: float
+
+    @property
+    def length(self) -> float:
+        """Its length [s]."""
+        return self.end - self.start
+
+
+def spans_of(parts: Iterable[tuple[float, float]]) -> tuple[Span, ...]:
+    """Return the spans that ``parts``, each with begin and end [s], form in their order."""
+    found: list[Span] = []
+    for start, end in sorted(parts):
+        if found and start - found[-1].end <= MAX_PAUSE:
+            found[-1] = Span(found[-1].start, max(found[-1].end, end))
+        else:
+            found.append(Span(start, end))
+    return tuple(found)
+
+
+def at_place(spans: Sequence[Span], place: float) -> float:
+    """Return the time [s] at ``place`` [s] of the axis; that of the nearer end beyond it."""
+    for span in spans:
+        if place <= span.length:
+            return span.start + max(place, 0.0)
+        place -= span.length
+    return spans[-1].end if spans else 0.0
+
+
+def place_of(spans: Sequence[Span], t: float) -> float:
+    """Return the place [s] of ``t`` [s] on the axis; inside a rest, that of its start."""
+    place = 0.0
+    for span in spans:
+        if t < span.start:
+            break
+        place += min(t, span.end) - span.start
+    return place
+
+
+def length_of(spans: Iterable[Span]) -> float:
+    """Return the length [s] of the axis."""
+    return sum(span.length for span in spans)
+
 
 MAX_BLOCKS = 24
 """Number of decoded blocks that are kept, 4 min of motion; each has about 1 MB."""

@@ -11,12 +11,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from katana450.errors import InputError
-from katana450.extensions.recording.claimed_folder import (
+from katana450.extensions.recording.folders import (
     CLAIM,
+    SUFFIX,
     claimed_folder,
+    recordings_in,
     remove_abandoned,
 )
-from katana450.extensions.recording.places import SUFFIX, recordings_in
 from katana450.extensions.recording.playback.opened_run import OpenedRun
 from katana450.extensions.recording.playback.run import PlaybackRun
 

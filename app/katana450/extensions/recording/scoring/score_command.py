@@ -15,9 +15,9 @@ import numpy as np
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError
 from katana450.extensions.programs.script.measures import title_of, unit_of
-from katana450.extensions.recording.episodes.episode_file import shown_part
-from katana450.extensions.recording.files.checking import session_for
+from katana450.extensions.recording.episodes.episode_folder import shown_part
 from katana450.extensions.recording.files.recording_file import RecordingFile
+from katana450.extensions.recording.files.simulation import session_for
 from katana450.extensions.recording.scoring.scored import (
     HIGHER_IS_BETTER,
     MEASURES,

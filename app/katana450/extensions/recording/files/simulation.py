@@ -1,4 +1,4 @@
-"""Simulation of a recording again, and comparison with what was recorded.
+"""Simulation of recorded commands: compared with the recording, or for complete states.
 
 A verification rounds as the process that recorded: in a process of its own if this one does not.
 """
@@ -6,23 +6,26 @@ A verification rounds as the process that recorded: in a process of its own if t
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
 
+from katana450.arm.control.modes import IDLE
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import Codec, json_form
-from katana450.extensions.recording.files.fingerprint import PORTABLE, ROUNDING
+from katana450.extensions.recording.codec import Codec, SharedText, json_form
+from katana450.extensions.recording.files.header import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.forms import FormError
 from katana450.extensions.recording.messages import (
@@ -37,9 +40,15 @@ from katana450.extensions.recording.messages import (
     StateRow,
     TickMessage,
 )
-from katana450.extensions.recording.replay import Checker, Verification
-from katana450.extensions.recording.shared_values import SharedText
-from katana450.extensions.recording.ticks import TickInput, tick_input
+from katana450.extensions.recording.ticks import (
+    Checker,
+    TickInput,
+    Verification,
+    after,
+    check_fits,
+    tick_input,
+)
+from katana450.maths.motion.limiter import JointMotion
 from katana450.portable_rounding import ROUNDS_PORTABLY, can_round_portably, portable_rounding
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -230,3 +239,91 @@ def _verified_apart(path: Path, urdf: Path | None, *, shows: bool) -> Verificati
         raise InputError(
             f"The process that simulates {path} ended with status {done.returncode}. {text}"
         ) from error
+
+
+MOMENT = 1e-6
+"""[s] Time that is less than any between two ticks."""
+
+
+def simulated_states(
+    file: RecordingFile,
+    session: Session,
+    start: float,
+    end: float,
+    lost: Callable[[int], None] | None = None,
+) -> Iterator[State]:
+    """Yield the states from the last complete state before ``start`` to ``end`` [s].
+
+    After a gap it continues at the next complete state. Raises InputError for a damaged recording,
+    and for one of another robot.
+
+    Args:
+        file: the recording.
+        session: the rules of its robot.
+        start: first time of interest, on the clock of the recording [s].
+        end: last time [s].
+        lost: called with the number of ticks that cannot be simulated. Each complete state is taken
+            then, also after ticks that rules of another version refuse. None raises their errors.
+    """
+    reader = TickReader()
+    for message in file.messages(PLANS, SOLIDS, end=end):
+        reader.add_shared(message)
+    first = file.last_before(CHECKPOINTS, start) if math.isfinite(start) else None
+    state: State | None = None
+    begun = False
+    begin = -math.inf if first is None else first.t - MOMENT
+    for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
+        if message.topic == CHECKPOINTS:
+            if state is not None and lost is None:
+                continue
+            state, begun = reader.checkpoint(message), True
+            check_fits(session, state)
+            yield state
+            continue
+        tick = reader.tick(message)
+        if isinstance(tick, TickMessage):
+            missing, state = tick.ticks, None
+        elif state is None:
+            missing = int(begun)
+        else:
+            try:
+                state = after(session, state, tick)
+            except InputError:
+                if lost is None:
+                    raise
+                missing, state = 1, None
+            else:
+                yield state
+                continue
+        if lost is not None:
+            lost(missing)
+
+
+def recorded_states(
+    file: RecordingFile, session: Session, start: float = -math.inf, end: float = math.inf
+) -> Iterator[State]:
+    """Yield the states from ``start`` to ``end`` [s], on the clock of the recording.
+
+    The last state before ``start`` comes first. Raises InputError as ``simulated_states``.
+    """
+    waiting: State | None = None
+    for state in simulated_states(file, session, start, end):
+        if state.t <= start:
+            waiting = state
+            continue
+        if waiting is not None:
+            yield waiting
+            waiting = None
+        yield state
+    if waiting is not None:
+        yield waiting
+
+
+def at_rest(state: State) -> State:
+    """Return ``state`` with the arm at rest, in no mode and not stopped, at the time 0."""
+    rest = JointMotion.rest(state.setpoint)
+    return replace(
+        state, t=0.0, stopped=None, paused=False, blocked=False, findings=(), mode=IDLE,
+        motion=rest, goal=rest.q, q=rest.q, gripper=state.gripper_setpoint,
+        gripper_goal=state.gripper_setpoint, outcomes=(), presses=(), speed=1.0,
+    )  # fmt: skip
