@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import urllib.request
 from pathlib import Path
 
@@ -54,6 +55,8 @@ def test_circle_is_plotted_and_shown_until_ctrl_c(tmp_path: Path) -> None:
         with urllib.request.urlopen(opened[0], timeout=10.0) as page:
             assert page.status == 200
         assert (tmp_path / "circle.png").read_bytes().startswith(b"\x89PNG")
+        # Another thread has sent the page. The one that printed the address waits soon after.
+        time.sleep(0.2)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=SECONDS)
     finally:
