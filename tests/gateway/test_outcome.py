@@ -18,6 +18,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
+from katana450.extensions.robot_choice.choose_robot import ChooseRobot
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
@@ -138,7 +139,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Hello, requests.Heartbeat, requests.Query, requests.Get, requests.Watch,
         requests.Acquire, requests.Take, requests.Ask, requests.Withdraw, requests.ReleaseLease,
         requests.Give, requests.Decline, requests.Rename,
-        requests.ListPeople, requests.Kick,
+        requests.ListPeople, requests.Kick, ChooseRobot,
         # Refused without a detour on offer; see test_api_motion.
         requests.Go,
         # Refused at a simulated arm.
