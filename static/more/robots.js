@@ -1,13 +1,13 @@
 // The choice of another robot. Loaded on first use.
 import { html } from "../instruments/shape.js";
 
-/** @typedef {{ name: string, title: string, kind: "own" | "uploaded" | "gallery", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
+/** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
 /** @typedef {{ name: string, key: string, loading: string | null, problem: string }} Driven */
 
 const box = /** @type {HTMLDialogElement} */ (document.getElementById("robots"));
 document.head.append(html("link", { rel: "stylesheet", href: new URL("robots.css", import.meta.url).href }));
 
-const KINDS = { own: "Of this app", uploaded: "Opened here", gallery: "Gallery" };
+const KINDS = { own: "Of this app", first: "With which the server began", uploaded: "Opened here", gallery: "Gallery" };
 const PATH = "api/v1/robots";
 
 const search = /** @type {HTMLInputElement} */ (html("input", { type: "search", placeholder: "Name or maker", "aria-label": "Search a robot" }));
@@ -67,7 +67,7 @@ function draw() {
   const words = search.value.trim().toLowerCase().split(/\s+/);
   const matches = robots.filter((robot) => words.every((word) => `${robot.name} ${robot.title} ${robot.maker ?? ""}`.toLowerCase().includes(word)));
   list.replaceChildren();
-  for (const kind of /** @type {const} */ (["own", "uploaded", "gallery"])) {
+  for (const kind of /** @type {const} */ (["own", "first", "uploaded", "gallery"])) {
     const group = matches.filter((robot) => robot.kind === kind);
     if (group.length) list.append(html("h2", {}, KINDS[kind]));
     for (const robot of group) {

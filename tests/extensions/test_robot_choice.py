@@ -18,11 +18,16 @@ from katana450.client import Client, RefusedError
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.importers.archive import ChoiceError
 from katana450.extensions.robot_choice.choose_robot import ChooseRobot
+from katana450.extensions.robot_choice.robot_check import refuse_outside
+from katana450.extensions.robot_choice.robot_routes import choices
 from katana450.extensions.robot_choice.uploaded_robots import (
     MAX_UPLOADED,
+    folder_of,
     keep_robot,
     uploaded_robots,
+    used_robot,
 )
+from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from tests.browser.server import SIMULATION_APP, AppServer
 from tests.gateway.client import ask, enter, opened
@@ -96,8 +101,7 @@ def test_one_of_several_robots_is_chosen_and_one_that_includes_others_is_known()
         ("arm.stl", b"solid", "no .urdf, .xacro or .zip"),
         ("arm.zip", b"PK", "cannot be read as a .zip"),
         ("arm.zip", zipped({"a.stl": b"solid"}), "There is no .urdf or .xacro"),
-        ("arm.urdf", urdf(shape='<mesh filename="file:///etc/a.stl"/>'), "outside of its folder"),
-        ("arm.urdf", urdf(shape='<mesh filename="../../a.stl"/>'), "outside of its folder"),
+        ("arm\0.urdf", urdf(), "cannot be shown"),
     ],
 )
 def test_other_files_are_refused(name: str, data: bytes, words: str) -> None:
@@ -106,10 +110,45 @@ def test_other_files_are_refused(name: str, data: bytes, words: str) -> None:
     assert not uploaded_robots()
 
 
-def test_oldest_robot_makes_room() -> None:
-    names = [keep_robot(urdf() + b" " * number, "arm.urdf") for number in range(MAX_UPLOADED + 2)]
+@pytest.mark.parametrize(
+    "name",
+    ["file:///etc/hosts", "/etc/hosts", "&#47;etc&#47;hosts", "../../a.stl", "package://etc/hosts"],
+)
+def test_mesh_outside_of_the_folder_is_refused(name: str) -> None:
+    path = kept(urdf(shape=f'<mesh filename="{name}"/>'), "arm.urdf")
+    root = folder_of(path)
+    assert root == path.parent
+    with pytest.raises(InputError, match="outside of the folder of the robot"):
+        refuse_outside(path.read_bytes(), path.parent, root)
+
+
+def test_mesh_in_the_folder_may_be_missing() -> None:
+    for name in ("a.stl", "meshes/a.stl", "package://arm/a.stl"):
+        path = kept(urdf(shape=f'<mesh filename="{name}"/>'), "arm.urdf")
+        refuse_outside(path.read_bytes(), path.parent, path.parent)
+
+
+def test_robot_that_was_not_used_for_longest_makes_room() -> None:
+    names = []
+    for number in range(MAX_UPLOADED + 1):
+        names.append(keep_robot(urdf() + b" " * number, "arm.urdf"))
+        assert used_robot(names[0]) is not None
     assert len(uploaded_robots()) == MAX_UPLOADED
-    assert names[-1] in uploaded_robots()
+    assert {names[0], names[-1]} <= uploaded_robots().keys()
+    assert names[1] not in uploaded_robots()
+    assert used_robot("none") is None
+    assert folder_of(URDF_PATH) is None
+
+
+def test_robot_with_which_the_server_began_is_listed_beside_ours() -> None:
+    key = keep_robot(urdf(), "arm.urdf")
+    listed = choices(Path("/robots/mine.urdf"))[:3]
+    assert [(robot.name, robot.title) for robot in listed] == [
+        ("katana450", "Katana450"),
+        ("first", "mine.urdf"),
+        (key, "arm.urdf"),
+    ]
+    assert [robot.name for robot in choices(URDF_PATH)[:2]] == ["katana450", key]
 
 
 @pytest.fixture

@@ -74,6 +74,7 @@ def serve(options: Namespace) -> int:
     settings = Settings(**{name: values[name] for name in named})
     # The options are sent to other processes, which do not need the command itself.
     options = Namespace(**{key: value for key, value in values.items() if key != "command"})
+    options.first_urdf = options.urdf
     start_log()
     raise_descriptor_limit()
     stopping = threading.Event()

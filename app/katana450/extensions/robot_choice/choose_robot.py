@@ -20,8 +20,8 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.runner import RequestHandler
 
-OWN = "katana450"
-"""Name of the robot of this distribution."""
+OWN, FIRST = "katana450", "first"
+"""Names of the robot of this distribution, and of that with which the server began."""
 
 Text = Annotated[str, Meta(max_length=200)]
 
@@ -94,27 +94,28 @@ class RobotChoice(RequestHandler):
         name, gate, replace_robot = request.robot, self.hub.gate, self.hub.replace_robot
         assert replace_robot is not None
         try:
-            urdf = checked_robot(_file(name), request.arguments or {})
+            urdf = checked_robot(self._file(name), request.arguments or {})
             with gate.lock:
                 self._check(participant)
-                log.warning("%s chose the robot %s.", participant.person.name, name)
-                replace_robot(urdf)
+            log.warning("%s chose the robot %s.", participant.person.name, name)
+            self.hub.recorder.note("robot", participant.actor, {"name": name})
+            # Without the lock, for which a STOP would wait.
+            replace_robot(urdf)
         except KatanaError as error:
             self._loading, self._problem = None, str(error)
         except Exception:
             self._loading, self._problem = None, "It could not be read: the log says why."
             raise
 
+    def _file(self, name: str) -> Path:
+        """Return the description of the robot ``name``. Raises KatanaError."""
+        if name in (OWN, FIRST):
+            return URDF_PATH if name == OWN else Path(self._options.first_urdf)
+        from katana450.extensions.robot_choice.uploaded_robots import used_robot
 
-def _file(name: str) -> Path:
-    """Return the description of the robot ``name``. Raises KatanaError."""
-    if name == OWN:
-        return URDF_PATH
-    from katana450.extensions.robot_choice.uploaded_robots import uploaded_robots
+        path = used_robot(name)
+        if path is not None:
+            return path
+        from katana450.extensions.gallery.arms_command import file_of, robot_named
 
-    path = uploaded_robots().get(name)
-    if path is not None:
-        return path
-    from katana450.extensions.gallery.arms_command import file_of, robot_named
-
-    return file_of(robot_named(name))
+        return file_of(robot_named(name))

@@ -12,7 +12,9 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from xml.etree.ElementTree import fromstring
 
+from katana450.arm.robot.visual import mesh_file
 from katana450.errors import InputError, KatanaError
 from katana450.platform_support import hanging_time, limit_resources
 
@@ -54,15 +56,33 @@ def checked_robot(path: Path, arguments: Mapping[str, str]) -> Path:
     return Path(answer["urdf"])
 
 
+def refuse_outside(urdf: bytes, folder: Path, root: Path) -> None:
+    """Raise InputError if the description ``urdf`` in ``folder`` names a mesh outside of ``root``.
+
+    A person who gives a robot to the server must not let it open other files.
+    """
+    for mesh in fromstring(urdf).iter("mesh"):
+        name = mesh.get("filename", "")
+        if not mesh_file(name, folder).is_relative_to(root.resolve()):
+            raise InputError(
+                f"The mesh {name!r} is outside of the folder of the robot. Give all meshes with it "
+                "in one .zip, named relative to the description or by package://."
+            )
+
+
 def main(path: Path, arguments: Mapping[str, str]) -> None:
     """Read the robot at ``path``, and print the answer."""
     limit_resources(MAX_MEMORY_BYTES, round(SECONDS))
+    from katana450.assembly.robot_files import read_urdf
     from katana450.assembly.robot_session import find_robot
+    from katana450.extensions.robot_choice.uploaded_robots import folder_of
     from katana450.extensions.xacro.xacro_file import expanded_file
     from katana450.settings import Settings
 
     try:
-        urdf = expanded_file(path, arguments) if arguments else path
+        urdf, root = expanded_file(path, arguments) if arguments else path, folder_of(path)
+        if root is not None:
+            refuse_outside(read_urdf(urdf), urdf.parent, root)
         find_robot(Settings(), urdf, None)
     except KatanaError as error:
         print(json.dumps({"why": str(error)}))

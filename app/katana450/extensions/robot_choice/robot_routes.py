@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from contextlib import suppress
+from pathlib import Path
 
 import msgspec
 from starlette.exceptions import HTTPException
@@ -16,8 +17,9 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.gallery.arms_command import listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
-from katana450.extensions.robot_choice.choose_robot import OWN
+from katana450.extensions.robot_choice.choose_robot import FIRST, OWN
 from katana450.extensions.robot_choice.uploaded_robots import keep_robot, uploaded_robots
+from katana450.resources import URDF_PATH
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
 from katana450.server.service.participants import actor_of
@@ -47,7 +49,8 @@ class Choice(msgspec.Struct, frozen=True, omit_defaults=True):
         title: Its name for people.
         maker: Its maker; empty if unknown.
         licence: Licence of the description; empty if unknown.
-        kind: "own", "uploaded" or "gallery"; those of the gallery may have to be downloaded.
+        kind: "own", "first" for the one with which the server began, "uploaded" or "gallery";
+            those of the gallery may have to be downloaded.
         arguments: Arguments of a xacro file and their defaults.
     """
 
@@ -71,10 +74,12 @@ class Kept(msgspec.Struct, frozen=True):
     robot: Choice
 
 
-def choices() -> list[Choice]:
-    """Return the robots that can be chosen: ours, those that were uploaded, and the gallery."""
+def choices(first: Path) -> list[Choice]:
+    """Return the robots that can be chosen; ``first``: file of that with which the server began."""
     robots = [Choice(OWN, "Katana450", "own", "Neuronics", "MIT")]
-    robots += map(_uploaded, uploaded_robots())
+    if first != URDF_PATH:
+        robots.append(Choice(FIRST, first.name, "first"))
+    robots += (_uploaded(name, path) for name, path in uploaded_robots().items())
     # Without the extra there is no gallery.
     with suppress(ConfigurationError):
         robots += [
@@ -85,8 +90,7 @@ def choices() -> list[Choice]:
     return robots
 
 
-def _uploaded(name: str) -> Choice:
-    path = uploaded_robots()[name]
+def _uploaded(name: str, path: Path) -> Choice:
     text = path.read_bytes()[:1_000_000]
     arguments: dict[str, str] = {}
     for key, more in ARGUMENT.findall(text)[:MAX_ARGUMENTS]:
@@ -98,11 +102,12 @@ def _uploaded(name: str) -> Choice:
 def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of the list, and of the upload."""
     hub = context.hub
+    first = URDF_PATH if context.options is None else Path(context.options.first_urdf)
     uploads = TokenBucket(UPLOADS_PER_SECOND, BURST, hub.clock())
 
     async def robots(request: Request) -> Response:
         context.identity(request)
-        answer = Choices(await asyncio.to_thread(choices))
+        answer = Choices(await asyncio.to_thread(choices, first))
         return Response(msgspec.json.encode(answer), media_type="application/json")
 
     async def upload(request: Request) -> Response:
@@ -121,7 +126,7 @@ def routes(context: RouteContext) -> list[BaseRoute]:
             return as_json(refused, NOT_UNDERSTOOD)
         except (InputError, ConfigurationError) as error:
             return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
-        answer = Kept(await asyncio.to_thread(_uploaded, key))
+        answer = Kept(_uploaded(key, uploaded_robots()[key]))
         return Response(msgspec.json.encode(answer), media_type="application/json")
 
     path = f"{ROOT}/robots"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import posixpath
 import re
 import shutil
@@ -20,14 +21,11 @@ PARTS = (".stl", ".obj", ".mtl", ".dae", ".ply", ".glb", ".gltf", ".bin", ".yaml
 """Suffixes of the files that a description names; pictures are not read."""
 
 MAX_UPLOADED = 20
-"""Maximum number of robots that are kept; the oldest is removed for another one."""
-
-OUTSIDE = re.compile(rb"""filename\s*=\s*["'](file:|/|[A-Za-z]:|[^"']*\.\.)""")
-"""The name of a mesh outside of the folder of the description."""
+"""Maximum number of robots that are kept; the one that was not used for longest is removed."""
 
 
 def uploaded_robots() -> dict[str, Path]:
-    """Return the descriptions that are kept, the newest first, by the names of their folders."""
+    """Return the descriptions that are kept by the names of their folders, the last used first."""
     folders = [path for path in _folder().glob("*") if path.is_dir()]
     folders.sort(key=lambda path: path.stat().st_mtime, reverse=True)
     descriptions = {folder.name: folder / "description" for folder in folders}
@@ -38,6 +36,20 @@ def uploaded_robots() -> dict[str, Path]:
     }
 
 
+def used_robot(name: str) -> Path | None:
+    """Return the description of the robot ``name``, which counts as used now; None without it."""
+    path = uploaded_robots().get(name)
+    if path is not None:
+        os.utime(_folder() / name)
+    return path
+
+
+def folder_of(path: Path) -> Path | None:
+    """Return the folder of the uploaded robot at ``path``; None for the file of another robot."""
+    inside = path.is_relative_to(_folder())
+    return _folder() / path.relative_to(_folder()).parts[0] if inside else None
+
+
 def keep_robot(data: bytes, name: str, main: str = "") -> str:
     """Keep the file ``name`` with the content ``data``; return the name of its folder.
 
@@ -46,11 +58,6 @@ def keep_robot(data: bytes, name: str, main: str = "") -> str:
     files, and ConfigurationError if it cannot be written.
     """
     files, description = _files(data, name, main)
-    if any(OUTSIDE.search(files[path]) for path in files if path.endswith(DESCRIPTIONS)):
-        raise InputError(
-            f"{name} names a file outside of its folder. Put its meshes beside it, name them "
-            "relative to it or by package://, and give all of them in one .zip."
-        )
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", Path(description).name.partition(".")[0])[:24] or "robot"
     key = f"{stem}-{hashlib.sha256(data + description.encode()).hexdigest()[:8]}"
     folder = _folder() / key
@@ -59,6 +66,7 @@ def keep_robot(data: bytes, name: str, main: str = "") -> str:
             (folder / path).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_files({folder / path: writer_of(content) for path, content in files.items()}, 0o600)
         write_files({folder / "description": writer_of(description.encode())}, 0o600)
+        os.utime(folder)
         for old in [*uploaded_robots()][MAX_UPLOADED:]:
             shutil.rmtree(_folder() / old, ignore_errors=True)
     except OSError as error:
@@ -68,6 +76,8 @@ def keep_robot(data: bytes, name: str, main: str = "") -> str:
 
 def _files(data: bytes, name: str, main: str) -> tuple[dict[str, bytes], str]:
     """Return the files of a robot by their paths, and the path of its description."""
+    if not name.isprintable():
+        raise InputError("The name of the file has characters that cannot be shown.")
     if name.lower().endswith(DESCRIPTIONS):
         own = posixpath.basename(name.replace("\\", "/"))
         return {own: data}, own
