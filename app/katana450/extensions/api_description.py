@@ -287,6 +287,21 @@ def _files() -> dict[str, Any]:
                 requestBody=_body("application/zip", binary),
             ),
         },
+        "robots": {
+            "get": _operation(
+                "list_robots",
+                "List the robots that `choose_robot` takes.",
+                _json_response("Names, makers, licences and arguments of xacro files.", _OBJECT),
+            ),
+            "post": _operation(
+                "upload_robot",
+                "Upload a .urdf, .xacro or .zip, which `choose_robot` then takes by its name.",
+                _json_response("The robot is kept.", _OBJECT),
+                UNREADABLE,
+                parameters=[parameters[0], parameters[2]],
+                requestBody=_body("application/octet-stream", binary),
+            ),
+        },
     }
 
 
