@@ -74,7 +74,6 @@ def serve(options: Namespace) -> int:
     settings = Settings(**{name: values[name] for name in named})
     # The options are sent to other processes, which do not need the command itself.
     options = Namespace(**{key: value for key, value in values.items() if key != "command"})
-    options.first_urdf = options.urdf
     start_log()
     raise_descriptor_limit()
     stopping = threading.Event()
@@ -105,7 +104,8 @@ def serve(options: Namespace) -> int:
             again, before = True, options
             # What belongs to the robot before is left out.
             others = dict.fromkeys(("tool", "scene", "workspace", "xacro_arg", "robot_problem"))
-            options = Namespace(**{**vars(options), **others, "urdf": chosen, "objects": []})
+            first = {"first_urdf": options.urdf, **vars(options)}
+            options = Namespace(**{**first, **others, "urdf": chosen, "objects": []})
     finally:
         listening.close()
         stopping_socket.close()

@@ -48,6 +48,11 @@ class ChooseRobot(Request, frozen=True):
     arguments: dict[Text, Text] | None = None
 
 
+def first_robot(options: Namespace) -> Path:
+    """Return the file of the robot with which the server began, as its ``options`` name it."""
+    return Path(getattr(options, "first_urdf", options.urdf))
+
+
 class RobotChoice(RequestHandler):
     """Reads a chosen robot in a thread, and then lets the supervisor start it."""
 
@@ -110,7 +115,7 @@ class RobotChoice(RequestHandler):
     def _file(self, name: str) -> Path:
         """Return the description of the robot ``name``. Raises KatanaError."""
         if name in (OWN, FIRST):
-            return URDF_PATH if name == OWN else Path(self._options.first_urdf)
+            return URDF_PATH if name == OWN else first_robot(self._options)
         from katana450.extensions.robot_choice.uploaded_robots import used_robot
 
         path = used_robot(name)

@@ -17,7 +17,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.gallery.arms_command import listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
-from katana450.extensions.robot_choice.choose_robot import FIRST, OWN
+from katana450.extensions.robot_choice.choose_robot import FIRST, OWN, first_robot
 from katana450.extensions.robot_choice.uploaded_robots import keep_robot, uploaded_robots
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers
@@ -102,7 +102,7 @@ def _uploaded(name: str, path: Path) -> Choice:
 def routes(context: RouteContext) -> list[BaseRoute]:
     """Return the routes of the list, and of the upload."""
     hub = context.hub
-    first = URDF_PATH if context.options is None else Path(context.options.first_urdf)
+    first = URDF_PATH if context.options is None else first_robot(context.options)
     uploads = TokenBucket(UPLOADS_PER_SECOND, BURST, hub.clock())
 
     async def robots(request: Request) -> Response:
