@@ -18,6 +18,7 @@ from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
 from katana450.client import connect
+from katana450.extensions.event_log.record_content import content_of
 from katana450.extensions.event_log.record_maker import (
     LIMITS,
     STREAM_GAP,
@@ -28,7 +29,6 @@ from katana450.extensions.event_log.records import (
     MAX_LINE_BYTES,
     MAX_TEXT,
     Record,
-    content_of,
     encoded,
     record,
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -213,3 +214,13 @@ def test_excused_time_ends_now(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert child.hangs is None
     now += START_SILENCE + 1.0
     assert child.hangs == f"has not answered for {START_SILENCE + 1.0:.1f} s"
+
+
+def test_process_that_supervises_loads_no_calculation() -> None:
+    """It takes part of the start, and stays for as long as the server."""
+    script = (
+        "import sys, katana450.cli.serve, katana450.extensions.event_log.disk_log\n"
+        "loaded = {'numpy', 'ruckig', 'katana450.arm.control.state'} & sys.modules.keys()\n"
+        "assert not loaded, loaded"
+    )
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60.0)

@@ -27,7 +27,8 @@ from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import reason
 from katana450.arm.control.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.extensions.event_log.records import Record, content_of, record, text, utc
+from katana450.extensions.event_log.record_content import content_of
+from katana450.extensions.event_log.records import Record, record, text, utc
 from katana450.server.service.recorder import LeaseChange, Note, Recorder
 from katana450.server.web.limits import TokenBucket
 
