@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from docs import page_types
 from docs.api import PAGE, added_requests, page
 from katana450.arm.control.act import Command, Request, classes_of, tag_of
 from katana450.errors import InputError
@@ -20,6 +21,14 @@ EVERY_REQUEST: tuple[type[Request], ...] = (*requests.CORE, *ADDED)
 
 def test_page_is_up_to_date() -> None:
     assert PAGE.read_text(encoding="utf-8") == page(), "run `python -m docs.api`"
+
+
+def test_types_of_the_page_are_up_to_date() -> None:
+    text = page_types.FILE.read_text(encoding="utf-8")
+    assert text == page_types.content(), "run `python -m docs.page_types`"
+    # An act may leave out a default, an answer only at its top; what it contains is complete.
+    assert 'interface Rename { do: "rename"; id?: number | string | null;' in text
+    assert "interface Finding { reason: string; text: string; amount: number | null;" in text
 
 
 def test_every_message_is_documented() -> None:
