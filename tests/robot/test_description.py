@@ -24,6 +24,11 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
+        (
+            "</robot>",
+            '<loop_joint name="bar" type="revolute"/></robot>',
+            r"line \d+: <loop_joint> 'bar' closes a loop .* <mimic>",
+        ),
         ('xyz="0.05 0.0 0.15"', 'xyz="${a} 0 0"', r"line \d+: .* 'a' is not defined"),
         (
             '<link name="base"/>',

@@ -216,7 +216,6 @@ EXTENSIONS = (
         expand=f"{HERE}.xacro.xacro_file:expanded",
         prepare=f"{HERE}.xacro.arguments:expand_with_arguments",
     ),
-    Extension("loops", prepare=f"{HERE}.loops.loop_joints:solve_loops"),
     Extension(
         "objects",
         view_layer=f"{HERE}.objects.handles:HandlesLayer",

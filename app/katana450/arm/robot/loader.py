@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.robot.arm_reader import FindArm, arm_in
-from katana450.arm.robot.description import checked, explained, refuse_loops, unexpanded
+from katana450.arm.robot.description import checked, explained, unexpanded
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of, urdf_of
@@ -45,7 +45,6 @@ def load(
             message says what is wrong, and in which line.
     """
     data = checked(path, expand)
-    refuse_loops(data, path)
     with explained(path):
         urdf = urdf_of(data, path.parent)
         links, faults = _links_of(urdf, path)

@@ -1,1 +1,0 @@
-"""Closed loops of joints in robot descriptions."""
