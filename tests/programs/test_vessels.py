@@ -89,8 +89,8 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
 @pytest.mark.parametrize(
     ("full", "pour", "size", "pose"),
     [
-        (220, "{into: glass, ml: 20, rate: 5}", [25, 60], [380, -100, 0, 0, 0, 0]),
-        (150, "{into: glass, ml: 80, rate: 10}", [40, 120], [450, -100, 0, 0, 0, 0]),
+        (220, "{into: glass, ml: 20}", [25, 60], [380, -100, 0, 0, 0, 0]),
+        (150, "{into: glass, ml: 80}", [40, 120], [450, -100, 0, 0, 0, 0]),
         (100, "{into: glass, shake: 0}", [30, 80], [420, 40, 0, 0, 0, 0]),
     ],
 )

@@ -7,12 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.extensions.programs.building.vessel_turn import (
-    RatePlan,
-    flow_at,
-    spill_tilt,
-    tilt_for,
-)
+from katana450.extensions.programs.building.vessel_turn import flow_at, spill_tilt, tilt_for
 from katana450.maths.water.flow import WaterFlow
 from katana450.maths.water.lip import DISCHARGE, left_over, viscous_flow, weir_flow
 from katana450.maths.water.units import DENSITY, GRAVITY, MILLILITRE, ML, VISCOSITY
@@ -57,16 +52,3 @@ def test_tilt_for_a_flow_has_that_flow(flow: WaterFlow, rate: float, volume: flo
     tilt = tilt_for(rate * ML, volume * ML, cup)
     assert flow_at(tilt, volume * ML, cup) == pytest.approx(rate * ML, rel=1e-5)
     assert tilt > spill_tilt(cup, volume * ML) - 1e-9
-
-
-@repeatable
-@given(st.floats(5.0, 200.0), st.floats(1.0, 50.0))
-def test_planned_flow_sums_up_to_the_volume(volume: float, rate: float) -> None:
-    plan = RatePlan.of(volume * ML, rate * ML)
-    t = (np.arange(4000) + 0.5) * (plan.duration / 4000)
-    flows = np.array([plan.flow(each) for each in t.tolist()])
-    assert flows.max() == pytest.approx(rate * ML)
-    assert flows.min() == pytest.approx(min(0.5, 0.5 * rate) * ML, rel=1e-2)
-    assert flows.mean() * plan.duration == pytest.approx(volume * ML, rel=1e-5)
-    assert plan.poured(plan.duration) == pytest.approx(volume * ML)
-    assert plan.poured(t[999]) == pytest.approx(flows[:1000].sum() * plan.duration / 4000, rel=2e-3)

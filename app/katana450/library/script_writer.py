@@ -315,10 +315,9 @@ class ScriptWriter:
         *,
         ml: Number | None = None,
         shake: int | None = None,
-        rate: Number | None = None,
     ) -> None:
-        """Pour the cup in the hand into an object: all of it or some [ml], at a rate [ml/s]."""
-        self._add("pour", "into", into=into, ml=ml, shake=shake, rate=rate)
+        """Pour the cup in the hand into an object: all of it or some [ml]."""
+        self._add("pour", "into", into=into, ml=ml, shake=shake)
 
     def set_down(self) -> None:
         """Put the held object back to where it was grasped."""

@@ -119,31 +119,6 @@ class UntimedPath:
 
 
 @dataclass(frozen=True, eq=False)
-class PacedPath(UntimedPath):
-    """One path on which the place grows evenly with time, in ``duration`` [s] without the ramps."""
-
-    duration: float
-
-    def timed(self) -> FollowPlan:
-        """Return the timed plan. Raises InputError if the arm cannot move that fast."""
-        plan = super().timed().plan
-        (segment,) = plan.segments
-        fastest = segment.scaling
-        if fastest.span > self.duration:
-            raise InputError(
-                f"It takes at least {fastest.span:.2g} s, so {self.duration:.2g} s are too short: "
-                "give a lower rate or a larger part."
-            )
-        even = replace(fastest, coefficients=np.full_like(fastest.coefficients, self.duration))
-        nearest = plan.nearest
-        if nearest is not None:
-            nearest = replace(nearest, tau=even.tau(fastest.pace(nearest.tau).sigma))
-        return FollowPlan(
-            replace(plan, segments=(replace(segment, scaling=even),), nearest=nearest)
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class PlanState:
     """The plan of a script up to one of its steps: the arm as predicted, and the actions so far.
 
@@ -251,17 +226,6 @@ class PlanState:
             paths.append(path)
             q = path.end
         return self.follow(paths, name, tool_speed)
-
-    def pace(self, curve: Curve, duration: float, name: str) -> PlanState:
-        """Return the plan with the tool's motion along ``curve``, evenly in ``duration`` [s].
-
-        Raises as ``follow``.
-        """
-        led = self.lead([curve], name)
-        _, untimed = led.actions[-1]
-        assert isinstance(untimed, UntimedPath)
-        paced = PacedPath(untimed.arm, untimed.world, untimed.state, untimed.paths, duration)
-        return replace(led, actions=(*self.actions, (name, paced)))
 
     def follow(self, paths: Sequence[Path], name: str, tool_speed: float = TOOL_SPEED) -> PlanState:
         """Return the plan with the motion along ``paths``, from the present posture.

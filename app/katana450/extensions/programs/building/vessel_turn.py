@@ -2,8 +2,8 @@
 
 An arm of the five-axis family rolls the vessel by its wrist. Other arms tilt it about its lip.
 
-The tilt is the inverse of the flow over the lip of the cup, also over time. The surface is level
-and at rest. See ``maths/water/lip.py`` for the rules.
+The tilt is the inverse of the flow over the lip of the cup. The surface is level and at rest. See
+``maths/water/lip.py`` for the rules.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -29,101 +29,10 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.lip import THINNING_TIME, viscous_flow, weir_flow, withdrawn_thickness
-from katana450.maths.water.units import GRAVITY, ML
+from katana450.maths.water.units import GRAVITY
 
 HALVINGS = 40
 """Number of halvings of the interval that contains the tilt: to 3e-12 rad."""
-
-RAMP_FRACTION = 0.3
-"""[1] Fraction of the volume that flows while the flow rises to the rate, and falls again."""
-
-END_RATE = 0.5 * ML
-"""[m^3/s] Maximum flow at both ends, where the tilt rests."""
-
-SAMPLES = 49
-"""Number of times at which the tilt is computed."""
-
-RATE_DEGREE = 14
-"""Degree of the polynomial that gives roll or tilt over time for a rate."""
-
-
-class RatedTilt(NamedTuple):
-    """The tilt of a cup over time with which it pours at a rate.
-
-    Attributes:
-        duration: of the pour [s].
-        times: (N,) from 0 to ``duration`` [s].
-        tilts: (N,) at these times [rad].
-    """
-
-    duration: float
-    times: FloatArray
-    tilts: FloatArray
-
-    def fitted(self, angles: FloatArray) -> FloatArray:
-        """Return the coefficients of the polynomial through ``angles`` (N,) at these times.
-
-        They are those of the powers of s, which grows evenly from -1 to 1.
-        """
-        return frozen(polyfit(2.0 * self.times / self.duration - 1.0, angles, RATE_DEGREE))
-
-
-@dataclass(frozen=True)
-class RatePlan:
-    """A flow that rises from ``low`` to ``rate`` [m^3/s] and falls again, and its volume.
-
-    The ramps are polynomials of third degree without a corner.
-
-    Attributes:
-        rate: the flow between the ramps.
-        low: the flow at both ends.
-        ramp: duration of each ramp [s].
-        hold: duration between the ramps [s].
-    """
-
-    rate: float
-    low: float
-    ramp: float
-    hold: float
-
-    @staticmethod
-    def of(volume: float, rate: float) -> RatePlan:
-        """Return the plan that pours ``volume`` [m^3] at ``rate`` [m^3/s]."""
-        low = min(END_RATE, 0.5 * rate)
-        ramp = RAMP_FRACTION * volume / (rate + low)
-        return RatePlan(rate, low, ramp, (1.0 - RAMP_FRACTION) * volume / rate)
-
-    @property
-    def duration(self) -> float:
-        """The duration [s]."""
-        return 2.0 * self.ramp + self.hold
-
-    def flow(self, t: float) -> float:
-        """Return the flow [m^3/s] at ``t`` [s]."""
-        s = min(max(min(t, self.duration - t) / self.ramp, 0.0), 1.0)
-        return self.low + (self.rate - self.low) * s * s * (3.0 - 2.0 * s)
-
-    def poured(self, t: float) -> float:
-        """Return the volume [m^3] that has flowed until ``t`` [s]."""
-        if t > 0.5 * self.duration:
-            return 2.0 * self.poured(0.5 * self.duration) - self.poured(self.duration - t)
-        s = min(t / self.ramp, 1.0)
-        grown = self.ramp * (s**3 - 0.5 * s**4)
-        return self.low * t + (self.rate - self.low) * (grown + max(t - self.ramp, 0.0))
-
-    def tilts(self, held: float, cup: Cylinder) -> RatedTilt:
-        """Return the tilts of a cup with ``held`` [m^3] at first.
-
-        At each time the tilt is that at which the rest, without the film on the wall, has the flow.
-        The times are those of Chebyshev's points and the ends.
-        """
-        times = 0.5 * self.duration * (1.0 - np.cos(np.linspace(0.0, np.pi, SAMPLES)))
-        tilts = []
-        for t in times.tolist():
-            out = self.poured(t)
-            film = film_after(out, held - out, t, cup) if t > 0.0 else 0.0
-            tilts.append(tilt_for(self.flow(t), max(held - out - film, 0.0), cup))
-        return RatedTilt(self.duration, times, np.array(tilts))
 
 
 def flow_at(tilt: float, volume: float, cup: Cylinder) -> float:
@@ -222,16 +131,8 @@ class VesselTurn(ABC):
     end: float
 
     @abstractmethod
-    def angles(self, tilts: FloatArray) -> FloatArray:
-        """Return the angles (N,) at which the vessel has these tilts. Raises InputError."""
-
     def line(self, start: float, end: float) -> Curve:
         """Return the even turn from one angle to another."""
-        return self.by(np.array((0.5 * (start + end), 0.5 * (end - start))))
-
-    @abstractmethod
-    def by(self, angles: FloatArray) -> Curve:
-        """Return the turn by a polynomial of ``angles`` (n,), in powers of 2 sigma - 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,15 +153,9 @@ class Tilting(VesselTurn):
     axis_in_pose: FloatArray
     end: float
 
-    def angles(self, tilts: FloatArray) -> FloatArray:
-        """Return ``tilts``."""
-        if tilts.max() > EMPTY_TILT:
-            raise InputError("No tilt of the cup gives this rate; lower it, or pour less.")
-        return tilts
-
-    def by(self, angles: FloatArray) -> Curve:
+    def line(self, start: float, end: float) -> Curve:
         """Return the `PoseTurn`."""
-        return PoseTurn(self.at, self.lip, self.axis, angles, self.axis_in_pose)
+        return PoseTurn(self.at, self.lip, self.axis, _evenly(start, end), self.axis_in_pose)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,27 +173,20 @@ class Rolling(VesselTurn):
     end: float
     offsets: FloatArray | None = None
 
-    def angles(self, tilts: FloatArray) -> FloatArray:
-        """Return the rolls that give ``tilts``."""
-        rolls = _roll_of(tilts, self.at.pitch)
-        if rolls.max() > abs(self.end) and rolls.max() >= POUR_TURN:
-            raise InputError("The wrist cannot tilt it far enough for this rate; lower it.")
-        return np.asarray(math.copysign(1.0, self.end) * rolls)
-
     def line(self, start: float, end: float) -> Curve:
         """Return the even roll."""
         if self.offsets is None:
             one, other = (replace(self.at, roll=self.at.roll + roll) for roll in (start, end))
             return ToolLine(one, other)
-        return super().line(start, end)
-
-    def by(self, angles: FloatArray) -> Curve:
-        """Return the `ToolTurn`."""
+        angles = _evenly(start, end)
         rolls = np.append(self.at.roll + angles[0], angles[1:])
-        if self.offsets is None:
-            return ToolTurn(self.at, rolls)
         places = 2.0 * polyval(NODES, angles) / self.end - 1.0
         return ToolTurn(self.at, rolls, _through(polyval(places, self.offsets).T))
+
+
+def _evenly(start: float, end: float) -> FloatArray:
+    """Return the coefficients (2,) of an even turn [rad], of the powers of 2 sigma - 1."""
+    return np.array((0.5 * (start + end), 0.5 * (end - start)))
 
 
 def turns_over(
@@ -306,8 +194,6 @@ def turns_over(
     held: SceneObject,
     below: SceneObject,
     tilt: float | None,
-    *,
-    is_rated: bool,
 ) -> Iterator[VesselTurn]:
     """Yield the ways to turn the vessel in the hand over ``below``, the best first.
 
@@ -316,13 +202,12 @@ def turns_over(
         held: the vessel.
         below: what receives its water.
         tilt: its tilt at the end of the pour [rad]; None to empty it.
-        is_rated: whether it is tilted at a rate, whose tilts `VesselTurn.angles` checks.
 
     Raises InputError for a tilt that the arm cannot give it, and out of reach.
     """
     level = plan.target
     if not level.is_pitched:
-        if tilt is not None and tilt > EMPTY_TILT and not is_rated:
+        if tilt is not None and tilt > EMPTY_TILT:
             raise InputError("No tilt of the cup pours this part; pour all of it, or less.")
         yield from _about_the_lip(plan, held, below, tilt)
         return

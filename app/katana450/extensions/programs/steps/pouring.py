@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, Any
-
-from numpy.polynomial.polynomial import polyval
 
 from katana450.arm.control.pouring import CUP, is_vessel
 from katana450.arm.control.scene_objects import SceneObject
@@ -19,20 +16,13 @@ from katana450.extensions.programs.building.hand_motions import carry
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.building.vessel_turn import (
-    RatedTilt,
-    RatePlan,
     VesselTurn,
     film_after,
     tilt_for,
     turns_over,
 )
 from katana450.extensions.programs.language import kinds
-from katana450.extensions.programs.language.declaration import Kind
-from katana450.extensions.programs.language.expression import PLAIN
-from katana450.extensions.programs.language.kinds import NAME, ObjectName, number, whole
-from katana450.extensions.programs.language.scope import ScriptContext
-from katana450.extensions.programs.language.source import YamlValue
-from katana450.extensions.programs.planning.curves import Curve
+from katana450.extensions.programs.language.kinds import NAME, ObjectName, whole
 from katana450.maths.water.flow import VesselWater, Water
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE, ML, counted
 
@@ -100,12 +90,6 @@ DRAIN_TIME = 1.5
 PART_FLOW = 0.5 * ML
 """[m^3/s] Flow with which the pour of a part ends: slow enough to end it in time."""
 
-LAST_FRACTION = 0.1
-"""[1] Fraction of all that is not poured at a given rate: so little flows as it can."""
-
-RATE_UNIT = "ml/s"
-"""Unit of a rate in a script."""
-
 REACTION_TIME = 0.25
 """[s] Time in which a cup that turns back still pours at the same flow."""
 
@@ -117,20 +101,6 @@ SHAKES = 3
 
 POURING = "pour"
 """Name of the task that turns the cup over."""
-
-
-FLOW = number(
-    1.0, 50.0, RATE_UNIT, "Flow while pouring, ml/s, or a text such as 10 ml/s", lambda ml: ML * ml
-)
-
-
-def _rate(value: YamlValue, context: ScriptContext) -> float:
-    """Read a flow [m^3/s], as a number in ml/s or a text such as 10 ml/s."""
-    if isinstance(value.held, str) and value.held.endswith(RATE_UNIT):
-        with suppress(ValueError):
-            flow = float(value.held.removesuffix(RATE_UNIT))
-            value = replace(value, kind="number", number=flow, unit=PLAIN)
-    return FLOW(value, context)
 
 
 @dataclass(frozen=True)
@@ -146,8 +116,6 @@ class Pour(Step, word="pour"):
         source: name of the vessel in the hand; None for any.
         volume: how much to pour [m^3]; None for all. The cup is tilted until the flow is PART_FLOW
             when the rest is left, kept so until then, and turned back.
-        rate: flow while pouring [m^3/s]; None to turn the cup evenly. Of all, the last
-            LAST_FRACTION flows faster.
         shake: number of shakes after all is poured; None for SHAKES.
     """
 
@@ -161,7 +129,6 @@ class Pour(Step, word="pour"):
         float | None,
         kinds.volume(1.0, 1000.0, "How much to pour, ml; all unless given").named("ml"),
     ] = None
-    rate: Annotated[float | None, Kind(_rate, FLOW.schema)] = None
     shake: Annotated[
         int | None, whole(0, 20, "Number of shakes after all is poured, 3 unless given")
     ] = None
@@ -209,10 +176,9 @@ class Pour(Step, word="pour"):
                 "with `side: front`."
             )
         try:
-            tilt, rated = self._tilt(plan, vessel, rest), self._rated(plan, vessel, rest)
             plan = plan.first(
-                turns_over(plan, vessel, below, tilt, is_rated=rated is not None),
-                lambda plan, way: self._turned(plan, vessel, way, rated, rest),
+                turns_over(plan, vessel, below, self._tilt(plan, vessel, rest)),
+                lambda plan, way: self._turned(plan, vessel, way, rest),
             )
         except InputError as error:
             message = f"The {vessel.name} cannot be emptied into {self.into}"
@@ -259,21 +225,12 @@ class Pour(Step, word="pour"):
         plan: PlanState,
         vessel: SceneObject,
         way: VesselTurn,
-        rated: RatedTilt | None,
         rest: float,
     ) -> PlanState:
         """Return ``plan`` with the motions of ``way`` at their pace, and the draining."""
-        fitted = None if rated is None else rated.fitted(way.angles(rated.tilts))
         plan = carry(plan, way.at, f"over {self.into}")
         pace, end = POUR_PACE if self.volume is None else PART_PACE, way.end
-        plan = plan.with_action("slowly", SetSpeed(pace))
-        if rated is None or fitted is None:
-            plan = plan.lead([way.line(0.0, end)], POURING)
-        else:
-            first, last = (float(polyval(place, fitted)) for place in (-1, 1))
-            curves = way.line(0.0, first), way.by(fitted), way.line(last, end)
-            plan = self._pour_at_rate(plan, rated.duration, *curves)
-            end = end if self.volume is None else last
+        plan = plan.with_action("slowly", SetSpeed(pace)).lead([way.line(0.0, end)], POURING)
         if self.shakes:
             back = way.end - math.copysign(SHAKE_ANGLE, way.end)
             plan = plan.lead([way.line(end, back), way.line(back, end)] * self.shakes, "shake")
@@ -288,26 +245,3 @@ class Pour(Step, word="pour"):
             left = counted(rest + PART_FLOW * REACTION_TIME)
         plan = plan.with_action("drain", Drain(vessel.name, left))
         return plan.with_action("full speed", SetSpeed(1.0))
-
-    def _pour_at_rate(
-        self, plan: PlanState, duration: float, start: Curve, turn: Curve, end: Curve
-    ) -> PlanState:
-        """Append ``start``, ``turn`` in ``duration`` [s], and ``end`` if all is poured."""
-        plan = plan.lead([start], POURING).with_action("at the rate", SetSpeed(1.0))
-        plan = plan.pace(turn, duration, "pour at the rate")
-        if self.volume is not None:
-            return plan
-        return plan.with_action("slowly", SetSpeed(POUR_PACE)).lead([end], "pour the last")
-
-    def _rated(self, plan: PlanState, vessel: SceneObject, rest: float) -> RatedTilt | None:
-        """Return the tilt over time for the rate; None if none is given."""
-        if self.rate is None:
-            return None
-        pouring, poured = plan.plan_context.session.pouring, plan.state.poured
-        water = None if poured is None else poured.water.vessel(vessel.name)
-        assert pouring is not None
-        assert water is not None
-        inside = pouring.water_environment(plan.state.objects).vessels[vessel.name].inside
-        held = water.kept * FEMTOLITRE
-        out = (1.0 - LAST_FRACTION) * held if self.volume is None else held - rest
-        return RatePlan.of(out, self.rate).tilts(held, inside)
