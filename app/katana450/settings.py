@@ -37,7 +37,6 @@ class Settings:
         lines: TCP port of this machine for programs that send JSON lines; None for no such port.
         bare: whether the arm has no gripper.
         stop_port: TCP port that serves STOP alone; None for the port after ``port``, or a free one.
-        clear_by: persons who may clear a stop; see ``server.service.stop_state.ClearBy``.
     """
 
     host: str = "127.0.0.1"
@@ -56,4 +55,3 @@ class Settings:
     lines: int | None = None
     bare: bool = False
     stop_port: int | None = None
-    clear_by: str = "driver"

@@ -21,7 +21,6 @@ from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, key_of, presser_of
 from katana450.server.service.recorder import Note
-from katana450.server.service.stop_state import ClearBy
 from tests.gateway.test_hub import PAGES, FakeArm, Table
 
 EARLY = "The arm was stopped just now. Clear the stop in 0.6 s."
@@ -64,9 +63,9 @@ class StoppableArm(FakeArm):
 class ClearingTable(Table):
     """A table with such an arm, and people with links."""
 
-    def __init__(self, state: State, clear_by: ClearBy) -> None:
+    def __init__(self, state: State) -> None:
         super().__init__(state)
-        self.hub = Hub(lambda: self.t, clear_by=clear_by)
+        self.hub = Hub(lambda: self.t)
         self.stoppable = StoppableArm(state)
         self.arm = self.stoppable
         self.hub.gate.arm = cast(Any, self.arm)
@@ -77,12 +76,7 @@ class ClearingTable(Table):
 
 @pytest.fixture
 def table(session: Session) -> ClearingTable:
-    return ClearingTable(session.begin(session.ready, 0.0, 0.0), ClearBy.DRIVER)
-
-
-@pytest.fixture
-def by_presser(session: Session) -> ClearingTable:
-    return ClearingTable(session.begin(session.ready, 0.0, 0.0), ClearBy.PRESSER)
+    return ClearingTable(session.begin(session.ready, 0.0, 0.0))
 
 
 def test_stop_on_another_path_is_adopted_with_its_cause(table: ClearingTable) -> None:
@@ -234,6 +228,8 @@ def test_clear_stop_is_offered_with_the_reason_to_wait(table: ClearingTable) -> 
     # A person who may not clear it learns that, and gets no lease.
     with pytest.raises(LeaseError, match="holds the arm"):
         table.hub.move(other, cmd.ClearStop())
+    until = f"Nothing moves until {driver.person.name} clears the stop."
+    assert status.of(table.hub, other)["until"] == until
     table.arm.clear_refusal = ""
     assert status.common(table.hub)["wait"] == ""
     table.hub.move(driver, cmd.ClearStop())
@@ -247,38 +243,6 @@ def test_refused_clear_stop_acquires_no_lease(table: ClearingTable) -> None:
     with pytest.raises(LeaseError, match="just now"):
         table.hub.move(driver, cmd.ClearStop())
     assert table.hub.lease.holder is None
-
-
-def test_presser_or_admin_clears_where_the_option_demands_it(by_presser: ClearingTable) -> None:
-    table = by_presser
-    driver = table.person("Dora", Role.OPERATOR)
-    presser = table.person("Vera", Role.VIEWER)
-    admin = table.person("Anna", Role.ADMIN)
-    for clearer in (presser, admin):
-        table.hub.acquire(driver)
-        table.hub.stop(presser.actor)
-        shown = status.of(table.hub, driver)
-        assert (shown["may_clear_stop"], shown["until"]) == (
-            False,
-            "Nothing moves until Vera or an admin clears the stop.",
-        )
-        with pytest.raises(LeaseError, match="Only Vera or an admin may clear"):
-            table.hub.move(driver, cmd.ClearStop())
-        assert status.of(table.hub, clearer)["may_clear_stop"]
-        table.hub.move(clearer, cmd.ClearStop())
-        assert table.hub.stopped is None
-        assert table.arm.actors[-1].grounds is Grounds.PRESSER
-        # Clearing takes no lease.
-        assert table.hub.lease.holder == driver.person
-        table.hub.release_lease(driver)
-
-
-def test_watchdog_stop_is_cleared_by_the_driver_in_any_case(by_presser: ClearingTable) -> None:
-    driver = by_presser.person("Dora", Role.OPERATOR)
-    by_presser.hub.acquire(driver)
-    by_presser.hub.gate.protect("Dora fell silent while the arm moved.")
-    by_presser.hub.move(driver, cmd.ClearStop())
-    assert by_presser.hub.stopped is None
 
 
 def test_stop_during_the_start_is_confirmed_if_the_arm_was_stopped_on_another_path(

@@ -49,7 +49,6 @@ from katana450.server.service.command_gate import guarded
 from katana450.server.service.heartbeats import ARRIVAL, Arrival
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.people import People
-from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.proxy import Proxy
 from katana450.server.web.access_links import AccessFile
 from katana450.server.web.admission import Admission
@@ -301,7 +300,7 @@ class VirtualServer:
         self.loop = VirtualLoop(self.clock)
         options, settings, now = _options(words), Settings(), self.clock.now
         robot, session, _ = found
-        self.hub = hub = Hub(now, settings.silence, clear_by=ClearBy(options.clear_by))
+        self.hub = hub = Hub(now, settings.silence)
         hub.people = People(now)
         hub.people.links = access
         address = Address(LOOPBACK_NAMES, any_address=False, secure=False)

@@ -41,7 +41,6 @@ from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of
 from katana450.server.service.stop_path import watch_stop_path
-from katana450.server.service.stop_state import ClearBy
 from katana450.server.viser_bridge.gestures import Gestures
 from katana450.server.viser_bridge.guard import Guard
 from katana450.server.viser_bridge.proxy import Proxy
@@ -84,7 +83,7 @@ class Gateway:
             keep_alive(lines)
         key = secrets.token_urlsafe(32)
         self.viser: viser.ViserServer = open_server(key)
-        self.hub = Hub(time.monotonic, settings.silence, meshes, ClearBy(settings.clear_by))
+        self.hub = Hub(time.monotonic, settings.silence, meshes)
         self.hub.gate.sample_delay = settings.sample_delay
         self.hub.people, self.hub.stop_path = web.people, web.stop_path
         self.hub.gate.recorder = web.recorder

@@ -84,13 +84,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         help="TCP port that serves STOP alone, from a process of its own (default: the port after "
         "--port, or a free one)",
     )
-    parser.add_argument(
-        "--clear-by",
-        choices=("driver", "presser"),
-        default=Settings.clear_by,
-        help="who may clear a stop: the driver (or any operator while nobody drives), or only the "
-        "person who pressed STOP and admins (default: %(default)s)",
-    )
     parser.add_argument("--no-browser", action="store_true", help="do not open the page by itself")
     for add_options in provided("serve_options"):
         add_options(parser)

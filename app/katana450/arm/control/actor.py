@@ -36,6 +36,7 @@ class Grounds(Enum):
     SAFETY = "anybody may stop the arm"
     NO_DRIVER = "may clear a stop while nobody drives"
     PRESSER = "pressed STOP, or is an admin"
+    """Only in recordings of earlier versions."""
     SERVER = "protection by the server"
 
 

@@ -23,7 +23,7 @@ from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.heartbeats import check_in_time
 from katana450.server.service.recorder import Recorder
-from katana450.server.service.stop_state import ClearBy, ClearRights, LastPause, StopRecord
+from katana450.server.service.stop_state import LastPause, StopRecord
 from katana450.settings import Settings
 
 log = logging.getLogger(__name__)
@@ -49,8 +49,8 @@ class CommandGate:
     refuses an older number. It also refuses a sample with a delay above ``sample_delay`` [s].
     """
 
-    def __init__(self, clock: Callable[[], float], clear_by: ClearBy = ClearBy.DRIVER) -> None:
-        """Create a gate without an arm. ``clock`` is in seconds. ``clear_by``: see ``ClearBy``."""
+    def __init__(self, clock: Callable[[], float]) -> None:
+        """Create a gate without an arm. ``clock`` is in seconds."""
         self._clock = clock
         self.sample_delay = Settings.sample_delay
         self.lock = threading.RLock()
@@ -74,7 +74,6 @@ class CommandGate:
         """Function that returns the participant that pressed STOP; None for another cause."""
         self.delivered: list[Callable[[cmd.Command, Actor, State, bool], None]] = []
         """Callbacks with command, actor, the state before, and whether that includes all before."""
-        self._clear_by = clear_by
         self._presses = Presses()
         self._cleared = 0
         self._jogged = -cmd.JOG_TIME
@@ -206,10 +205,9 @@ class CommandGate:
         with self.lock:
             self._stop(StopCause(why, at=time.time()), SERVER)
 
-    @property
-    def clear_rights(self) -> ClearRights:
-        """Rights to clear the present stop."""
-        return ClearRights(self._clear_by, self.stopped, self.lease)
+    def may_clear(self, person: Person) -> bool:
+        """Return whether ``person`` may clear a stop, once that is possible."""
+        return person.role.may_drive and self.lease.driver in (None, person)
 
     @property
     def clear_refusal(self) -> str:
@@ -370,15 +368,9 @@ class CommandGate:
         """
         # The arm may have been stopped on another path just now.
         self.reconcile()
-        rights = self.clear_rights
-        may = rights.allow(actor.person)
-        if may and self.clear_refusal:
+        if self.may_clear(actor.person) and self.clear_refusal:
             raise LeaseError(self.clear_refusal)
-        if rights.by_presser:
-            if not may:
-                raise LeaseError(f"Only {rights.names} may clear this stop.")
-            granted = replace(actor, grounds=Grounds.PRESSER)
-        elif self.ended is None or self.ended.owner == actor.key:
+        if self.ended is None or self.ended.owner == actor.key:
             granted = self._granted(actor, pacing=False)
         else:
             # The lease stays free, so that the owner can continue the program.

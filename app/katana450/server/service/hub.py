@@ -39,7 +39,7 @@ from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath
-from katana450.server.service.stop_state import ClearBy, StopNews, StopRecord
+from katana450.server.service.stop_state import StopNews, StopRecord
 from katana450.settings import Settings
 
 TICK = 0.02
@@ -54,17 +54,15 @@ class Hub:
         clock: Callable[[], float],
         hold_after: float = Settings.silence,
         meshes: Meshes | None = None,
-        clear_by: ClearBy = ClearBy.DRIVER,
     ) -> None:
         """Create a hub without participants.
 
         ``hold_after``: heartbeat timeout of the driver [s] after which a moving arm stops, or
-        pauses if it is simulated. ``meshes``: initial meshes. ``clear_by``: persons who may clear a
-        stop.
+        pauses if it is simulated. ``meshes``: initial meshes.
         """
         self.clock = clock
         self._hold_after = hold_after
-        self.gate = CommandGate(clock, clear_by)
+        self.gate = CommandGate(clock)
         self.gate.presser_of = self._presser_of
         self.stop_path, self.stop_news = StopPath(), StopNews()
         self.event_log = EventLog()

@@ -95,11 +95,6 @@ def session_of(key: str) -> str:
     return key.rpartition("/")[0] or key
 
 
-def is_same_person(key: str, other: str) -> bool:
-    """Return whether two keys belong to the participants of one person, or of one browser."""
-    return key == other or session_of(key) == session_of(other) != SHARED_SESSION
-
-
 class MeasuresAge(Protocol):
     """Interface for the age of a window's picture; ``Flow`` implements it."""
 

@@ -171,9 +171,9 @@ def of(hub: Hub, participant: Participant) -> dict[str, Any]:
     own_pause = hub.gate.last_pause is not None and hub.gate.last_pause.key == person.key
     stopped = hub.stopped
     own_stop = None if stopped is None or stopped.cause.key != person.key else stopped.why
-    rights = hub.gate.clear_rights
-    clears = rights.allow(person)
-    until = "Clear stop is pressed" if clears else f"{rights.names} clears the stop"
+    clears = hub.gate.may_clear(person)
+    clearer = "an operator" if lease.driver is None else lease.driver.name
+    until = "Clear stop is pressed" if clears else f"{clearer} clears the stop"
     stays = f"Nothing moves until {until}."
     if (mode := arm_mode(hub)) in UNCONTROLLED:
         stays = UNCONTROLLED[mode][1]

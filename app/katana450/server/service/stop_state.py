@@ -1,29 +1,17 @@
-"""Causes of the present stop and pause, the rights to clear a stop, and news of it."""
+"""Causes of the present stop and pause, and news of the stop."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import NamedTuple, Self
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.control.state import State
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.runtime.state_publisher import Snapshot
-from katana450.server.service.participants import is_same_person
-
-
-class ClearBy(Enum):
-    """Rule on the persons who may clear a stop."""
-
-    DRIVER = "driver"
-    """The driver, or any operator while nobody drives."""
-    PRESSER = "presser"
-    """The person who pressed STOP, or an admin. A stop by a watchdog: as ``DRIVER``."""
 
 
 @dataclass(frozen=True)
@@ -59,40 +47,6 @@ class StopRecord:
         if self.confirmed or self.ticket is None or snapshot.ticket < self.ticket:
             return self
         return self if snapshot.state.stopped is None else replace(self, confirmed=True)
-
-
-@dataclass(frozen=True)
-class ClearRights:
-    """Rights to clear a stop, once that is possible.
-
-    Attributes:
-        rule: Rule of the server.
-        stopped: The stop; None without one.
-        lease: Lease of the arm.
-    """
-
-    rule: ClearBy
-    stopped: StopRecord | None
-    lease: Lease
-
-    @property
-    def by_presser(self) -> bool:
-        """True if only the person who pressed STOP, or an admin, may clear it."""
-        pressed_by_person = self.stopped is not None and self.stopped.cause.by is not None
-        return self.rule is ClearBy.PRESSER and pressed_by_person
-
-    def allow(self, person: Person) -> bool:
-        """Return whether ``person`` may clear the stop."""
-        if self.stopped is not None and self.by_presser:
-            return is_same_person(person.key, self.stopped.cause.key) or person.role is Role.ADMIN
-        return person.role.may_drive and self.lease.driver in (None, person)
-
-    @property
-    def names(self) -> str:
-        """Name of the persons who may clear the stop."""
-        if self.stopped is not None and self.by_presser:
-            return f"{self.stopped.cause.by} or an admin"
-        return "an operator" if self.lease.driver is None else self.lease.driver.name
 
 
 class StopNews:
