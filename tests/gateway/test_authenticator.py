@@ -63,9 +63,9 @@ def test_link_that_is_revoked_during_another_change_stays_revoked(
         write_files(*args, **more)
 
     monkeypatch.setattr(access_links, "write_files", write)
-    file.keep_out(kept, 10.0)
+    added = number_of(file, "Cleo")
     revoking.join()
-    assert {number: grant.kept_out for number, grant in file.grants.items()} == {kept: 10.0}
+    assert set(file.grants) == {kept, added}
 
 
 def number_of(file: AccessFile, name: str) -> str:
@@ -233,9 +233,9 @@ def test_cookies_are_sent_to_our_pages_alone(file: AccessFile) -> None:
         assert "set-cookie" not in response.headers
 
 
-def test_file_of_an_earlier_version_with_a_mute_is_read(file: AccessFile) -> None:
+def test_file_of_an_earlier_version_with_more_fields_is_read(file: AccessFile) -> None:
     number = number_of(file, "Anna")
     content = json.loads(file.path.read_text())
-    content["grants"][number]["muted"] = 10.0
+    content["grants"][number]|= {"muted": 10.0, "kept_out": 20.0}
     file.path.write_text(json.dumps(content))
     assert AccessFile.open(file.path).grants[number].name == "Anna"

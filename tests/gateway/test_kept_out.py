@@ -121,27 +121,6 @@ def test_request_whose_sender_is_removed_before_its_end_is_refused(
     asyncio.run(act())
 
 
-def test_access_file_says_who_is_kept_out(house: House) -> None:
-    house.file.give("Vera", Role.VIEWER, time.time() + HOUR)
-    (number,) = house.file.grants
-
-    async def written(*, out: bool) -> None:
-        async with asyncio.timeout(5.0):
-            while (house.file.grants[number].kept_out > time.time()) != out:
-                await asyncio.sleep(0.01)
-
-    async def act() -> None:
-        vera = Identity(number, "Vera", Role.VIEWER, number, "Vera")
-        with house.people.connected(Connection(vera, ConnectionKind.PAGE, "127.0.0.1")):
-            person = house.number(number)
-        house.ask(requests.Kick(person=person, seconds=60.0))
-        await written(out=True)
-        house.ask(requests.Kick(person=person, seconds=0.0))
-        await written(out=False)
-
-    asyncio.run(act())
-
-
 def test_http_programs_without_links_are_kept_out_together(
     tmp_path: Path, session: Session
 ) -> None:
@@ -240,14 +219,6 @@ def test_connected_and_absent_people_are_never_forgotten(
             assert people.refusals(session) == 1
         assert list(people.shown.values()) == kept
     assert people.refusals("visitor 0") == 0
-
-
-def test_absences_are_restored_with_their_people(room: Room) -> None:
-    people = room.hub.people
-    people.restore(VERA, -5.0)
-    people.restore(ODA, 30.0)
-    assert list(people.shown.values()) == [ODA]
-    assert (people.kept_out("vera"), people.kept_out("oda")) == (0.0, 30.0)
 
 
 @pytest.fixture

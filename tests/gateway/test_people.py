@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import json
-import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
 
 from katana450.arm.control.lease import Role
-from katana450.client import Client, connect
+from katana450.client import Client
 from katana450.client.files import LostError, RefusedError
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
-from tests.commands import completed
 from tests.gateway.client import HOUR, Control, page_name
-from tests.gateway.site import open_site
 from tests.gateway.virtual import VirtualServer
 
 KICKED = "An admin has disconnected you."
@@ -181,39 +177,3 @@ def test_program_of_an_admin_lists_and_kicks(guarded: VirtualServer, file: Acces
             poll(watch)
         with pytest.raises(RefusedError, match="disconnect yourself"):
             guard.ask(requests.Kick(person=people["Ada"].person))
-
-
-@pytest.mark.long
-def test_command_lists_and_kicks(tmp_path: Path) -> None:
-    with open_site(tmp_path) as site:
-        boss, viewer = site.link("Ada", Role.ADMIN), site.link("Cleo", Role.VIEWER)
-        secret = tmp_path / "token"
-        secret.write_text(f"{site.server.url}/#{boss}\n")
-
-        def people(*words: str, token: str = boss) -> tuple[int, str]:
-            environment = {"KATANA450_TOKEN": token}
-            done = completed(
-                [sys.executable, "-m", "katana450", "people", *words, "--url", site.server.url],
-                env=environment,
-            )
-            assert "Traceback" not in done.stderr
-            return done.returncode, done.stdout + done.stderr
-
-        with connect(site.server.url, "Watch", viewer) as watch:
-            status, text = people("list")
-            assert status == 0
-            (line,) = (line for line in text.splitlines() if "Cleo" in line)
-            number = line.split()[0]
-            assert "viewer" in line
-            assert "program" in line
-            assert people("list", token=viewer) == (1, "katana450: Only an admin may do this.\n")
-            assert people("kick", number, "--seconds", "30")[0] == 0
-            with pytest.raises(LostError, match="disconnected"):
-                poll(watch)
-            assert "kept out" in people("list")[1]
-            assert people("let-in", number)[0] == 0
-        assert people("kick", "999")[0] == 1
-        # The token can also be in a file, as part of its link.
-        assert people("list", "--token-file", str(secret), token="")[0] == 0
-        with connect(site.server.url, "Watch", viewer):
-            assert people("kick", number, "--revoke")[0] == 0

@@ -200,17 +200,6 @@ def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.Mo
     asyncio.run(act())
 
 
-def test_every_press_of_a_disconnected_person_counts(port: Port) -> None:
-    async def act() -> None:
-        number = port.number(port.vera)
-        port.file.keep_out(number, time.time() + HOUR)
-        assert await port.stop(port.vera, "two") == (202, "requested")
-        assert await port.stop(port.vera, "three") == (202, "requested")
-        assert port.sent == ["two", "three"]
-
-    asyncio.run(act())
-
-
 async def problem_with(answer: bytes, arm_age: float) -> str:
     """Return the problem of a server of STOP that gives ``answer``, after several checks."""
     path, asked = StopPath(), asyncio.Semaphore(0)

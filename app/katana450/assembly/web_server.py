@@ -26,7 +26,7 @@ from katana450.server.service.people import People
 from katana450.server.service.recorder import Recorder
 from katana450.server.service.stop_path import StopPath
 from katana450.server.web.acceptor import Acceptor
-from katana450.server.web.authenticator import Authenticator, identity_of
+from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.browser_socket import BrowserSocket
 from katana450.server.web.listen import raise_descriptor_limit
 from katana450.server.web.security import MAX_MESSAGE_BYTES, SecurityMiddleware
@@ -77,10 +77,7 @@ class WebServer:
         self.people, self.recorder = People(time.monotonic), Recorder()
         # Until the event log takes its notes, they wait.
         self.recorder.enabled = True
-        self.people.links, now = access, time.time()
-        for number, grant in {} if access is None else access.grants.items():
-            if now < grant.expires:
-                self.people.restore(identity_of(number, grant), grant.kept_out - now)
+        self.people.links = access
         port = self.stop_path.main_port
         self.authenticator = Authenticator(access, port, self.address, self.people)
         self.routes = page_routes(self.authenticator, self.stop_path, self.recorder)

@@ -16,12 +16,6 @@ EXTENSIONS = (
                 f"{HERE}.server_commands.options:add_access_options",
                 f"{HERE}.server_commands.commands:access",
             ),
-            CliCommand(
-                "people",
-                "list who is connected, and disconnect people",
-                f"{HERE}.server_commands.options:add_people_options",
-                f"{HERE}.server_commands.commands:people",
-            ),
         ),
         handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
     ),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import math
-import time
 from argparse import Namespace
 from datetime import UTC, datetime
 
@@ -55,15 +54,6 @@ class PeopleRequests(RequestHandler):
             else:
                 log.warning("%s let %s in again.", by, name)
                 people.let_in(person.session)
-            if links is not None:
-                # The next start of the server finds it there.
-                until = time.time() + request.seconds if request.seconds else 0.0
-                people.write(
-                    lambda: links.keep_out(person.session, until),
-                    lambda why: _report(
-                        participant, f"The server forgets this when it restarts. {why}"
-                    ),
-                )
             return
         if links is None:
             raise InputError("This server has no links that could be revoked.")

@@ -48,12 +48,6 @@ class LinkStore(Protocol):
     def revoke(self, number: str) -> object:
         """Delete the link of ``number``. Raises KatanaError or OSError."""
 
-    def keep_out(self, number: str, until: float) -> None:
-        """Store until when a person is kept out [s since the epoch].
-
-        Raises KatanaError or OSError.
-        """
-
 
 @dataclass(eq=False)
 class Connection:
@@ -184,15 +178,6 @@ class People:
         for connection in closed:
             connection.kicked.set()
         return len(closed)
-
-    def restore(self, identity: Identity, kept_out: float) -> None:
-        """Keep ``identity`` out as before the server was started.
-
-        ``kept_out``: remaining time [s]; not positive for none.
-        """
-        self.kick(identity, max(kept_out, 0.0))
-        if identity.session in self._listed:
-            self._remember(identity)
 
     def let_in(self, session: str) -> None:
         """Let the identity of ``session`` in again before its time."""

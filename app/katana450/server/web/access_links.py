@@ -37,22 +37,18 @@ LOCK_TIMEOUT, LOCK_INTERVAL = 5.0, 0.02
 attempts."""
 
 
-class Grant(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """Rights of one link.
+class Grant(msgspec.Struct, frozen=True):
+    """Rights of one link. Further fields, which earlier versions wrote, are ignored.
 
     Attributes:
         name: Name of the person.
         role: Role of the person.
         expires: End of the validity [s since the epoch].
-        kept_out: End of the time [s since the epoch] for which an admin keeps the person out.
-        muted: Ignored; files of earlier versions can have it.
     """
 
     name: str
     role: Role
     expires: float
-    kept_out: float = 0.0
-    muted: float | None = None
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -120,16 +116,6 @@ class AccessFile:
             if number in grants:
                 return grants.pop(number)
             raise InputError(f"There is no link {number!r}; `katana450 access list` shows them.")
-
-    def keep_out(self, number: str, until: float) -> None:
-        """Store until when [s since the epoch] the person is kept out.
-
-        So it lasts when the server is started again. Raises InputError if ``number`` is unknown.
-        """
-        with self._changing() as grants:
-            if number not in grants:
-                raise InputError(f"There is no link {number!r}.")
-            grants[number] = msgspec.structs.replace(grants[number], kept_out=until)
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""
