@@ -236,6 +236,6 @@ def test_cookies_are_sent_to_our_pages_alone(file: AccessFile) -> None:
 def test_file_of_an_earlier_version_with_more_fields_is_read(file: AccessFile) -> None:
     number = number_of(file, "Anna")
     content = json.loads(file.path.read_text())
-    content["grants"][number]|= {"muted": 10.0, "kept_out": 20.0}
+    content["grants"][number] |= {"muted": 10.0, "kept_out": 20.0}
     file.path.write_text(json.dumps(content))
     assert AccessFile.open(file.path).grants[number].name == "Anna"

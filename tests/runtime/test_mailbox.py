@@ -57,6 +57,19 @@ def test_stop_reports_the_dropped_tickets(mailbox: Mailbox) -> None:
     )
 
 
+def test_stop_drops_no_clearing_of_the_stop_before_it(mailbox: Mailbox, session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    state = session.step(state, [press("one")], 1.0)
+    stops = (cmd.Home(), cmd.ClearStop(), press("two"), cmd.ClearStop(), press("three"))
+    for command in stops:
+        mailbox.put(command)
+    drained = mailbox.drain()
+    assert (drained.tickets, drained.dropped) == ([[2], [3, 5]], [1, 4])
+    state = session.step(state, drained.commands, 3.0)
+    assert state.stopped is not None
+    assert state.stopped.cause.press == "two"
+
+
 def press(name: str) -> cmd.Stop:
     return cmd.Stop(pressed("Anna", "a", name, 0.0))
 

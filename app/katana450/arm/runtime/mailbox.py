@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, HoldFor, PauseFor, Stop
+from katana450.arm.control.commands import ClearStop, Command, HoldFor, PauseFor, Stop
 from katana450.arm.control.stop_cause import StopCause
 from katana450.arm.control.stopping import joined
 from katana450.arm.runtime.presses import Presses
@@ -104,13 +104,18 @@ class Mailbox:
                     self._repeated[self._tickets] = command.cause
                     return self._tickets
                 # Never refused. Waiting commands are dropped; an earlier stop is fulfilled.
-                for submission, tickets in zip(self._waiting, self._of_waiting, strict=True):
+                before = zip(self._waiting, self._of_waiting, strict=True)
+                self._waiting, self._of_waiting = [], []
+                for submission, tickets in before:
                     if isinstance(submission.command, Stop):
                         command, actor = joined(submission.command, command), submission.actor
                         replaced.extend(tickets)
+                    elif isinstance(submission.command, ClearStop) and not replaced:
+                        # It ends the stop of before, so that this one has its own cause.
+                        self._waiting.append(submission)
+                        self._of_waiting.append(tickets)
                     else:
                         self._dropped.extend(tickets)
-                self._waiting, self._of_waiting = [], []
                 self.stop_waits.set()
             elif self._waiting and command.replaces(self._waiting[-1].command):
                 self._waiting.pop()
