@@ -40,6 +40,8 @@ class Person:
         if not self.touches:
             self.page.drag_arrow(MOVE, "z", metres)
             return
+        # A first visit shows its card beside the scene, and the camera follows the size of that.
+        still(self.page, lambda: self.page.project(self.page.node_pose(MOVE)[:3, 3]))
         start, end = self.page.grip_arrow(MOVE, "z").pixels(metres)
         with fingers(self.page.page) as hand:
             hand.put(start)

@@ -5,6 +5,9 @@ By mouse and keys at a desk, by real touches on a phone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -22,11 +25,24 @@ pytestmark = pytest.mark.long
 PLANNED = 120.0
 """Timeout [s] of a plan on a busy machine."""
 
+LONG = "Long way"
+"""A script that is planned for longer than a busy page takes to show it."""
+
 
 @pytest.fixture
 def server(shared_server: SharedServer) -> AppServer:
     """Return the server in the state of a new one for each walk."""
     return shared_server.as_new()
+
+
+@pytest.fixture(autouse=True)
+def long_script(scripts: Path) -> Iterator[None]:
+    """Keep a script of 400 lines in the folder of the server."""
+    file = scripts / f"{LONG}.yaml"
+    there_and_back = "{line: {by: {y: 60}}}, {line: {by: {y: -60}}}"
+    file.write_text(f"steps: [{{repeat: {{times: 200, steps: [{there_and_back}]}}}}]", "utf-8")
+    yield
+    file.unlink()
 
 
 @in_sizes_and_schemes(SIZES)
@@ -54,10 +70,9 @@ def pour(person: Person) -> None:
 def planning(person: Person) -> None:
     page, truth = person.page, person.truth
     person.open_panel("Programs")
-    page.choose("Script", "Square")
+    page.choose("Script", LONG)
     person.press(page.frame.get_by_role("button", name="Preview", exact=True))
     page.wait_until(lambda: bar(page, "headline").startswith("Planning"), "the planning")
-    # Pictures and checks of a large window take longer than this planning.
     person.button("Cancel", inside="#orders")
     page.wait_until(lambda: "Planning" not in bar(page, "headline"), "the end", seconds=20.0)
     person.assert_stop_is_free()
