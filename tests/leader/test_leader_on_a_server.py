@@ -161,7 +161,10 @@ def test_lag_behind_a_sine(
         shown.process.wait(10.0)
     t, wave, q = (np.array(each) for each in zip(*rows, strict=True))
     found = [lag(t, sign * wave, q[:, axis]) for axis, sign in ((0, -1), (2, 1), (4, -1))]
-    amplitude = float(np.ptp(q[:, 0]) / np.ptp(wave))
+    # The arm overshoots where the processes got no time for a moment, so most periods count.
+    period = np.floor((t - t[0]) * SINE[1])
+    amplitudes = [np.ptp(q[period == each, 0]) for each in range(5)]
+    amplitude = float(np.median(amplitudes) / np.ptp(wave))
     with capsys.disabled():
         print(f"\nlag {1e3 * max(found):.0f} ms, amplitude {amplitude:.1%}")
     assert max(found) < MAX_LAG
