@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.exchange.tools import PINOCCHIO, PYBULLET
+from tests.exchange.tools import PINOCCHIO
 
 TESTS = Path(__file__).parents[1]
 
 PAGE = (TESTS.parent / "docs" / "exchange.md").read_text(encoding="utf-8")
 
 USED = {
-    "PyBullet": PYBULLET.name.partition("==")[2],
     "pinocchio": PINOCCHIO.name.partition("==")[2],
     "MuJoCo": version("mujoco-core"),
     "yourdfpy": version("yourdfpy"),
@@ -53,7 +52,7 @@ def rows() -> list[dict[str, str]]:
 def test_every_program_has_a_test() -> None:
     """Each row names files of tests, which exist and name the program."""
     table = rows()
-    assert len(table) > 20
+    assert len(table) > 16
     for row in table:
         files = re.findall(r"`([^`]+)`", row["test"])
         assert bool(files) != (row["program, version"] in NOT_TESTED), row

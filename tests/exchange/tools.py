@@ -79,7 +79,7 @@ X_ITE = Package("x_ite@15.0.1", "package/dist/x_ite.min.js")
 """A browser of VRML and X3D worlds."""
 
 THREE = Package("three@0.187.0", "package/build/three.module.js")
-"""A library that draws scenes in browsers, with loaders of GLB and VRML."""
+"""A library that draws scenes in browsers, with loaders of meshes."""
 
 GLTF_VALIDATOR = Package("gltf-validator@2.0.0-dev.3.10", "package/index.js")
 """The validator of the makers of glTF."""
@@ -89,12 +89,6 @@ ROSLIB = Package("roslib@2.1.0", "node_modules/roslib/dist/RosLib.js", alone=Fal
 
 NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ROSLIB)
 """Packages of npm; nothing of them is executed when they are unpacked."""
-
-PYBULLET = Package("pybullet==3.2.7", "pybullet*.so")
-"""A simulator of robots; its wheel of 103 MB is too large for the other tests."""
-
-VTK = Package("vtk==9.7.2", "vtkmodules/__init__.py")
-"""A library that reads VRML worlds."""
 
 PINOCCHIO = Package(
     "pin==4.1.0", "cmeel.prefix/lib/python*/site-packages/pinocchio/__init__.py", alone=False
@@ -112,7 +106,7 @@ ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 FOXGLOVE = Package("foxglove-sdk==0.30.3", "foxglove/__init__.py")
 """The server for Foxglove of the extra `foxglove`, 54 MB."""
 
-WHEELS = (PYBULLET, VTK, PINOCCHIO, OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
+WHEELS = (PINOCCHIO, OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
@@ -133,11 +127,6 @@ def missing(names: Sequence[str]) -> list[str]:
 def x_ite() -> Path | None:
     """Return the path of its script, if present."""
     return X_ITE.file
-
-
-def vtk_folder() -> Path | None:
-    """Return the folder of its modules, if present."""
-    return VTK.folder if VTK.file else None
 
 
 def needs(*names: str) -> pytest.MarkDecorator:
