@@ -104,19 +104,6 @@ def resume(page: ViserPage) -> None:
     page.press_in_bar("Resume")
 
 
-def set_speed(page: ViserPage, percent: float) -> None:
-    """Set the maximum speed by the slider of our page."""
-    page.page.evaluate(
-        """(percent) => {
-            const slider = document.querySelector("#speed input, input#speed");
-            slider.value = percent;
-            for (const kind of ["input", "change"])
-                slider.dispatchEvent(new Event(kind, { bubbles: true }));
-        }""",
-        percent,
-    )
-
-
 def camera(page: ViserPage) -> Any:
     body = page.sent("ViewerCameraMessage")[-1].body
     return np.array([body["position"], body["look_at"]])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from playwright.sync_api import Route, Worker
+from playwright.sync_api import Worker
 
 from katana450.client import connect
 from katana450.server.api import answers
@@ -20,7 +20,7 @@ from tests.browser.camera import Drawing
 from tests.browser.conftest import OpenPage, Windows
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, ATTENTIVE_APP, AppServer
-from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, set_speed, take
+from tests.browser.session import MOVE, Truth, bar, camera, clear_stop, take
 from tests.browser.test_app import Robot
 from tests.gateway.slow_link import DelayedLink, SlowLink
 
@@ -133,69 +133,6 @@ def test_silent_connection_is_reported_and_the_arm_stops(attentive: Attentive) -
     line.cut = False
     page.page.wait_for_selector("#banner", state="hidden", timeout=10_000)
     clear_stop(page, truth)
-
-
-def begin_drag(page: ViserPage, truth: Truth) -> None:
-    """Begin a drag whose mouse button stays pressed, and return once the arm moves.
-
-    A browser with too little processor time may exceed the heartbeat timeout before that.
-    """
-    for _ in range(3):
-        page.grip_arrow(MOVE, "z").__enter__().sweep(0.1, 4)
-        page.wait_until(lambda: truth.status()["moving"] or truth.status()["stopped"], "motion")
-        if truth.status()["stopped"] is None:
-            return
-        page.page.mouse.up()
-        print("Stopped before the reload:", truth.status()["stopped"])
-        clear_stop(page, truth)
-    raise AssertionError("The arm was stopped each time before the page was reloaded.")
-
-
-SLOW = 0.05
-"""Fraction of full speed at which the arm still moves after the reload."""
-
-
-@pytest.mark.long
-def test_reload_during_a_drag_stops_the_arm_with_a_reason(open_page: OpenPage) -> None:
-    with AppServer(ATTENTIVE_APP) as server:
-        truth = Truth(server)
-        page = open_page(server.url, nodes=("/arm", MOVE))
-        take(page)
-        set_speed(page, 100 * SLOW)
-        truth.wait(speed=SLOW)
-        begin_drag(page, truth)
-        name = truth.status()["holder"]
-        goal = truth.status()["goal"]
-        # The mouse button stays pressed, so the drag never ends.
-        held: list[Route] = []
-
-        def hold(route: Route) -> None:
-            held.append(route)
-
-        page.page.route("**/enter", hold)
-        page.page.reload(wait_until="commit")
-        truth.wait(5.0, stop="confirmed")
-        reasons = ("closed the window", "lost the connection", "fell silent")
-        why = truth.status()["stopped"]
-        assert why in {f"{name} {reason} while the arm moved." for reason in reasons}, why
-        truth.wait(5.0, moving=False)
-        rest = truth.status()["q"]
-        assert not np.allclose(rest, goal, atol=1e-3)
-        page.page.mouse.up()
-        page.wait_until(lambda: held, "the page to come back")
-        held[0].continue_()
-        page.page.unroute("**/enter")
-        page.page.locator("#why", has_text=why).wait_for()
-        assert bar(page, "headline") == "Stopped"
-        assert "Nothing moves until" in bar(page, "why")
-        page.page.wait_for_timeout(200)
-        assert truth.status()["q"] == rest
-        # Clear stop starts no motion either.
-        page.page.locator("#clear-stop").click()
-        truth.wait(stopped=None)
-        page.page.wait_for_timeout(200)
-        assert truth.status()["q"] == rest
-        assert page.errors == []
 
 
 @pytest.mark.long

@@ -137,34 +137,6 @@ def test_clicked_object_is_removed_by_delete_and_returns(
     page.page.wait_for_selector("#selection", state="hidden")
 
 
-@pytest.mark.long
-def test_drag_is_undone_but_never_past_a_stop(page: ViserPage, truth: Truth) -> None:
-    start = np.array(truth.status()["goal"])
-    page.drag_arrow(MOVE, "y", 0.1)
-    truth.wait(10.0, moving=False)
-    moved = np.array(truth.status()["goal"])
-    assert np.abs(moved - start).max() > 0.05
-    page.page.click("#help-button")
-    newest = page.page.locator("#undoable li").first
-    page.wait_until(lambda: newest.text_content() == "arm (drag)", "the list")
-    page.page.click("#help button.main")
-    page.page.mouse.click(60, 200)
-    # The focus is in viser's document.
-    page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: np.allclose(truth.status()["q"], start, atol=1e-6), "the way back")
-    page.drag_arrow(MOVE, "y", -0.1)
-    truth.wait(10.0, moving=False)
-    moved = np.array(truth.status()["q"])
-    page.page.keyboard.press("Space")
-    truth.wait(mood="stopped")
-    page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: "stopped" in bar(page, "toast"), "the refusal")
-    clear_stop(page, truth)
-    page.page.keyboard.press("Control+z")
-    page.wait_until(lambda: "nothing to undo" in bar(page, "toast"), "the refusal")
-    assert np.allclose(truth.status()["q"], moved, atol=1e-6)
-
-
 def test_chosen_file_is_refused_or_placed_changed_and_removed(
     page: ViserPage, reader: Client, tmp_path: Path, artefacts: Path
 ) -> None:

@@ -18,7 +18,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.planning.plan import Plan
-from tests.general_arms.driven import TICK, begun, pose, session_of
+from tests.general_arms.driven import TICK, begun, session_of
 from tests.general_arms.published_arms import (
     IIWA_7,
     KR_6,
@@ -99,12 +99,6 @@ def middle(chain: Chain) -> FloatArray:
 def length(chain: Chain) -> float:
     """Return a length [mm] that the arm can move its tool in every direction."""
     return 25.0 if chain.n == 4 else 80.0
-
-
-def angles_beside(chain: Chain, turn: tuple[float, float, float]) -> str:
-    """Return fields with the angles of the ready posture, turned by a rotation vector [rad]."""
-    R = pose(session_of(chain), begun(session_of(chain)))[:3, :3]
-    return angles_of(so3.exp(np.array(turn)) @ R)
 
 
 def angles_of(R: FloatArray) -> str:
