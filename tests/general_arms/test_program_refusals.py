@@ -35,15 +35,13 @@ from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, PU
 
 
 @every({"UR5e": UR5E, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}, {"KR 6": KR_6, "Panda": PANDA})
-def test_line_beyond_the_reach_is_refused_with_the_place_and_what_works(chain: Chain) -> None:
+def test_line_beyond_the_reach_is_refused_with_the_place(chain: Chain) -> None:
     with pytest.raises(ScriptError) as refused:
         program(chain, "line: {by: {x: 1900}}")
     text = str(refused.value)
     assert "% along it, at (" in text
     assert "mm in the base frame" in text
     assert " mm, because its links reach no farther" in text
-    remedy = text.split("as far as `")[1].split("`", maxsplit=1)[0]
-    assert plans(program(chain, f"line: {{{remedy}}}"))
 
 
 WRIST = {

@@ -1,4 +1,4 @@
-"""Test the messages about places and paths out of reach: the amount, the cause, and what works."""
+"""Test the messages about places and paths out of reach: the amount, the cause, and the nearest."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_roll_beyond_its_limit_is_named(begin: PlanState) -> None:
     why = said(begin, target)
     assert "the roll is 3.5 deg beyond what the arm can have" in why
     assert "axis 5, wrist roll, is at its limit of 171.5 deg" in why
-    found = re.search(r"`roll: (\S+)`", why)
+    found = re.search(r"roll: ([\d.]+)}`", why)
     assert found is not None
     assert float(found[1]) == pytest.approx(171.5, abs=0.1)
 
@@ -143,10 +143,19 @@ def test_object_out_of_reach_is_reported_in_the_frame_of_the_script(stage: Stage
     assert "mm in the base frame" in why
 
 
-def test_a_line_is_suggested_up_to_the_limit_before_the_end_of_the_reach(stage: Stage) -> None:
+def test_nearest_place_is_possible(stage: Stage) -> None:
+    move = "steps:\n  - move: "
+    with pytest.raises(ScriptError) as refused:
+        compiled(parse(f"{move}{{x: 700, y: 0, z: 0}}"), stage.plan_context, stage.begin())
+    _, remedy, rest = str(refused.value).split("`")
+    assert rest == " with this pitch."
+    compiled(parse(f"{move}{remedy}"), stage.plan_context, stage.begin())
+
+
+def test_farthest_place_of_a_line_is_named(stage: Stage) -> None:
     """At 78 % the arm is stretched; axis 2 is at its limit long before."""
-    line = "steps:\n  - line: "
-    with pytest.raises(ScriptError, match=r"78\.7 % along it") as refused:
-        compiled(parse(line + "{by: {z: -500}}"), stage.plan_context, stage.begin())
-    _, remedy, _ = str(refused.value).split("`")
-    compiled(parse(f"{line}{{{remedy}}}"), stage.plan_context, stage.begin())
+    why = refusal(stage, "  - line: {by: {z: -500}}\n", "shoulder")
+    assert "78.7 % along it" in why
+    assert re.search(
+        r"Farthest out of reach is \(.*\) mm .*, 100 % along it: \S+ mm, because ", why
+    )

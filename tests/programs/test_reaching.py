@@ -17,7 +17,6 @@ from katana450.extensions.programs.script.script import parse
 from tests.programs.conftest import Stage
 
 PLACE = "frame: {frame}\nsteps:\n  - move: {{x: {x}, y: {y}, z: {z}, pitch: {pitch}, roll: 0}}\n"
-PITCH = re.compile(r"`pitch: (\S+?)`")
 POINT = re.compile(r"`\{x: (\S+), y: (\S+), z: (\S+)\}`")
 
 
@@ -44,18 +43,14 @@ def refusal(begin: PlanState, frame: str, p: tuple[float, ...], pitch: float) ->
 @pytest.mark.parametrize("frame", ["shoulder", "base"])
 def test_suggested_places_are_reached(begin: PlanState, frame: str) -> None:
     rng = np.random.default_rng(19)
-    pitches = points = 0
+    points = 0
     for _ in range(60):
         *p, pitch = np.round(rng.uniform((-600, -600, -300, -90), (700, 600, 600, 90)), 1).tolist()
         why = refusal(begin, frame, tuple(p), pitch)
-        if found := PITCH.search(why):
-            pitches += 1
-            assert refusal(begin, frame, tuple(p), float(found[1])) == ""
         if found := POINT.search(why):
             points += 1
             assert refusal(begin, frame, tuple(map(float, found.groups())), pitch) == ""
         assert not why or f"({p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f}) mm in the {frame} frame" in why
-    assert pitches > 2
     assert points > 20
 
 

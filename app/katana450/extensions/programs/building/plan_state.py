@@ -22,7 +22,7 @@ from katana450.extensions.programs.language.step_target import ScriptFrame, Step
 from katana450.extensions.programs.planning.approach import Approach
 from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.hand_planning import HandPlanning, hand_of
-from katana450.extensions.programs.planning.out_of_reach import unreached
+from katana450.extensions.programs.planning.out_of_reach import unfollowed, unreached
 from katana450.extensions.programs.planning.tool_planning import ToolPlanning
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry import se3
@@ -364,6 +364,13 @@ class PlanState:
         T = self.plan_context.T_base_shoulder
         frame = ScriptFrame.of(T, in_base=False) if self.frame is None else self.frame
         return unreached(self.planning, self.q, target, branch, frame)
+
+    def unfollowed(self, refused: InputError, curve: Curve, branch: AnyBranch) -> InputError:
+        """Return ``refused`` with the place of ``curve`` that is farthest out of reach."""
+        if self.frame is None or self.given_up:
+            # With another grasp. Only the refusal with the first one is shown.
+            return refused
+        return unfollowed(self.planning, self.q, refused, curve, branch, self.frame)
 
     def branches(self, wanted: AnyBranch | None) -> Sequence[AnyBranch]:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""

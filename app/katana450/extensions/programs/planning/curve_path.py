@@ -12,7 +12,6 @@ a singularity, as a drag does, and never leaps.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final, NamedTuple
@@ -379,19 +378,6 @@ def septics(places: FloatArray, left: FloatArray, right: FloatArray) -> FloatArr
     return terms
 
 
-class LostPathError(PathError):
-    """A curve that an arm can follow only in part.
-
-    Attributes:
-        sigma: the place up to which it can.
-    """
-
-    def __init__(self, text: str, point: Sequence[float], sigma: float) -> None:
-        """Name ``point`` in ``text``."""
-        super().__init__(text, point)
-        self.sigma = sigma
-
-
 class _Place(NamedTuple):
     """A place on the curve, and the posture there."""
 
@@ -524,15 +510,13 @@ class CurveSearch:
         if refusal is not None:
             place, why = refusal
             remedy = "Shift the path, give it another orientation, or begin on another branch."
-            raise LostPathError(f"{why} {remedy}", self._point(place), place)
+            raise PathError(f"{why} {remedy}", self._point(place))
 
-    def _refusal(self, sigma: float, near: RegularPosture | None) -> LostPathError:
+    def _refusal(self, sigma: float, near: RegularPosture | None) -> PathError:
         """Return the refusal of a curve that leads on from ``near``, at ``sigma``, to an edge."""
         where, point = at_place(sigma), self._point(sigma)
         if near is None:
-            return LostPathError(
-                f"The tool is not at the start of the path, {where}.", point, sigma
-            )
+            return PathError(f"The tool is not at the start of the path, {where}.", point)
         u, _, vt = np.linalg.svd(near.matrix)
         last = min(near.matrix.shape) - 1
         taking_part = np.flatnonzero(np.abs(vt[last]) > TAKES_PART).tolist()
@@ -550,7 +534,7 @@ class CurveSearch:
                 "moving the tool, and would have to turn at once. Lead the path around that "
                 "place, give it another orientation, or use `move`, which keeps to no line."
             )
-        return LostPathError(text, point, sigma)
+        return PathError(text, point)
 
     def _point(self, sigma: float) -> list[float]:
         x, y, z = self.curve.at(Jet.variable(sigma)).target.position.tolist()

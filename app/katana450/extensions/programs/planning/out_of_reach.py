@@ -1,21 +1,21 @@
-"""Messages about places and paths out of reach: by how much, what binds, and what works."""
+"""Messages about places and paths out of reach: by how much, what binds, and the nearest place."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from katana450.arm.control.messages import axis_names
+from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.language.kinds import XYZ
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.tool_planning import EXACT, ToolPlanning
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import AnyBranch, Branch
@@ -41,9 +41,6 @@ SAMPLES = 65
 
 CLEAR_TURN = math.radians(1.0)
 """[rad] Error of the orientation that is reported beside one of the position."""
-
-Reached = Callable[[ToolTarget], bool]
-"""Returns whether the tool can be at a target."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,21 +123,44 @@ def unreached(
     )
     # Only the roll may be missed.
     moved = positioned if positioned.errors[:2] == (0.0, 0.0) else oriented
-
-    def reached(other: ToolTarget) -> bool:
-        return planning.joints(q, other, branch) is not None
-
-    works = [*_turns(target, positioned, moved, frame, reached)]
-    for text, p in near_points(frame, moved.pose.position):
-        if reached(target.moved(frozen(p))):
-            works.append(f"at `{text}` with {planning.orientation}")
+    remedy = ""
+    for text, place in near_places(frame, target, moved.pose):
+        if planning.joints(q, place, branch) is not None:
+            is_turned = (place.pitch, place.roll) != (target.pitch, target.roll)
+            kept = "" if is_turned else f" with {planning.orientation}"
+            remedy = f" It can be at `{text}`{kept}."
             break
-    remedy = f" It can be {' or '.join(works)}." if works else ""
     missed = _missed(moved)
     if not missed:
         # The nearest posture takes it, but on another branch.
         return f"{why}: it is reached on the branch {moved.projection.branch} only.{remedy}"
     return f"{why}: {missed}, because {binding(planning, moved)}.{remedy}"
+
+
+def unfollowed(
+    planning: ToolPlanning,
+    q: FloatArray,
+    refused: InputError,
+    curve: Curve,
+    branch: AnyBranch,
+    frame: ScriptFrame,
+) -> InputError:
+    """Return ``refused`` with the place of the path that is farthest out of reach.
+
+    A refusal for a contact, or for another reason than the path, is returned unchanged.
+
+    Args:
+        planning: that of the tool.
+        q: (n,) joint angles at the start of the path [rad].
+        refused: why the tool cannot follow the path.
+        curve: the path.
+        branch: the branch of the joints on the path.
+        frame: the frame of the script.
+    """
+    if isinstance(refused, BlockedError) or not isinstance(refused, PathError):
+        return refused
+    text = refused.text + farthest(planning, q, curve, branch, frame)
+    return PathError(text, refused.point, parts=refused.parts)
 
 
 def farthest(
@@ -211,13 +231,25 @@ def near(value: float) -> Iterator[float]:
         yield round(multiple * STEP, 6)
 
 
-def near_points(frame: ScriptFrame, p: FloatArray) -> Iterator[tuple[str, FloatArray]]:
-    """Yield points near ``p`` (3,) [m] in {S}, whose numbers are short: as text, and in {S} [m]."""
-    for point in itertools.product(*(near(coordinate) for coordinate in frame.shown(p).tolist())):
-        place = ", ".join(
-            f"{name}: {coordinate:g}" for name, coordinate in zip(XYZ, point, strict=True)
-        )
-        yield f"{{{place}}}", frame.point(np.array(point))
+def near_places(
+    frame: ScriptFrame, target: ToolTarget, pose: ToolTarget
+) -> Iterator[tuple[str, ToolTarget]]:
+    """Yield places near ``pose`` whose numbers are short: as text of a script, and as target.
+
+    The orientation is that of ``target``, except for a pitch and a roll in which ``pose`` differs.
+    """
+    names = [
+        name
+        for name in ("pitch", "roll")
+        if target.is_pitched and abs(getattr(pose, name) - getattr(target, name)) > EXACT
+    ]
+    angles = [math.degrees(getattr(pose, name)) for name in names]
+    for numbers in itertools.product(*map(near, (*frame.shown(pose.position).tolist(), *angles))):
+        fields = zip((*XYZ, *names), numbers, strict=True)
+        text = ", ".join(f"{name}: {number:g}" for name, number in fields)
+        turned = dict(zip(names, np.radians(numbers[3:]).tolist(), strict=True))
+        place = target.moved(frozen(frame.point(np.array(numbers[:3]))))
+        yield f"{{{text}}}", replace(place, **turned)
 
 
 def _smallest(target: ToolTarget) -> float:
@@ -250,36 +282,3 @@ def _links(planning: ToolPlanning, q: FloatArray) -> str:
         if abs(elbow) <= LIMIT_SLACK:
             return "the arm is stretched"
     return "its links reach no farther"
-
-
-def _turns(
-    target: ToolTarget,
-    positioned: NearestPlace,
-    moved: NearestPlace,
-    frame: ScriptFrame,
-    reached: Reached,
-) -> Iterator[str]:
-    """Yield texts to copy, each with an orientation that the tool can have at ``target``.
-
-    ``positioned``: the nearest place that keeps the position. ``moved``: the place in the message.
-    """
-    if target.is_pitched:
-        pose, rolled = positioned.pose, moved.pose
-        for pitch in near(math.degrees(pose.pitch)):
-            if reached(replace(target, pitch=math.radians(pitch))):
-                yield f"with `pitch: {pitch:g}`"
-                break
-        missed = moved.projection.roll_error > EXACT
-        for roll in near(math.degrees(rolled.roll)) if missed else ():
-            if reached(replace(target, roll=math.radians(roll))):
-                yield f"with `roll: {roll:g}`"
-                break
-        return
-    best = positioned.projection
-    if len(best.q) < 6 or best.position_error > POSITION_WORTH_TELLING:
-        return
-    R = frame.T[:3, :3]
-    roll, pitch, yaw = np.round(np.degrees(so3.to_rpy(R @ best.T[:3, :3])), 1) + 0.0
-    turned = R.T @ so3.from_rpy(*np.radians((roll, pitch, yaw)))
-    if reached(replace(target, rotation=frozen(turned))):
-        yield f"with `roll: {roll:g}, pitch: {pitch:g}, yaw: {yaw:g}`"

@@ -17,10 +17,10 @@ import numpy as np
 
 from katana450.arm.control.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
-from katana450.errors import InputError
+from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.language.step_target import Angles
-from katana450.extensions.programs.planning.curve_path import CurveSearch, LostPathError, ToolPath
+from katana450.extensions.programs.planning.curve_path import CurveSearch, ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
     ToolScrew,
@@ -287,17 +287,16 @@ class ToolPlanning:
         if tool.branch_of(q) != str(branch) or max(self.at(q).apart(start)) > EXACT:
             first = self.on_branch(q, start, branch)
             if first is None:
-                raise LostPathError(
+                raise PathError(
                     f"The path begins out of reach on the branch {branch}, at {{point}}. Move it "
                     "nearer to the arm, or give it another orientation.",
                     start.position.tolist(),
-                    0.0,
                 )
             q = first
         equations = tool.equations(q)
         try:
             return CurveSearch(equations, curve, q, np.zeros(len(equations.locked))).path()
-        except LostPathError as error:
+        except PathError as error:
             refusal = error
         if not equations.locked or not self._may_swing(q, curve, branch):
             raise refusal
@@ -306,7 +305,7 @@ class ToolPlanning:
             if chain.lower[swivel] <= q[swivel] + swing <= chain.upper[swivel]:
                 turns = np.zeros(len(equations.locked))
                 turns[0] = swing
-                with suppress(LostPathError):
+                with suppress(PathError):
                     return CurveSearch(equations, curve, q, turns).path()
         raise refusal
 

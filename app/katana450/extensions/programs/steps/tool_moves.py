@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any
@@ -14,12 +14,6 @@ from katana450.arm.control.session import TOOL_SPEED
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.building.unfollowed import (
-    ANGLE,
-    arc_remedies,
-    line_remedies,
-    unfollowed,
-)
 from katana450.extensions.programs.language.kinds import (
     DIRECTION,
     LENGTH,
@@ -109,8 +103,7 @@ class Line(Step, word="line"):
             branch, frame = plan.branches(None)[0], plan.frame
             if self.to is not None and frame is not None and frame.looks_like_metres(end.position):
                 raise InputError(plan.unreached(end, branch)) from error
-            remedies = line_remedies(plan, start, end, error)
-            raise unfollowed(plan, error, line, branch, remedies) from error
+            raise plan.unfollowed(error, line, branch) from error
 
 
 @dataclass(frozen=True)
@@ -186,45 +179,24 @@ class _Turn(Step):
     def follow(
         self, plan: PlanState, arc: Curve, name: str, branch: AnyBranch | None = None
     ) -> PlanState:
-        """Move to the start of ``arc`` if the arm is not there, then along it."""
+        """Move to the start of ``arc`` if the arm is not there, then along it.
+
+        Raises InputError if the tool cannot follow it.
+        """
         planning = plan.planning
 
         def path(plan: PlanState, arc_branch: AnyBranch) -> Path:
             curve = roomiest(planning.chain, arc_branch, arc) if self.is_roomiest else arc
             return planning.path(plan.q, curve, arc_branch)
 
-        tool_path = plan.choose(plan.branches(branch), path)
-        plan = plan.move_to(tool_path.start, f"{name}: to its start")
-        return plan.follow([tool_path], name, self.feed)
-
-    def follow_or_advise(
-        self,
-        plan: PlanState,
-        arc: Callable[[ToolTarget, float], Curve],
-        end: ToolTarget,
-        size: tuple[str, float],
-        branch: AnyBranch | None = None,
-    ) -> PlanState:
-        """Follow ``arc`` to the orientation of ``end``. Raises InputError with what works instead.
-
-        ``arc`` gives the arc for a target and a fraction of its ``size``; see ``arc_remedies``.
-        """
-        name = "arc" if size[0] == ANGLE else "circle"
-
         try:
-            return self.follow(plan, arc(end, 1.0), name, branch)
+            tool_path = plan.choose(plan.branches(branch), path)
+            start = plan.move_to(tool_path.start, f"{name}: to its start")
+            return start.follow([tool_path], name, self.feed)
         except InputError as error:
             if self.is_roomiest:
                 raise
-            first = plan.branches(branch)[0]
-            # Eight branches would take long.
-            arc_branch = branch if end.is_pitched else first
-
-            def build(target: ToolTarget, fraction: float) -> PlanState:
-                return self.follow(plan, arc(target, fraction), name, arc_branch)
-
-            remedies = arc_remedies(end, build, size, error)
-            raise unfollowed(plan, error, arc(end, 1.0), first, remedies) from error
+            raise plan.unfollowed(error, arc, plan.branches(branch)[0]) from error
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -243,12 +215,8 @@ class Arc(_Turn, word="arc"):
         """Plan the arc. Raises InputError if the tool cannot follow it."""
         start, end = plan.target, self.turned(plan)
         centre, axis = self.seen(plan)
-
-        def arc(end: ToolTarget, fraction: float) -> Curve:
-            angle, climb = fraction * self.angle, fraction * self.climb
-            return arc_between(centre, axis, angle, climb, start, end)
-
-        return self.follow_or_advise(plan, arc, end, (ANGLE, math.degrees(self.angle)))
+        arc = arc_between(centre, axis, self.angle, self.climb, start, end)
+        return self.follow(plan, arc, "arc")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -280,15 +248,10 @@ class Circle(_Turn, word="circle"):
             # A level circle has no highest point: start at the point farthest in front.
             front = plan.direction(np.array((1.0, 0.0, 0.0)), in_base=True)
             out = front - (front @ normal) * normal
-        turn = math.tau * self.turns
-
-        def arc(end: ToolTarget, fraction: float) -> Curve:
-            start = centre + fraction * self.radius / math.hypot(*out) * out
-            start_target = end.moved(frozen(start))
-            return arc_between(centre, normal, turn, 0.0, start_target, start_target)
-
-        size = "radius", 1e3 * self.radius
-        return self.follow_or_advise(plan, arc, self.turned(plan), size, self.branch)
+        point = centre + self.radius / math.hypot(*out) * out
+        start = self.turned(plan).moved(frozen(point))
+        arc = arc_between(centre, normal, math.tau * self.turns, 0.0, start, start)
+        return self.follow(plan, arc, "circle", self.branch)
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,4 +284,4 @@ class Screw(Step, word="screw"):
         try:
             return plan.lead([screw], "screw")
         except InputError as error:
-            raise unfollowed(plan, error, screw, branch, iter(())) from error
+            raise plan.unfollowed(error, screw, branch) from error
