@@ -9,9 +9,8 @@ import time
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.extensions.rosbridge.channel import Endpoint, RosChannel
+from katana450.extensions.rosbridge.channel import RosChannel
 from katana450.extensions.rosbridge.publications import Publications
-from katana450.extensions.rosbridge.servoing import Units
 from katana450.server.service.budget import Budgets
 from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
@@ -42,8 +41,8 @@ class SilentLine:
 def test_error_while_goals_continue_ends_the_connection(caplog: pytest.LogCaptureFixture) -> None:
     async def ask() -> list[tuple[int, str]]:
         hub, line = Hub(time.monotonic), SilentLine()
-        endpoint = Endpoint(Publications(hub, lambda: ""), Units.UNITLESS)
-        channel = RosChannel(hub, line, Budgets(hub.clock).of("a"), endpoint)
+        publications = Publications(hub, lambda: "")
+        channel = RosChannel(hub, line, Budgets(hub.clock).of("a"), publications)
         client = hub.join(Identity("session", "A client", Role.OPERATOR), "a", channel.notify)
 
         def fail() -> bool:

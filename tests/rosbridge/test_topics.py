@@ -1,9 +1,8 @@
-"""Topics and the services of rosapi describe the arm and the server."""
+"""Topics and lists describe the arm and the server."""
 
 from __future__ import annotations
 
 import asyncio
-import json
 import time
 from typing import Any
 
@@ -59,7 +58,7 @@ def test_topics_describe_the_arm_as_it_is(server: AppServer, robot: Robot) -> No
     asyncio.run(act())
 
 
-def test_rosapi_lists_what_there_is(server: AppServer) -> None:
+def test_topics_services_and_actions_are_listed(server: AppServer) -> None:
     async def act() -> None:
         async with ros(server.url, watches=False) as client:
             topics = (await client.call("/rosapi/topics"))["values"]
@@ -67,20 +66,8 @@ def test_rosapi_lists_what_there_is(server: AppServer) -> None:
                 "tf2_msgs/msg/TFMessage"
             )
             services = (await client.call("/rosapi/services"))["values"]["services"]
-            for service in services:
-                answer = await client.call("/rosapi/service_type", {"service": service})
-                kind = answer["values"]["type"]
-                found = (await client.call("/rosapi/services_for_type", type=kind))["values"]
-                assert service in found["services"]
+            assert {"/stop", "/hold", "/clear_stop", "/rosapi/topics"} <= set(services)
             servers = (await client.call("/rosapi/action_servers"))["values"]["action_servers"]
             assert servers == [FOLLOW, GRIPPER]
-            given = await client.call("/rosapi/get_param", name="robot_description")
-            assert json.loads(given["values"]["value"]).startswith("<?xml")
-            now = (await client.call("/rosapi/get_time"))["values"]["time"]
-            assert abs(now["sec"] - time.time()) < 5.0
-            kind = (await client.call("/rosapi/topic_type", topic="/tf"))["values"]["type"]
-            answer = await client.call("/rosapi/topics_for_type", {"type": "tf2_msgs/TFMessage"})
-            assert answer["values"]["topics"] == ["/tf", "/tf_static"]
-            assert kind == "tf2_msgs/msg/TFMessage"
 
     asyncio.run(act())

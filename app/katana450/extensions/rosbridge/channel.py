@@ -7,13 +7,13 @@ import logging
 import math
 from collections.abc import Callable, Coroutine
 from contextlib import nullcontext, suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError, KatanaError, LeaseError
-from katana450.extensions.rosbridge import names, ops, rosapi
+from katana450.extensions.rosbridge import names, ops
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GripperGoal
 from katana450.extensions.rosbridge.messages import (
@@ -23,7 +23,7 @@ from katana450.extensions.rosbridge.messages import (
     TwistStamped,
 )
 from katana450.extensions.rosbridge.publications import Publications, Subscriptions
-from katana450.extensions.rosbridge.servoing import ServoStream, Units
+from katana450.extensions.rosbridge.servoing import ServoStream
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import driver_key
@@ -42,9 +42,6 @@ MAX_GOALS = 4
 """Maximum number of goals of one client at a time."""
 
 ERROR_TEXT = "The server had an internal error; see its log."
-
-LEVELS = ("info", "warning", "error", "none")
-"""Levels of status messages, from the most to the least verbose."""
 
 REPEAT_SECONDS = 1.0
 """[s] Time during which an equal refusal of messages of a topic is not repeated."""
@@ -66,17 +63,12 @@ class RosLine(WebSocketJsonChannel):
         await super().close(code, why)
 
 
-class Endpoint(NamedTuple):
-    """The topics of a client, and the units that it has chosen in its address."""
-
-    publications: Publications
-    units: Units
-
-
 class RosChannel(Channel):
     """Channel of one client. Messages of topics that a slow client cannot take are dropped."""
 
-    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget, endpoint: Endpoint) -> None:
+    def __init__(
+        self, hub: Hub, line: JsonChannel, budget: Budget, publications: Publications
+    ) -> None:
         t = hub.clock()
         super().__init__(
             hub,
@@ -85,13 +77,12 @@ class RosChannel(Channel):
             often=TokenBucket(RATE, BURST, t),
             bad=TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
         )
-        self._publications = endpoint.publications
-        self._subscriptions = Subscriptions(endpoint.publications.hub.clock)
-        self._stream = ServoStream(hub, self._ask, endpoint.units)
+        self._publications = publications
+        self._subscriptions = Subscriptions(hub.clock)
+        self._stream = ServoStream(hub, self._ask)
         self._goals: list[Goal] = []
         self._newest: dict[str, dict[str, Any]] = {}
         self._acting = asyncio.Event()
-        self._level = LEVELS.index("info")
         self._refused: dict[str, tuple[str, float]] = {}
         self._pinged = -math.inf
         self._ping: Callable[[], None] = getattr(line, "ping", lambda: None)
@@ -114,8 +105,6 @@ class RosChannel(Channel):
         """Queue ``notice``: an operation, or a notice of the server, which becomes a status."""
         if "op" not in notice:
             notice = status(notice.get("why", ""), level="warning")
-        if notice["op"] == "status" and LEVELS.index(notice["level"]) < self._level:
-            return
         super().notify(notice)
 
     def refuse(self, why: str, request_id: Any, **_more: float) -> None:
@@ -189,10 +178,6 @@ class RosChannel(Channel):
                 self._send_goal(participant, op)
             case ops.CancelActionGoal():
                 self._cancel_goal(op)
-            case ops.SetLevel(level=level):
-                if level not in LEVELS:
-                    raise InputError(f"There is no level {level[:40]!r}, only {', '.join(LEVELS)}.")
-                self._level = LEVELS.index(level)
 
     def _check_commanded(self, topic: str, kind: str = "") -> None:
         """Raise InputError unless clients can publish to ``topic``, with messages of ``kind``."""
@@ -233,13 +218,8 @@ class RosChannel(Channel):
             why = f"There is no service {service}. The services are {known}."
             self._respond(op, why, result=False)
             raise InputError(why)
-        if service.startswith(rosapi.ROSAPI):
-            try:
-                values = rosapi.call(service, op.args, self._publications.description)
-            except InputError as error:
-                self._respond(op, str(error), result=False)
-                raise
-            self._respond(op, values)
+        if service in names.LISTS:
+            self._respond(op, names.LISTS[service])
         elif service.endswith(names.CANCEL):
             for goal in self._goals:
                 if names.resolved(goal.action) == service.removesuffix(names.CANCEL):

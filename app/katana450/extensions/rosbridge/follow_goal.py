@@ -28,7 +28,6 @@ from katana450.extensions.rosbridge.messages import (
     FollowJointTrajectoryFeedback,
     FollowJointTrajectoryResult,
     Header,
-    JointTolerance,
     JointTrajectoryPoint,
     RosMessage,
     time_of,
@@ -88,15 +87,11 @@ class CheckedTrajectory:
     Attributes:
         times: (m,) [s], the first one 0.
         postures: (m, n) [rad], in the order of the arm's joints; the first is that of the arm.
-        path_tolerance: (n,) maximum tracking errors [rad]; infinite without one.
-        goal_tolerance: (n,) maximum errors at the end [rad]; infinite without one.
         time_tolerance: maximum delay of the end [s]; infinite without one.
     """
 
     times: FloatArray
     postures: FloatArray
-    path_tolerance: FloatArray
-    goal_tolerance: FloatArray
     time_tolerance: float
 
     @classmethod
@@ -147,8 +142,6 @@ class CheckedTrajectory:
         return cls(
             np.array([0.0, *times]),
             np.vstack((q, *postures)),
-            _tolerances(goal.path_tolerance, joints, "path_tolerance"),
-            _tolerances(goal.goal_tolerance, joints, "goal_tolerance"),
             goal.goal_time_tolerance.seconds or math.inf,
         )
 
@@ -172,15 +165,6 @@ class CheckedTrajectory:
         )
         lines = "".join(f"    - [{row}]\n" for row in rows)
         return f"name: {name}\nsteps:\n- trajectory:\n    through:\n{lines}"
-
-    def check_path(self, error: FloatArray, joints: Sequence[str]) -> None:
-        """Raise GoalError if the tracking errors ``error`` (n,) [rad] exceed the tolerance."""
-        _check_error(error, self.path_tolerance, joints, ErrorCode.PATH_TOLERANCE_VIOLATED)
-
-    def check_end(self, q: FloatArray, joints: Sequence[str]) -> None:
-        """Raise GoalError if ``q`` (n,) [rad] is too far from the last point."""
-        error = q - self.postures[-1]
-        _check_error(error, self.goal_tolerance, joints, ErrorCode.GOAL_TOLERANCE_VIOLATED)
 
     def check_time(self, seconds: float) -> None:
         """Raise GoalError if the planned duration ``seconds`` [s] exceeds the tolerance."""
@@ -235,38 +219,6 @@ def _check_stamp(stamp: float, duration: float, now: float) -> None:
         ErrorCode.OLD_HEADER_TIMESTAMP,
         f"The trajectory began {now - stamp:.1f} s ago{ended}. Send it with a stamp of 0.",
     )
-
-
-def _tolerances(
-    tolerances: Sequence[JointTolerance], joints: Sequence[str], what: str
-) -> FloatArray:
-    """Return the tolerances of positions (n,); 0 and less stand for none, as in ROS."""
-    maxima = dict.fromkeys(joints, math.inf)
-    for tolerance in tolerances:
-        if tolerance.name not in maxima:
-            raise GoalError(
-                ErrorCode.INVALID_JOINTS, f"{what} names the unknown joint {tolerance.name!r}."
-            )
-        if tolerance.velocity > 0.0 or tolerance.acceleration > 0.0:
-            raise _invalid(
-                f"{what} of {tolerance.name}: only tolerances of `position` are supported."
-            )
-        if tolerance.position > 0.0:
-            maxima[tolerance.name] = tolerance.position
-    return np.array(list(maxima.values()))
-
-
-def _check_error(
-    error: FloatArray, tolerance: FloatArray, joints: Sequence[str], code: ErrorCode
-) -> None:
-    excess = np.abs(error) - tolerance
-    worst = int(excess.argmax())
-    if excess[worst] > 0.0:
-        raise GoalError(
-            code,
-            f"{joints[worst]} is {abs(error[worst]):.3g} rad off; the tolerance is "
-            f"{tolerance[worst]:.3g} rad.",
-        )
 
 
 PLACE = re.compile(r"^line \d+, (column \d+|[^:]*): ", re.IGNORECASE)
@@ -330,10 +282,7 @@ class FollowGoal(Goal):
             case "stopped":
                 return self._canceled(now.why)
             case "done":
-                self._trajectory.check_end(self.host.arm.state.q, self._joints)
                 return self._succeeded(PLACE.sub("", now.why))
-        if self._runs:
-            self._check_path()
         return None
 
     def end(self, why: str) -> Result:
@@ -393,11 +342,6 @@ class FollowGoal(Goal):
         self._trajectory.check_time(now.seconds / state.speed)
         self.host.ask(Steer(order=ProgramOrder.RUN, revocations=self._revocations))
         self._runs, self._began = True, self.host.hub.clock()
-
-    def _check_path(self) -> None:
-        """Raise GoalError if the arm is too far from where it should be now."""
-        state = self.host.arm.state
-        self._trajectory.check_path(state.setpoint - state.q, self._joints)
 
     def _progress(self) -> answers.Progress | None:
         """Return the progress of the program; None if it is not the present one any more."""

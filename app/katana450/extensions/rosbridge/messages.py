@@ -186,27 +186,17 @@ class MultiDOFJointTrajectory(RosMessage, frozen=True, kw_only=True):
     points: Annotated[list[float], Meta(max_length=0)] = []
 
 
-class JointTolerance(RosMessage, frozen=True, kw_only=True):
-    """control_msgs/JointTolerance."""
-
-    name: str = ""
-    position: float = 0.0
-    velocity: float = 0.0
-    acceleration: float = 0.0
-
-
-Tolerances = Annotated[list[JointTolerance], Meta(max_length=64)]
 NoTolerances = Annotated[list[float], Meta(max_length=0)]
 
 
 class FollowJointTrajectory(RosMessage, frozen=True, kw_only=True):
-    """The goal of control_msgs/FollowJointTrajectory."""
+    """The goal of control_msgs/FollowJointTrajectory. Tolerances of joints must be empty."""
 
     trajectory: JointTrajectory = JointTrajectory()
     multi_dof_trajectory: MultiDOFJointTrajectory = MultiDOFJointTrajectory()
-    path_tolerance: Tolerances = []
+    path_tolerance: NoTolerances = []
     component_path_tolerance: NoTolerances = []
-    goal_tolerance: Tolerances = []
+    goal_tolerance: NoTolerances = []
     component_goal_tolerance: NoTolerances = []
     goal_time_tolerance: GivenTime = GivenTime()
 

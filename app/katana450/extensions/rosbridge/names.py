@@ -54,23 +54,18 @@ SERVICES: Final = {
     HOLD_SERVICE: TRIGGER,
     CLEAR_SERVICE: TRIGGER,
     **{action + CANCEL: "action_msgs/srv/CancelGoal" for action in ACTIONS},
-    **{
-        f"/rosapi/{name}": f"rosapi_msgs/srv/{kind}"
-        for name, kind in {
-            "topics": "Topics",
-            "topics_for_type": "TopicsForType",
-            "topic_type": "TopicType",
-            "services": "Services",
-            "services_for_type": "ServicesForType",
-            "service_type": "ServiceType",
-            "action_servers": "GetActionServers",
-            "nodes": "Nodes",
-            "get_param": "GetParam",
-            "get_time": "GetTime",
-        }.items()
-    },
+    "/rosapi/topics": "rosapi_msgs/srv/Topics",
+    "/rosapi/services": "rosapi_msgs/srv/Services",
+    "/rosapi/action_servers": "rosapi_msgs/srv/GetActionServers",
 }
 """Services that clients can call."""
+
+LISTS: Final = {
+    "/rosapi/topics": {"topics": list(TOPICS), "types": list(TOPICS.values())},
+    "/rosapi/services": {"services": list(SERVICES)},
+    "/rosapi/action_servers": {"action_servers": list(ACTIONS)},
+}
+"""Answers of the services that list what there is. Their arguments have no effect."""
 
 
 def resolved(name: str) -> str:

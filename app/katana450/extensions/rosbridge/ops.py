@@ -129,12 +129,6 @@ class CancelActionGoal(Op, frozen=True, kw_only=True):
         return FREE
 
 
-class SetLevel(Op, frozen=True, kw_only=True):
-    """Choose the status messages to receive: those of ``level`` and above."""
-
-    level: str
-
-
 AnyOp = (
     Advertise
     | Unadvertise
@@ -144,7 +138,6 @@ AnyOp = (
     | CallService
     | SendActionGoal
     | CancelActionGoal
-    | SetLevel
 )
 
 _decoder: msgspec.json.Decoder[AnyOp] = msgspec.json.Decoder(AnyOp)

@@ -16,7 +16,6 @@ from enum import Enum
 import numpy as np
 
 from katana450.arm.control.joint_commands import JOG_TIME
-from katana450.arm.control.tool_commands import MAX_ANGULAR_RATE, MAX_LINEAR_RATE
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.rosbridge.messages import (
     GivenHeader,
@@ -42,18 +41,9 @@ IMPOSSIBLE = 0.01
 motion of the arm while the command is on its way."""
 
 
-class Units(Enum):
-    """Meaning of the numbers of a command, ``command_in_type`` of MoveIt Servo."""
-
-    UNITLESS = "unitless"
-    """-1 to 1, fractions of a scale."""
-    SPEED_UNITS = "speed_units"
-    """m/s and rad/s."""
-
-
 LINEAR_SCALE, ROTATIONAL_SCALE, JOINT_SCALE = 0.4, 0.8, 0.5
-"""Speeds that the value 1 of a command without unit stands for, as MoveIt Servo comes: of the tool
-point [m/s], of pitch and roll [rad/s], of a joint [rad/s or m/s]."""
+"""Speeds that the value 1 of a command stands for, as MoveIt Servo comes: of the tool point [m/s],
+of pitch and roll [rad/s], of a joint [rad/s or m/s]."""
 
 
 def check_fresh(header: GivenHeader, now: float) -> None:
@@ -73,7 +63,6 @@ def tool_rates(
     twist: Twist,
     R_shoulder_frame: FloatArray,
     R_shoulder_pitched: FloatArray | None,
-    units: Units,
 ) -> FloatArray:
     """Return the rates of a jog along {S}.
 
@@ -81,17 +70,16 @@ def tool_rates(
     they are (6,): (x, y, z) [m/s] and the angular velocity [rad/s].
 
     Args:
-        twist: velocity of the tool point, and angular velocity of the tool.
+        twist: velocity of the tool point, and angular velocity of the tool, each from -1 to 1.
         R_shoulder_frame: (3, 3) orientation in {S} of the frame of ``twist``.
         R_shoulder_pitched: (3, 3) the axes of ``pitched_frame`` in {S}; None for an arm outside the
             five-axis family.
-        units: units of ``twist``.
 
     Raises:
         InputError: a number is out of range, or the arm has no axis for the rotation.
     """
-    linear = _scaled(twist.linear, units, LINEAR_SCALE, MAX_LINEAR_RATE, "linear", "m/s")
-    angular = _scaled(twist.angular, units, ROTATIONAL_SCALE, MAX_ANGULAR_RATE, "angular", "rad/s")
+    linear = _scaled(twist.linear, LINEAR_SCALE, "linear")
+    angular = _scaled(twist.angular, ROTATIONAL_SCALE, "angular")
     v, omega = R_shoulder_frame @ linear, R_shoulder_frame @ angular
     if R_shoulder_pitched is None:
         return np.concatenate((v, omega))
@@ -109,7 +97,7 @@ def tool_rates(
     return np.array([*v, pitch_axis @ omega, roll_axis @ omega])
 
 
-def joint_rates(jog: JointJog, joints: Sequence[str], units: Units) -> FloatArray:
+def joint_rates(jog: JointJog, joints: Sequence[str]) -> FloatArray:
     """Return the rates (n,) [rad/s or m/s] of ``joints``; those that ``jog`` does not name are 0.
 
     Raises InputError for unknown or repeated joints, and for numbers that are out of range.
@@ -123,11 +111,9 @@ def joint_rates(jog: JointJog, joints: Sequence[str], units: Units) -> FloatArra
         )
     check_joints(jog.joint_names, joints)
     velocities = dict(zip(jog.joint_names, jog.velocities, strict=True))
-    limit = 1.0 if units is Units.UNITLESS else MAX_ANGULAR_RATE
-    for name, value in velocities.items():
-        _check_range(value, limit, f"The velocity of {name}", units, "rad/s")
-    factor = JOINT_SCALE if units is Units.UNITLESS else 1.0
-    return np.array([factor * velocities.get(name, 0.0) for name in joints])
+    for name, fraction in velocities.items():
+        _check_fraction(fraction, f"The velocity of {name}")
+    return np.array([JOINT_SCALE * velocities.get(name, 0.0) for name in joints])
 
 
 def check_joints(names: Sequence[str], joints: Sequence[str]) -> None:
@@ -150,20 +136,16 @@ def rotation_of(frame: str, frames: Mapping[str, FloatArray], root: str) -> Floa
     return rotation
 
 
-def _scaled(
-    vector: Vector3, units: Units, scale: float, maximum: float, part: str, unit: str
-) -> FloatArray:
-    limit = 1.0 if units is Units.UNITLESS else maximum
-    for axis, value in (("x", vector.x), ("y", vector.y), ("z", vector.z)):
-        _check_range(value, limit, f"`{part}.{axis}`", units, unit)
-    factor = scale if units is Units.UNITLESS else 1.0
-    return factor * np.array([vector.x, vector.y, vector.z])
+def _scaled(vector: Vector3, scale: float, part: str) -> FloatArray:
+    fractions = vector.x, vector.y, vector.z
+    for axis, fraction in zip("xyz", fractions, strict=True):
+        _check_fraction(fraction, f"`{part}.{axis}`")
+    return scale * np.array(fractions)
 
 
-def _check_range(value: float, limit: float, what: str, units: Units, unit: str) -> None:
-    if not abs(value) <= limit:
-        meant = "without unit" if units is Units.UNITLESS else unit
-        raise InputError(f"{what} is {value:g}; it must be from {-limit:g} to {limit:g} {meant}.")
+def _check_fraction(fraction: float, what: str) -> None:
+    if not abs(fraction) <= 1.0:
+        raise InputError(f"{what} is {fraction:g}; it must be from -1 to 1 without unit.")
 
 
 LEAD = JOG_TIME
@@ -185,13 +167,10 @@ class ServoStream:
     STREAM_GAP: the person who steers may not have seen the stop.
     """
 
-    def __init__(
-        self, hub: Hub, ask: Callable[[requests.Request], answers.Answer], units: Units
-    ) -> None:
+    def __init__(self, hub: Hub, ask: Callable[[requests.Request], answers.Answer]) -> None:
         """Create a stream that has not begun. ``ask`` executes a request of the client."""
         self._hub = hub
         self._ask = ask
-        self._units = units
         self._motion = ServoMotion.NOTHING
         self._last = -math.inf
         self._revocations = 0
@@ -214,13 +193,13 @@ class ServoStream:
         pitched = None
         if mounted.kinematics_to(state.tool).freedoms == 5:
             pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
-        self._tool(tool_rates(message.twist, R, pitched, self._units))
+        self._tool(tool_rates(message.twist, R, pitched))
 
     def jog(self, message: JointJog) -> None:
         """Move joints. Raises KatanaError if that is refused."""
         check_fresh(message.header, time.time())
         names = axis_names(self._hub.present().robot)
-        self._joints(joint_rates(message, names, self._units))
+        self._joints(joint_rates(message, names))
 
     def _tool(self, rates: FloatArray) -> None:
         """Move the tool at ``rates``, see ``requests.Jog``. Raises KatanaError if refused."""
