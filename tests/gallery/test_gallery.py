@@ -83,10 +83,6 @@ def test_the_list_states_maker_and_licence(capsys: pytest.CaptureFixture[str]) -
     assert rows["so_arm101"].endswith("Apache-2.0")
     assert "Universal Robots" in rows["ur5e"]
     assert "9 robots" in lines[-1]
-    assert main(["arms", "--find", "kuka"]) == 0
-    assert capsys.readouterr().out.splitlines()[1].startswith("iiwa14")
-    assert main(["arms", "--find", "nobody"]) == 1
-    assert "No robot of the gallery has 'nobody'" in capsys.readouterr().err
 
 
 def test_one_robot_prints_its_file_and_its_licence(

@@ -75,17 +75,12 @@ class ListedRobot:
 
 def listed_robots() -> dict[str, ListedRobot]:
     """Return all descriptions by name. Raises ConfigurationError without the package."""
-    try:
-        descriptions = library(PACKAGE, "gallery", "Robots of the gallery").DESCRIPTIONS
-    except AttributeError as error:
-        raise ConfigurationError(
-            f"This version of {PACKAGE} has no list of robots. Install a newer one."
-        ) from error
-    repositories = _repositories()
+    descriptions = library(PACKAGE, "gallery", "Robots of the gallery").DESCRIPTIONS
+    repositories = import_module(f"{PACKAGE}._repositories").REPOSITORIES
     robots = [
         _listed(key, description, repositories) for key, description in sorted(descriptions.items())
     ]
-    return {description.name: description for description in robots}
+    return {robot.name: robot for robot in robots}
 
 
 def robot_named(name: str) -> ListedRobot:
@@ -114,28 +109,18 @@ def robot_named(name: str) -> ListedRobot:
 
 
 def _listed(key: str, description: Any, repositories: Mapping[str, Any]) -> ListedRobot:
-    # Older versions of the package lack some of these fields.
-    repository = repositories.get(getattr(description, "repository", None) or "")
+    repository = repositories.get(description.repository)
     url = "" if repository is None else repository.url.removesuffix(".git")
-    file = getattr(description, "license_file", None)
+    file = description.license_file
     return ListedRobot(
         name=key.removesuffix(ENDING),
-        robot=getattr(description, "robot", None) or key.removesuffix(ENDING),
-        maker=getattr(description, "maker", None) or "",
-        licence=getattr(description, "license_spdx", None) or "not stated",
+        robot=description.robot,
+        maker=description.maker or "",
+        licence=description.license_spdx or "not stated",
         licence_url=f"{url}/blob/{repository.commit}/{file}" if repository and file else "",
         source=url,
-        urdf=bool(description.has_urdf),
+        urdf=description.has_urdf,
     )
-
-
-def _repositories() -> Mapping[str, Any]:
-    """Return the repositories of the package by name; none if this version keeps them elsewhere."""
-    try:
-        repositories: Mapping[str, Any] = import_module(f"{PACKAGE}._repositories").REPOSITORIES
-    except (ImportError, AttributeError):
-        return {}
-    return repositories
 
 
 def _plain(name: str) -> str:
@@ -247,15 +232,6 @@ def arms(options: Namespace) -> int:
         print(f"katana450: {credit(robot)}", file=sys.stderr)
         return 0
     robots = [listed for listed in listed_robots().values() if listed.urdf]
-    if options.find is not None:
-        word = options.find.lower()
-        robots = [
-            listed
-            for listed in robots
-            if word in f"{listed.name} {listed.robot} {listed.maker}".lower()
-        ]
-        if not robots:
-            raise ConfigurationError(f"No robot of the gallery has {options.find!r} in its name.")
     rows = [(listed.name, listed.robot, listed.maker, listed.licence) for listed in robots]
     rows.insert(0, ("NAME", "ROBOT", "MAKER", "LICENCE"))
     widths = [max(len(row[column]) for row in rows) for column in range(3)]

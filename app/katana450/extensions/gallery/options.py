@@ -12,7 +12,6 @@ def add_arms_options(parser: ArgumentParser) -> None:
         "NAME, download that one if it is not here yet, and print its file and licence."
     )
     parser.add_argument("name", nargs="?", metavar="NAME", help="one robot, such as ur5e")
-    parser.add_argument("--find", metavar="WORD", help="list only names and makers with this word")
 
 
 def choose_named(options: Namespace) -> None:
