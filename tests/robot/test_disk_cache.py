@@ -24,7 +24,6 @@ from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
 from katana450.extensions.conduit.rings import Floats, poses
 from katana450.extensions.conduit.stretches import stretches_of
-from katana450.extensions.water import _glossy
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.server.view.scene import surface
@@ -277,7 +276,6 @@ def test_every_kind_of_value_is_found_again(folder: Path) -> None:
         partial(surface, visual),
         partial(visual.kept, lambda: _merged(visual), Drawn),
         partial(kept, lambda: poses(stretch, 9), Floats),
-        partial(_glossy, np.eye(3), np.zeros((1, 3), np.uint32), (1.0, 2.0, 3.0, 0.5)),
         page_routes.page_files,
         viser_page.load,
     ):

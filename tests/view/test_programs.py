@@ -240,10 +240,10 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
     # Filled, but still in its place.
     assert ghosts() == (False, True)
 
-    def filled() -> tuple[bool, bool]:
+    def filled() -> tuple[bool, ...]:
         """Return whether water is shown in the cup and in the basin."""
-        found = nodes(server)
-        return found["/path/water/cup"].visible, found["/path/water/basin"].visible
+        found = [nodes(server).get(f"/path/water/{part}") for part in ("vessel0", "basin")]
+        return tuple(part is not None and part.visible for part in found)
 
     for t in (carried, emptied):
         seen = look(t)

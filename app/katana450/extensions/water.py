@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import viser
 
 from katana450.arm.control.state import State
-from katana450.arm.robot.creases import smooth_normals
-from katana450.arm.robot.surfaces import Material, VisualMesh
-from katana450.disk_cache import kept
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment
-from katana450.maths.water.flow import VesselWater, Water, WaterFlow
+from katana450.maths.water.flow import Water, WaterFlow
 from katana450.maths.water.parcel import landing
 from katana450.maths.water.surface import (
     BODY_FACES,
@@ -26,13 +25,10 @@ from katana450.maths.water.surface import (
 )
 from katana450.maths.water.units import FEMTOLITRE, MILLILITRE
 from katana450.server.view.layer import LayerContext, ViewLayer
-from katana450.server.view.scene import Window, glb
+from katana450.server.view.scene import Window
 
 IN_VESSEL, IN_AIR, ON_TABLE = 0.58, 0.5, 0.3
 """Opacity (0 to 1) of the water in each place."""
-
-ROUGH = 0.08
-"""Roughness (0 to 1) of the faces that mirror."""
 
 WORTH_SHOWING = MILLILITRE // 20
 """Smallest amount [fl] that is shown: one drop."""
@@ -53,6 +49,51 @@ TWIST = 2.4
 """Turn [rad] from puddle to puddle, which hides that all have the same shape."""
 
 
+class WaterPart(NamedTuple):
+    """A part of the water as a mesh. One of the same name always has the same faces.
+
+    Attributes:
+        name: name among the parts: ``vessel0`` and so on, stream, basin, ``puddle0`` and so on.
+        corners: (n, 3) in the base frame [m].
+        faces: (m, 3) corners of each triangle, counterclockwise seen from outside.
+        opacity: from 0 to 1.
+    """
+
+    name: str
+    corners: FloatArray
+    faces: Faces
+    opacity: float
+
+
+def parts_of(water: Water, water_environment: WaterEnvironment) -> list[WaterPart]:
+    """Return all visible parts of the water."""
+    parts: list[WaterPart] = []
+    basin, flow = water_environment.basin, WaterFlow(water_environment)
+    level = basin.level(water.basin * FEMTOLITRE)
+    for number, held in enumerate(water.vessels):
+        vessel, T = water_environment.vessels.get(held.name), held.T
+        if vessel is not None and held.volume >= WORTH_SHOWING:
+            local = body(vessel.inside, flow.surface(held)) * INSET
+            corners = local @ T[:3, :3].T + (T[:3, 3] + vessel.floor * T[:3, 2])
+            parts.append(WaterPart(f"vessel{number}", corners, BODY_FACES, IN_VESSEL))
+    if water.parcels:
+        end = landing(water.parcels[0], water_environment, level).age
+        corners = stream(water.parcels, water_environment.cup.inside.radius, end)
+        parts.append(WaterPart("stream", corners, STREAM_FACES, IN_AIR))
+    if water.basin >= WORTH_SHOWING:
+        level = max(level, CLEAR)
+        radius, (x, y, z) = basin.radius(level), basin.at
+        corners, faces = disc()
+        corners = corners * (radius, radius, level) + (x, y, z + basin.floor)
+        parts.append(WaterPart("basin", corners, faces, IN_VESSEL))
+    for number, puddle in enumerate(water.puddles):
+        corners, faces = blob()
+        scale = puddle.radius, puddle.radius, min(puddle.radius / FLAT, 1.0)
+        corners = (corners * scale) @ so3.rotation_z(TWIST * number).T + puddle.at
+        parts.append(WaterPart(f"puddle{number}", corners, faces, ON_TABLE))
+    return parts
+
+
 class WaterLayer(ViewLayer):
     """The water as a layer of the scene, without controls."""
 
@@ -61,7 +102,6 @@ class WaterLayer(ViewLayer):
         self._server, self._session = context.server, context.session
         # Made on the first state with water.
         self._nodes: WaterNodes | None = None
-        self._water_environment: WaterEnvironment | None = None
 
     def follow(self, state: State) -> None:
         """Draw the water of ``state``; hide the nodes without water."""
@@ -73,9 +113,7 @@ class WaterLayer(ViewLayer):
         water_environment = pouring.water_environment(state.objects)
         if self._nodes is None:
             self._nodes = WaterNodes(self._server, water_environment)
-        elif water_environment is not self._water_environment:
-            self._nodes.stand(water_environment)
-        self._water_environment = water_environment
+        self._nodes.stand(water_environment)
         self._nodes.show(state.poured.water)
 
 
@@ -85,148 +123,51 @@ class WaterNodes:
     def __init__(
         self, server: Window, water_environment: WaterEnvironment, path: str = "/water"
     ) -> None:
-        """Add the hidden nodes below the new node ``path``."""
+        """Add the hidden node ``path``."""
         self._server, self._path = server, path
         self._water_environment = water_environment
-        self._flow = WaterFlow(water_environment)
         self._shown: Water | None = None
-        # The water in each vessel by its name, with the corners that were sent.
-        self._bodies: dict[str, tuple[viser.MeshHandle, FloatArray]] = {}
-        self._level = 0.0
         self._root = server.scene.add_frame(path, show_axes=False, visible=False)
-        corners = np.zeros((int(STREAM_FACES.max()) + 1, 3))
-        self._stream = self._add("stream", corners, STREAM_FACES, IN_AIR)
-        self._basin = self._add_glossy("basin", *disc(), IN_VESSEL)
-        self.stand(water_environment)
         # Made on first use: a good run spills nothing.
-        self._puddles: list[viser.GlbHandle] = []
+        self._handles: dict[str, viser.MeshHandle] = {}
 
     def stand(self, water_environment: WaterEnvironment) -> None:
         """Use the cup and the basin of ``water_environment`` from now on."""
-        self._water_environment, self._flow = water_environment, WaterFlow(water_environment)
-        x, y, z = water_environment.basin.at
-        self._basin.position = (x, y, z + water_environment.basin.floor)
+        if water_environment is not self._water_environment:
+            self._water_environment, self._shown = water_environment, None
 
     def show(self, water: Water) -> None:
         """Draw ``water``."""
-        last, self._shown = self._shown, water
-        if water is not last:
-            self._show_vessels(water, last)
-            self._show_stream(water)
-            self._show_basin(water)
-            self._show_puddles(water)
+        if water is not self._shown:
+            self._shown = water
+            parts = {part.name: part for part in parts_of(water, self._water_environment)}
+            for name, node in self._handles.items():
+                _reveal(node, name in parts)
+            for part in parts.values():
+                self._draw(part)
         _reveal(self._root, True)
 
     def hide(self) -> None:
         """Hide all water."""
         _reveal(self._root, False)
 
-    def _show_vessels(self, water: Water, last: Water | None) -> None:
-        for vessel in water.vessels:
-            before = None if last is None else last.vessel(vessel.name)
-            if before is None or not _same(vessel, before):
-                self._show_vessel(vessel)
-        for name, (node, _) in self._bodies.items():
-            if water.vessel(name) is None:
-                _reveal(node, False)
-
-    def _show_vessel(self, water: VesselWater) -> None:
-        vessel, T = self._water_environment.vessels.get(water.name), water.T
-        shown = vessel is not None and water.volume >= WORTH_SHOWING
-        node, sent = self._bodies.get(water.name, (None, None))
-        if node is not None:
-            _reveal(node, shown)
-        if vessel is None or not shown:
-            return
-        # Corners in the base frame: a moving vessel then needs one message, not two for its pose.
-        local = body(vessel.inside, self._flow.surface(water)) * INSET
-        corners = local @ T[:3, :3].T + (T[:3, 3] + vessel.floor * T[:3, 2])
+    def _draw(self, part: WaterPart) -> None:
+        corners = part.corners.astype(np.float32)
+        node = self._handles.get(part.name)
         if node is None:
-            # People name the objects, and their names may have characters that a node's may not.
-            name = f"vessel{len(self._bodies)}" if self._bodies else "cup"
-            node = self._add(name, corners.astype(np.float32), BODY_FACES, IN_VESSEL)
-        elif sent is not None and np.abs(corners - sent).max() <= WORTH_SENDING:
-            return
-        else:
-            node.vertices = corners.astype(np.float32)
-        self._bodies[water.name] = node, corners
-
-    def _show_stream(self, water: Water) -> None:
-        _reveal(self._stream, bool(water.parcels))
-        if water.parcels:
-            level = self._water_environment.basin.level(water.basin * FEMTOLITRE)
-            end = landing(water.parcels[0], self._water_environment, level).age
-            corners = stream(water.parcels, self._water_environment.cup.inside.radius, end)
-            self._stream.vertices = corners.astype(np.float32)
-
-    def _show_basin(self, water: Water) -> None:
-        basin = self._water_environment.basin
-        _reveal(self._basin, water.basin >= WORTH_SHOWING)
-        level = max(basin.level(water.basin * FEMTOLITRE), CLEAR)
-        if self._basin.visible and abs(level - self._level) > WORTH_SENDING:
-            self._level = level
-            radius = basin.radius(level)
-            self._basin.scale = (radius, radius, level)
-
-    def _show_puddles(self, water: Water) -> None:
-        for number in range(len(self._puddles), len(water.puddles)):
-            puddle = self._add_glossy(f"puddle{number}", *blob(), ON_TABLE)
-            puddle.wxyz = so3.to_quaternion(so3.exp((0.0, 0.0, TWIST * number)))
-            self._puddles.append(puddle)
-        for number, node in enumerate(self._puddles):
-            shown = number < len(water.puddles)
-            _reveal(node, shown)
-            if shown:
-                centre, radius = water.puddles[number].at, water.puddles[number].radius
-                node.position = centre
-                node.scale = (radius, radius, min(radius / FLAT, 1.0))
-
-    def _add_glossy(
-        self, name: str, corners: FloatArray, faces: Faces, opacity: float
-    ) -> viser.GlbHandle:
-        """Add water of a fixed shape as GLB, which mirrors the room; viser's meshes cannot."""
-        return self._server.scene.add_glb(
-            f"{self._path}/{name}",
-            _glossy(corners, faces, (*COLOUR, opacity)),
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-
-    def _add(
-        self, name: str, corners: FloatArray, faces: Faces, opacity: float
-    ) -> viser.MeshHandle:
-        return self._server.scene.add_mesh_simple(
-            f"{self._path}/{name}",
-            corners,
-            faces,
-            color=COLOUR,
-            opacity=opacity,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-
-
-def _same(a: VesselWater, b: VesselWater) -> bool:
-    same = a.volume == b.volume and a.slosh == b.slosh
-    return same and bool((a.T == b.T).all())
+            self._handles[part.name] = self._server.scene.add_mesh_simple(
+                f"{self._path}/{part.name}",
+                corners,
+                part.faces,
+                color=COLOUR,
+                opacity=part.opacity,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        elif np.abs(node.vertices - corners).max() > WORTH_SENDING:
+            node.vertices = corners
 
 
 def _reveal(node: viser.SceneNodeHandle, visible: bool) -> None:
     if node.visible != visible:
         node.visible = visible
-
-
-def _glossy(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:
-    """Return a GLB file of a shape that mirrors and is translucent.
-
-    look: red, green and blue (0 to 255, sRGB), and the opacity (0 to 1).
-    """
-    return kept(lambda: _exported(corners, faces, look), bytes, corners, faces, str(look))
-
-
-def _exported(corners: FloatArray, faces: Faces, look: tuple[float, ...]) -> bytes:
-    red, green, blue = (part / 255.0 for part in look[:3])
-    material = Material("water", (red, green, blue), rough=ROUGH)
-    triangles = faces.astype(np.int64)
-    shape = VisualMesh(material, corners, smooth_normals(corners, triangles), triangles)
-    return glb([shape], look[3])
