@@ -57,7 +57,7 @@ is received from that program for 1 s (`--owner-silence`). A request with `wait`
 On a connection that has become slow, samples would still move the arm after a person has let go. So
 each request may have `made`, the time of its making [s] on the client's own clock. The server compares
 both clocks by the least delay of the connection. A `jog`, `step_tool`, `nudge`, `servo` or other target
-that took 0.15 s more than that (`--sample-delay`) is refused with the reason, and a heartbeat counts as
+that took 0.15 s more than that is refused with the reason, and a heartbeat counts as
 that much older. The end of a motion is never late: a `jog` with zero rates, `end_drag`, `hold`, `stop`. A
 longer delay counts as usual after 10 s without a late command. The page sends `made` with everything,
 and the Python client with heartbeats and with samples sent by `send`. A request without `made` counts
@@ -97,14 +97,18 @@ from katana450.client import connect
 with connect("http://127.0.0.1:8080", name="My script") as arm:
     print(arm.query(answers.State).q)
     there = arm.joints([0.3, -1.0, 1.4, 0.3, 0.0])  # waits until the arm is there
-    there = arm.go(requests.Position(p=(0.45, 0.1, 0.0)))  # the tool point, pitch and roll kept
+    there = arm.position((0.45, 0.1, 0.0))  # the tool point, pitch and roll kept
     print(there.why or "target reached")
-    done = arm.ask(requests.Joint(axis=5, value=4.0))
+    done = arm.ask(requests.Joint(axis=5, value=4.0))  # not waited for
     print(done.outcome, [found.text for found in done.findings])  # limited, axis 5 at its limit
 ```
 
-`arm.upload(Path("bracket.stl"))` uploads a mesh. `arm.ask(requests.Place(name="bracket",
-shape=requests.Shape.MESH, mesh=key))` places it in front of the arm. `arm.save_scene()` returns the
+The client has a method for each motion, and for nearly every other request below, with its fields. A motion
+is waited for, and the method returns the state then; a sample of a stream is only sent; any other request
+returns its answer. `arm.go`, `arm.send` and `arm.ask` do the same with any request.
+
+`arm.upload(Path("bracket.stl"))` uploads a mesh. `arm.place("bracket", shape=requests.Shape.MESH, mesh=key)`
+places it in front of the arm. `arm.save_scene()` returns the
 scene, and `arm.load_scene(data)` restores it.
 
 `connect` sends the heartbeats by itself. `aconnect` is the same for asyncio. A refused request

@@ -6,21 +6,20 @@ import asyncio
 import math
 import secrets
 import time
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Coroutine
 from contextlib import aclosing, asynccontextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 from urllib.parse import quote, urlencode
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from katana450.arm.control.act import Id
 from katana450.arm.control.checked import encoded_field
+from katana450.client.acts import Acts
 from katana450.client.files import STOP_TIMEOUT, EpisodeClient, LostError, RefusedError, Site
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
@@ -56,8 +55,17 @@ NOT_RUN = "Not run"
 A = TypeVar("A", bound=answers.Answer)
 
 
-class AsyncClient:
-    """One connection, made by ``aconnect``. It sends the heartbeats of the program."""
+class AsyncClient(
+    Acts[
+        Coroutine[Any, Any, answers.State],
+        Coroutine[Any, Any, answers.Answer],
+        Coroutine[Any, Any, None],
+    ]
+):
+    """One connection, made by ``aconnect``. It sends the heartbeats of the program.
+
+    It has a method for each act beside those below.
+    """
 
     def __init__(self, socket: ClientConnection, welcome: answers.Welcome, site: Site) -> None:
         self._socket = socket
@@ -286,17 +294,6 @@ class AsyncClient:
                     return state
         raise LostError("The server has closed the connection.")
 
-    async def joints(self, q: npt.ArrayLike) -> answers.State:
-        """Drive all joints to ``q`` (n,) [rad]; see ``go``."""
-        return await self.go(requests.Joints(q=np.asarray(q, dtype=float)))
-
-    async def nudge(self, axis: int, by: float) -> answers.State:
-        """Turn the joint ``axis``, counted from 1, by the angle ``by`` [rad]; see ``go``.
-
-        ``why`` of the state says if a limit of the joint shortened the motion.
-        """
-        return await self.go(requests.Nudge(axis=axis, by=by))
-
     async def upload(self, file: Path, unit: str | None = None) -> answers.Mesh:
         """Upload the mesh in ``file``; scene objects refer to it by its key.
 
@@ -336,14 +333,6 @@ class AsyncClient:
         answer = await self.ask(requests.ListPeople())
         assert isinstance(answer, answers.People)
         return answer.people
-
-    async def kick(self, person: int, seconds: float = 60.0, *, revoke: bool = False) -> None:
-        """Disconnect ``person``, the number in ``people``. For admins only.
-
-        ``seconds``: time [s] after which the person may come back; 0 lets the person in at once.
-        ``revoke``: whether to revoke the access link for good.
-        """
-        await self.ask(requests.Kick(person=person, seconds=seconds, revoke=revoke))
 
     async def _heartbeat(self) -> None:
         while True:

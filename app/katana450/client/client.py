@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+from katana450.client.acts import Acts
 from katana450.client.asynchronous import FOLLOW_RATE, AsyncClient, aconnect
 from katana450.client.files import EpisodeClient
 from katana450.server.api import answers
@@ -30,7 +31,7 @@ def _blocking(
     return blocking
 
 
-class Client:
+class Client(Acts[answers.State, answers.Answer, None]):
     """One connection, made by ``connect``. A separate thread sends its heartbeats.
 
     Its methods are those of ``AsyncClient``. Each waits for its result.
@@ -55,8 +56,6 @@ class Client:
     stop = _blocking(AsyncClient.stop)
     clear_stop = _blocking(AsyncClient.clear_stop)
     go = _blocking(AsyncClient.go)
-    joints = _blocking(AsyncClient.joints)
-    nudge = _blocking(AsyncClient.nudge)
     upload = _blocking(AsyncClient.upload)
     save_scene = _blocking(AsyncClient.save_scene)
     load_scene = _blocking(AsyncClient.load_scene)
@@ -64,7 +63,6 @@ class Client:
     run = _blocking(AsyncClient.run)
     recording = _blocking(AsyncClient.recording)
     people = _blocking(AsyncClient.people)
-    kick = _blocking(AsyncClient.kick)
 
     def query(self, kind: type[A]) -> A:
         """See ``AsyncClient.query``."""

@@ -1,0 +1,365 @@
+# Written by `python -m docs.stubs` from the classes of the acts.
+from typing import Any, Generic, Literal, TypeVar
+
+import numpy.typing as npt
+
+from katana450.server.api import requests
+
+AtRest = TypeVar("AtRest")
+Answered = TypeVar("Answered")
+Sent = TypeVar("Sent")
+
+OWN: tuple[type[requests.Request], ...]
+METHODS: dict[str, type[requests.Request]]
+
+def way_of(kind: type[requests.Request]) -> str: ...
+def signature_of(kind: type[requests.Request]) -> Any: ...
+def documentation_of(kind: type[requests.Request]) -> str: ...
+
+class Acts(Generic[AtRest, Answered, Sent]):
+    def operate_arm(self, act: requests.ArmAct, confirmed: bool = ...) -> Answered:
+        """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
+
+        The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
+
+        Args:
+            act: connect; disconnect; calibrate: the arm moves to its mechanical stops; engage: the
+                motors hold the arm, which was calibrated before; release: motors off, the arm falls;
+                unblock: hold again after a collision or an error.
+            confirmed: Whether a person has confirmed the hazard. Without it, an act that has one is
+                refused with the text of the hazard.
+        """
+
+    def joint(self, axis: int, value: float) -> AtRest:
+        """Move one joint to a value.
+
+        Args:
+            axis: Number of the joint, counted from 1.
+            value: Target [rad]; [m] for a joint that slides.
+        """
+
+    def nudge(self, axis: int, by: float) -> AtRest:
+        """Move one joint by a relative angle, counted from its goal. Nudges in a row add up.
+
+        The new goal is limited to the range of the joint.
+
+        Args:
+            axis: Number of the joint, counted from 1.
+            by: Change of the goal [rad]; [m] for a joint that slides.
+        """
+
+    def joints(self, q: npt.ArrayLike) -> AtRest:
+        """Move all joints along a straight line in joint space; they arrive together.
+
+        Args:
+            q: (n,) Targets [rad]; [m] for joints that slide.
+        """
+
+    def servo(
+        self,
+        q: npt.ArrayLike,
+        qd: npt.ArrayLike | None = ...,
+        gripper: float | None = ...,
+    ) -> Sent:
+        """Follow one sample of a stream of joint angles.
+
+        The motion keeps the limits of speed, acceleration and jerk. The arm comes to rest when no
+        other sample arrives for 0.2 s.
+
+        Args:
+            q: (n,) Joint angles [rad]; [m] for joints that slide.
+            qd: (n,) Rates of ``q``. Without them the rates are estimated from the stream, which is less
+                exact.
+            gripper: Target of the finger joint [rad], or [m] if it slides; it stays without.
+        """
+
+    def gripper(self, angle: float) -> AtRest:
+        """Move the fingers.
+
+        Args:
+            angle: Target of the finger joint [rad]; [m] for fingers that slide. The answer ``arm`` has
+                its range.
+        """
+
+    def home(self) -> AtRest:
+        """Move to the ready posture."""
+
+    def go_to_zero(self) -> AtRest:
+        """Move to the zero posture, in which the arm is stretched along x."""
+
+    def branch(
+        self,
+        shoulder: Literal["front", "back"] | None = ...,
+        elbow: Literal["up", "down"] | None = ...,
+        name: str | None = ...,
+    ) -> AtRest:
+        """Move to the target pose on another branch: with another shoulder or elbow.
+
+        Args:
+            shoulder: Shoulder of the branch of a five-axis arm.
+            elbow: Elbow of the branch of a five-axis arm.
+            name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
+        """
+
+    def hold(self) -> AtRest:
+        """Come to rest and drop the target."""
+
+    def pause(self) -> Answered:
+        """Come to rest on the path and keep the target.
+
+        The requests ``pause``, ``resume`` and ``speed`` also act on a running program. Only its owner
+        may send them then: the page or API program that started it. A program that is being planned
+        starts paused.
+        """
+
+    def resume(self) -> AtRest:
+        """Resume the motion after a pause."""
+
+    def speed(self, value: float) -> Answered:
+        """Set the maximum speed of every joint and of the tool.
+
+        Args:
+            value: Fraction of full speed.
+        """
+
+    def fill(self, ml: float) -> Answered:
+        """Fill the cup with water, and remove all water elsewhere.
+
+        Args:
+            ml: Volume in the cup [ml].
+        """
+
+    def remove(self, name: str) -> Answered:
+        """Remove an object; a held object stays.
+
+        Args:
+            name: Name of the object.
+        """
+
+    def attach(self, name: str, to: requests.Attachment, T: npt.ArrayLike | None = ...) -> Answered:
+        """Fix an object to the hand, for example a camera or a tool, or release it to the world.
+
+        Args:
+            name: Name of the object.
+            to: Body to which the object is fixed. With `"table"` it is put down upright on the table
+                below.
+            T: (4, 4) Pose on the hand, in the frame of the arm's default tool. Without it the object
+                stays where it is.
+        """
+
+    def position(self, p: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+        """Move the tool point to a position; the orientation of the target is kept.
+
+        Args:
+            p: (3,) Position [m] in ``frame``.
+            frame: Frame of ``p``: {S} at the shoulder, or the base frame on the table.
+        """
+
+    def pose(self, T: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+        """Move the tool to a pose, or as near to it as the arm can.
+
+        The priority (``set_priority``) decides which part of the pose is kept.
+
+        Args:
+            T: (4, 4) Pose of the tool in ``frame``, translations in m.
+            frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
+        """
+
+    def turn(self, pitch: float, roll: float) -> AtRest:
+        """Turn the tool of a five-axis arm to a pitch and a roll; its target position is kept.
+
+        These are the two rotations that a five-axis arm is free to choose.
+
+        Args:
+            pitch: Angle of the tool below the horizontal [rad], positive downwards.
+            roll: Angle about the tool's own axis [rad].
+        """
+
+    def orient(self, R: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+        """Turn the tool of an arm outside the five-axis family; its target position is kept.
+
+        Args:
+            R: (3, 3) Rotation of the tool in ``frame``.
+            frame: Frame of ``R``: {S} at the shoulder, or the base frame on the table.
+        """
+
+    def step_tool(self, by: npt.ArrayLike, frame: requests.JogFrame = ...) -> AtRest:
+        """Move the target of the tool by one step. Steps in a row add up.
+
+        Where the target cannot be reached, the nearest pose becomes the target.
+
+        Args:
+            by: (5,) Step of the tool point (x, y, z) [m], then of pitch and roll [rad]. (6,) for arms
+                outside the five-axis family: a rotation vector [rad] follows.
+            frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six numbers
+                it also turns about them.
+        """
+
+    def jog(self, rates: npt.ArrayLike, frame: requests.JogFrame = ...) -> Sent:
+        """Move the tool at given rates for 0.2 s. Repeat the request to continue the motion.
+
+        A client sends it repeatedly while a key, pad or stick is held.
+
+        Args:
+            rates: (5,) Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll
+                [rad/s]. (6,) for arms outside the five-axis family: the rates of the rotations about x,
+                y and z follow.
+            frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six rates it
+                also turns about them.
+        """
+
+    def end_drag(self) -> AtRest:
+        """End a drag: the nearest pose that the arm can reach becomes the target."""
+
+    def tool(self, name: str) -> Answered:
+        """Choose the tool frame to which targets and read-outs refer. Nothing moves.
+
+        Args:
+            name: Name of the tool frame; the answer ``arm`` lists them.
+        """
+
+    def set_priority(self, priority: requests.Priority) -> Answered:
+        """Choose which part of a target is kept when the arm cannot satisfy all of it.
+
+        A present target of the tool is projected again.
+
+        Args:
+            priority: The part that is kept first.
+        """
+
+    def undo(self) -> AtRest:
+        """Undo the last change of a goal, an object or a setting by this client.
+
+        To undo a goal, the arm moves back to the earlier one. Refused while the arm is stopped, and
+        without a change since the last stop or change of driver.
+        """
+
+    def redo(self) -> AtRest:
+        """Repeat the change by this client that was undone last, if no other change followed."""
+
+    def acquire(self) -> Answered:
+        """Acquire the lease if it is free. A command does this by itself while the lease is free."""
+
+    def take(self) -> Answered:
+        """Take the lease from its holder. For admins only."""
+
+    def withdraw(self) -> Answered:
+        """Withdraw your own request for the lease."""
+
+    def release_lease(self) -> Answered:
+        """Release the lease, so that others can acquire it."""
+
+    def give(self, to: int) -> Answered:
+        """Hand the lease over to another page or program.
+
+        The holder may do this, and the owner of the running program, which ends the program.
+
+        Args:
+            to: Number of the page or program.
+        """
+
+    def decline(self, to: int) -> Answered:
+        """Decline the request of another page or program for the lease.
+
+        The holder may do this, and the owner of the running program.
+
+        Args:
+            to: Number of the page or program.
+        """
+
+    def rename(self, name: str) -> Answered:
+        """Choose the name that others see. Refused if it is empty, too long or taken.
+
+        Args:
+            name: Name, of at most 24 characters. That of an access link cannot be changed.
+        """
+
+    def list_people(self) -> Answered:
+        """List everybody who is connected or kept out. For admins only."""
+
+    def kick(self, person: int, seconds: float = ..., revoke: bool = ...) -> Answered:
+        """Close all connections of a person, and keep the person out for a while. For admins only.
+
+        The person can still stop the arm over HTTP. A running program of the person ends, also an
+        unattended one.
+
+        Args:
+            person: Number of the person in ``people``.
+            seconds: Time [s] after which the person may come back; 0 lets the person in at once.
+            revoke: Whether to revoke the access link for good. An admin's link is revoked by
+                ``katana450 access revoke`` alone.
+        """
+
+    def place(
+        self,
+        name: str,
+        T: npt.ArrayLike | None = ...,
+        near: tuple[float, float] | None = ...,
+        frame: requests.Frame = ...,
+        shape: requests.Shape | None = ...,
+        size: list[float] | None = ...,
+        mesh: str | None = ...,
+        can_be_held: bool | None = ...,
+        scale: float | None = ...,
+        colour: str | None = ...,
+        opacity: float | None = ...,
+        hidden: bool | None = ...,
+    ) -> Answered:
+        """Create an object, or change one. Fields that are not given keep their values.
+
+        Args:
+            name: Name of the object.
+            T: (4, 4) Pose in ``frame``; the object's own frame is in the middle of its underside. A new
+                object without ``T`` is placed where there is room in front of the arm. An object that
+                can be held, vessels and the basin are refused where nothing carries them: they stand
+                on the table or on another object.
+            near: (2,) Point of the table [m] in the base frame. A new object without ``T`` is placed
+                there or near it, where there is room beside other objects and the arm in its ready
+                posture.
+            frame: Frame of ``T``: {S} at the shoulder, or the base frame on the table.
+            shape: Shape that is checked for contacts.
+            size: Size of the shape [m]: box (x, y, z), cylinder and vessel (radius, height), sphere
+                (radius). The size of a mesh is that of its file.
+            mesh: Key of the mesh, from the answer to its upload.
+            can_be_held: Whether the fingers may touch the object; they hold it between both sides.
+            scale: Factor on the size.
+            colour: Colour such as "#94a3b8", or "own" for the colour of the file.
+            opacity: Opacity, 1 for an opaque object.
+            hidden: Whether the object is not drawn. It is checked for contacts nevertheless.
+        """
+
+    def load(self, scene: str) -> Answered:
+        """Replace all objects and the water by those of an uploaded scene. The arm does not move.
+
+        Args:
+            scene: Key of the scene, from the answer to its upload.
+        """
+
+    def set(
+        self,
+        node: str,
+        field: str,
+        value: float | list[float] | None,
+        more: tuple[requests.FieldSetting, ...] = ...,
+    ) -> AtRest:
+        """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
+
+        If one field cannot be set, none is. The names are those of `katana450 export vrml`; ``query``
+        with ``world`` lists them. A ``rotation`` of a joint does not place the joint: it is a command
+        to move there, under the rules of ``joints``.
+
+        Args:
+            node: DEF name of the node.
+            field: Name of the field.
+            value: New value. Null restores the original colour, transparency or choice.
+            more: Further fields to set at the same time.
+        """
+
+    def get(self, node: str, field: str, more: tuple[requests.FieldName, ...] = ...) -> Answered:
+        """Read fields of the VRML world by the DEF names of their nodes, as VR Source does.
+
+        Args:
+            node: DEF name of the node.
+            field: Name of the field.
+            more: Further fields to read at the same time.
+        """

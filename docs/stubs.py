@@ -1,0 +1,98 @@
+"""Write the ``.pyi`` files of the methods that are derived from classes.
+
+Run it with ``python -m docs.stubs``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+import katana450
+from katana450.client import acts
+
+PACKAGE = Path(katana450.__file__).parent
+
+ACTS_HEAD = """\
+# Written by `python -m docs.stubs` from the classes of the acts.
+from typing import Any, Generic, Literal, TypeVar
+
+import numpy.typing as npt
+
+from katana450.server.api import requests
+
+AtRest = TypeVar("AtRest")
+Answered = TypeVar("Answered")
+Sent = TypeVar("Sent")
+
+OWN: tuple[type[requests.Request], ...]
+METHODS: dict[str, type[requests.Request]]
+
+def way_of(kind: type[requests.Request]) -> str: ...
+def signature_of(kind: type[requests.Request]) -> Any: ...
+def documentation_of(kind: type[requests.Request]) -> str: ...
+
+class Acts(Generic[AtRest, Answered, Sent]):
+"""
+
+RESULTS = {"go": "AtRest", "ask": "Answered", "send": "Sent"}
+"""Type of the result of each way in which a client executes an act."""
+
+
+def acts_stub() -> str:
+    """Return the content of ``client/acts.pyi``."""
+    methods = []
+    for name, kind in acts.METHODS.items():
+        hints = get_type_hints(kind)
+        parameters = ["self"]
+        for parameter in list(acts.signature_of(kind).parameters.values())[1:]:
+            default = "" if parameter.default is inspect.Parameter.empty else " = ..."
+            parameters.append(f"{parameter.name}: {type_text(hints[parameter.name])}{default}")
+        result = RESULTS[acts.way_of(kind)]
+        methods.append(method_text(name, parameters, result, acts.documentation_of(kind)))
+    return ACTS_HEAD + "\n".join(methods)
+
+
+def method_text(name: str, parameters: list[str], result: str, about: str) -> str:
+    """Return the stub of a method, with its docstring ``about``."""
+    line = f"    def {name}({', '.join(parameters)}) -> {result}:\n"
+    if len(line) > 101:
+        rows = "".join(f"        {parameter},\n" for parameter in parameters)
+        line = f"    def {name}(\n{rows}    ) -> {result}:\n"
+    if "\n" in about:
+        about += "\n"
+    return line + textwrap.indent(f'"""{about}"""', "        ") + "\n"
+
+
+def type_text(hint: Any) -> str:
+    """Return the type ``hint`` of a field as text. Arrays can be given as any sequence."""
+    if hint is NoneType:
+        return "None"
+    origin, arguments = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        return " | ".join(dict.fromkeys(type_text(argument) for argument in arguments))
+    if origin is Literal:
+        return f"Literal[{', '.join(repr(argument) for argument in arguments)}]".replace("'", '"')
+    if origin is np.ndarray:
+        return "npt.ArrayLike"
+    if origin is not None:
+        inner = ", ".join("..." if part is ... else type_text(part) for part in arguments)
+        return f"{origin.__name__}[{inner}]"
+    if hint.__module__ == "builtins":
+        return str(hint.__name__)
+    return f"requests.{hint.__name__}"
+
+
+STUBS: dict[Path, Callable[[], str]] = {PACKAGE / "client" / "acts.pyi": acts_stub}
+"""Content of each file."""
+
+
+if __name__ == "__main__":
+    for file, content in STUBS.items():
+        file.write_text(content(), encoding="utf-8")
