@@ -11,7 +11,7 @@ READY_POSTURE_DEG = (0.0, -68.0, 85.0, 8.0, 0.0)
 and stretched. It leaves room to drag and turn the tool in every direction."""
 
 
-FIXED = frozenset({"rate", "frame_rate", "ready"})
+FIXED = frozenset({"rate", "frame_rate", "ready", "sample_delay"})
 """Names of the settings that no option of ``serve`` sets."""
 
 

@@ -82,7 +82,7 @@ def test_a_moment_of_a_motion(tmp_path: Path) -> None:
     table = tmp_path / "m.csv"
     table.write_text("t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n1,1.5,-1.19,1.48,0.14\n")
     pictures = []
-    words = ["--trajectory", str(table), "--theme", "dark", "--size", "160x100"]
+    words = ["--trajectory", str(table), "--size", "160x100"]
     for name, more in (("start", ["--at", "0"]), ("end", []), ("late", ["--at", "99"])):
         path = tmp_path / f"{name}.png"
         assert main(["render", "--out", str(path), *words, *more]) == 0

@@ -30,7 +30,6 @@ from katana450.extensions.media.scene import (
 from katana450.maths.geometry import se3
 from katana450.maths.water.surface import COLOUR
 from katana450.resources import URDF_PATH
-from katana450.server.viser_bridge.themes import DARK, LIGHT, THEMES
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, silhouette
 from tests.media.conftest import Workshop
@@ -49,7 +48,7 @@ def katana() -> Robot:
 @pytest.fixture(scope="module")
 def filled(workshop: Workshop) -> Picture:
     state = workshop.filled
-    return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT)
+    return picture(workshop.stage.items(state), workshop.stage.water(state), NEAR)
 
 
 def ball(radius: float) -> VisualMesh:
@@ -62,7 +61,7 @@ def ball(radius: float) -> VisualMesh:
 
 def test_the_same_scene_gives_the_same_bytes(workshop: Workshop, filled: Picture) -> None:
     state = workshop.filled
-    again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR, LIGHT)
+    again = picture(workshop.stage.items(state), workshop.stage.water(state), NEAR)
     assert again.png == filled.png
 
 
@@ -90,26 +89,11 @@ def test_the_arm_covers_the_same_pixels_as_in_pillow(
     assert overlap((hits.item >= 0).reshape(SIZE, SIZE), theirs) >= 0.98
 
 
-def test_the_arm_stands_before_its_room_whatever_the_theme(workshop: Workshop) -> None:
-    items = workshop.stage.items(workshop.ready)
-    shown = {
-        name: picture(items, (), replace(NEAR, size=(160, 100)), theme)
-        for name, theme in THEMES.items()
-    }
-    light, dark = shown["Light"], shown["Dark"]
-    assert (light.item == dark.item).all()
-    room = light.item == FLOOR
-    assert light.pixels[room].mean() > 180.0
-    assert dark.pixels[room].mean() < 80.0
-    arm = light.item >= 0
-    assert np.abs(light.pixels[arm].astype(float) - dark.pixels[arm]).mean() < 12.0
-
-
 def test_cup_and_water_are_seen(workshop: Workshop, filled: Picture) -> None:
     cup, water = filled.shows("cup"), filled.shows("vessel0")
     assert cup.sum() > 300
     assert 20 < water.sum() < cup.sum()
-    dry = picture(workshop.stage.items(workshop.ready), (), NEAR, LIGHT)
+    dry = picture(workshop.stage.items(workshop.ready), (), NEAR)
     wet, white = filled.pixels[water].astype(float), dry.pixels[water].astype(float)
     # Water absorbs red of the white cup.
     assert (wet[:, 2] - wet[:, 0]).mean() > (white[:, 2] - white[:, 0]).mean() + 20.0
@@ -124,7 +108,7 @@ def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
     T = se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0))
     box = SceneObject("crate", Shape.BOX, (0.1, 0.1, 0.1), T)
     state = replace(workshop.ready, objects=(box,))
-    shown = picture(workshop.stage.surrounding_items(state), (), NEAR, LIGHT)
+    shown = picture(workshop.stage.surrounding_items(state), (), NEAR)
     where = np.argwhere(shown.shows("crate")).mean(axis=0)
     away = np.array((0.4, 0.0, 0.05)) - NEAR.position
     right, up, ahead = NEAR.frame @ away / NEAR.pixel
@@ -137,7 +121,7 @@ def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
 def test_a_sphere_has_the_size_of_its_projection() -> None:
     """A distant sphere covers a disc with the sine of its half angle as radius."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
-    shown = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT)
+    shown = picture([Item("ball", ball(0.3), UP)], (), at)
     radius = math.tan(math.asin(0.3 / 2.0)) / at.pixel
     assert shown.shows("ball").sum() == pytest.approx(math.pi * radius**2, rel=0.01)
 
@@ -146,7 +130,7 @@ def test_a_shadow_falls_along_the_key_light() -> None:
     """The shadow of a sphere 0.5 m up lies along the light's direction from its centre."""
     at = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
     items = [Item("ball", ball(0.15), UP)]
-    with_ball, without = picture(items, (), at, LIGHT), picture((), (), at, LIGHT)
+    with_ball, without = picture(items, (), at), picture((), (), at)
     darker = without.pixels.astype(int).sum(axis=2) - with_ball.pixels.astype(int).sum(axis=2)
     shadow = (darker > 60) & (with_ball.item == FLOOR)
     key = np.array((0.7, -0.9, 1.9))
@@ -160,7 +144,7 @@ def test_a_shadow_falls_along_the_key_light() -> None:
 def test_edges_are_smooth() -> None:
     """Pixels between a dark sphere and the bright room have intermediate colours."""
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
-    row = picture([Item("ball", ball(0.3), UP)], (), at, LIGHT).pixels[:, :, 1].astype(int)
+    row = picture([Item("ball", ball(0.3), UP)], (), at).pixels[:, :, 1].astype(int)
     inside, outside = row[100, 100], row[100, 5]
     # A nearly vertical outline crosses pixels at another place in each row.
     rim = row[70:130, 10:60]
@@ -169,7 +153,7 @@ def test_edges_are_smooth() -> None:
 
 def test_an_empty_picture_is_the_room() -> None:
     at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (64, 48))
-    shown = picture((), (), at, DARK)
+    shown = picture((), (), at)
     assert set(np.unique(shown.item)) == {FLOOR, NOWHERE}
     assert shown.names == ()
 

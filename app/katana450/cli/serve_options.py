@@ -12,9 +12,6 @@ from katana450.settings import Settings
 MIN_SILENCE, MAX_SILENCE = 0.2, 2.0
 """[s] Heartbeats are 0.1 s apart, and after 3 s the driver loses the lease."""
 
-MIN_SAMPLE_DELAY, MAX_SAMPLE_DELAY = 0.05, 2.0
-"""[s] Bounds of the delay from which samples are refused: a busy machine alone delays by 0.05 s."""
-
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``serve`` to ``parser``."""
@@ -34,15 +31,6 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="heartbeat timeout of the driver, after which a moving arm brakes; the page of the "
         f"driver sends ten a second ({MIN_SILENCE:g} to {MAX_SILENCE:g}, default: %(default)s)",
-    )
-    parser.add_argument(
-        "--sample-delay",
-        type=_sample_delay,
-        default=Settings.sample_delay,
-        metavar="SECONDS",
-        help="do not execute a sample of a jog, drag, step or stream that took so much longer than "
-        f"the least delay of its connection ({MIN_SAMPLE_DELAY:g} to {MAX_SAMPLE_DELAY:g}, "
-        "default: %(default)s)",
     )
     parser.add_argument(
         "--strict-silence",
@@ -95,26 +83,18 @@ def _silence(text: str) -> float:
     return heartbeat_timeout(text, MAX_SILENCE)
 
 
-def _sample_delay(text: str) -> float:
-    return _seconds(text, MIN_SAMPLE_DELAY, MAX_SAMPLE_DELAY)
-
-
 def heartbeat_timeout(text: str, longest: float) -> float:
     """Return the number of seconds in ``text``, from MIN_SILENCE to ``longest``.
 
     Raises ArgumentTypeError for any other text.
     """
-    return _seconds(text, MIN_SILENCE, longest)
-
-
-def _seconds(text: str, shortest: float, longest: float) -> float:
     try:
         seconds = float(text)
     except ValueError:
         seconds = -1.0
-    if not shortest <= seconds <= longest:
+    if not MIN_SILENCE <= seconds <= longest:
         raise argparse.ArgumentTypeError(
-            f"a number of seconds from {shortest:g} to {longest:g}, not {text!r}"
+            f"a number of seconds from {MIN_SILENCE:g} to {longest:g}, not {text!r}"
         )
     return seconds
 

@@ -11,9 +11,6 @@ from katana450.extensions.export.options import joint_values
 CAMERAS = ("free", "front", "side", "top", "tool")
 """Camera presets, as on the page; the first is its 3D view."""
 
-THEMES = ("light", "dark")
-"""Themes of the page."""
-
 
 def add_render_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``katana450 render`` to ``parser``."""
@@ -63,7 +60,6 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
-    parser.add_argument("--theme", choices=THEMES, default=THEMES[0])
     add_arm_options(parser, tool=False)
 
 

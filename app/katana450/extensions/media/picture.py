@@ -31,7 +31,7 @@ from katana450.extensions.media.scene import (
     lit,
     unit,
 )
-from katana450.server.viser_bridge.themes import FILL, FLOOR_AT, KEY, RIM, Theme
+from katana450.server.viser_bridge.themes import FILL, FLOOR_AT, KEY, LIGHT, RIM
 from katana450.srgb import to_light, to_srgb
 
 CELLS = ((0.05, 0.6), (0.25, 1.0))
@@ -41,20 +41,20 @@ FADE_DISTANCE = 5.0
 """[m] Distance at which the floor has faded to the background."""
 
 
-def background(theme: Theme, camera: Camera, y: Floats) -> Floats:
+def background(camera: Camera, y: Floats) -> Floats:
     """Return the light (n, 3) of the background at rows ``y`` (n,) [px] of the picture."""
     fraction = np.clip(y / camera.size[1], 0.0, 1.0)[:, None]
-    top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (theme.sky, theme.floor))
+    top, bottom = (np.array(c, dtype=np.float32) / 255.0 for c in (LIGHT.sky, LIGHT.floor))
     return to_light(top + fraction * (bottom - top)).astype(np.float32)
 
 
-def floor_light(theme: Theme, camera: Camera, hits: Hits, lit: Bools, behind: Floats) -> Floats:
+def floor_light(camera: Camera, hits: Hits, lit: Bools, behind: Floats) -> Floats:
     """Return the light (n, 3) of points on the floor, faded to the background ``behind`` (n, 3)."""
-    colour = np.tile(np.array(theme.floor, dtype=np.float32) / 255.0, (len(hits.points), 1))
-    for (apart, wide), line in zip(CELLS, (theme.cell, theme.section), strict=True):
+    colour = np.tile(np.array(LIGHT.floor, dtype=np.float32) / 255.0, (len(hits.points), 1))
+    for (apart, wide), line in zip(CELLS, (LIGHT.cell, LIGHT.section), strict=True):
         fraction = _lines(camera, hits, apart, wide)[:, None]
         colour += fraction * (np.array(line, dtype=np.float32) / 255.0 - colour)
-    colour[~lit] *= 1.0 - theme.shadow
+    colour[~lit] *= 1.0 - LIGHT.shadow
     shown = to_light(colour)
     east, north = (hits.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
     left = np.clip(1.0 - np.hypot(east, north) / FADE_DISTANCE, 0.0, 1.0)[:, None]
@@ -193,14 +193,12 @@ class Picture:
         return np.isin(self.item, numbers)
 
 
-def picture(
-    items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera, theme: Theme
-) -> Picture:
+def picture(items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera) -> Picture:
     """Return the picture of the items as ``camera`` sees them.
 
     Raises MissingExtraError without embreex.
     """
-    return _Renderer(items, translucents, camera, theme).picture
+    return _Renderer(items, translucents, camera).picture
 
 
 class _Samples(NamedTuple):
@@ -223,11 +221,7 @@ class _Renderer:
     """The rendering of one picture."""
 
     def __init__(
-        self,
-        items: Sequence[Item],
-        translucents: Sequence[Translucent],
-        camera: Camera,
-        theme: Theme,
+        self, items: Sequence[Item], translucents: Sequence[Translucent], camera: Camera
     ) -> None:
         self._solid = RenderScene.of(items)
         self._thin = RenderScene.of([translucent.item for translucent in translucents])
@@ -235,7 +229,7 @@ class _Renderer:
             [translucent.opacity for translucent in translucents], dtype=np.float32
         )
         self._tracer, self._behind = Tracer(self._solid), Tracer(self._thin)
-        self._camera, self._theme = camera, theme
+        self._camera = camera
         self._eye = np.array(camera.position, dtype=np.float32)
 
     @property
@@ -263,11 +257,9 @@ class _Renderer:
         directions = self._camera.directions(x, y)
         hits = first_hits(self._tracer, self._eye, directions, FLOOR_AT)
         reached = lit(self._tracer, hits, LAMPS[0].towards)
-        light = background(self._theme, self._camera, y)
+        light = background(self._camera, y)
         floor, solid = hits.item == FLOOR, hits.item >= 0
-        light[floor] = floor_light(
-            self._theme, self._camera, hits.some(floor), reached[floor], light[floor]
-        )
+        light[floor] = floor_light(self._camera, hits.some(floor), reached[floor], light[floor])
         light[solid] = _surface(self._solid, hits.some(solid), reached[solid])
         item = hits.item.copy()
         if self._thin.names:

@@ -37,7 +37,7 @@ def render(options: argparse.Namespace) -> int:
     check_writable(path)
     if kind == ".mp4":
         check_filmable(options.size, options.fps)
-    shot = Shot(Preset[options.camera.upper()], options.size, options.theme.title())
+    shot = Shot(Preset[options.camera.upper()], options.size)
     shown = chosen(options)
     if kind == ".png":
         state = shown.at(shown.duration if options.at is None else options.at)

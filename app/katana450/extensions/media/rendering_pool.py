@@ -29,7 +29,6 @@ from katana450.extensions.media.scene import Camera
 from katana450.extensions.media.stage import RenderStage
 from katana450.server.view.cameras import camera_pose
 from katana450.server.viser_bridge.presets import FOV, Preset
-from katana450.server.viser_bridge.themes import THEMES, Theme
 from katana450.settings import Settings
 
 Pixels = npt.NDArray[np.uint8]
@@ -43,14 +42,12 @@ class Shot(NamedTuple):
 
     preset: Preset
     size: tuple[int, int]
-    theme: str
 
     def taken(self, stage: RenderStage, robot: Robot, state: State) -> Picture:
         """Return the picture of ``state``."""
         view = camera_pose(self.preset, robot, state)
         camera = Camera(view.position, view.target, float(FOV), self.size)
-        theme: Theme = THEMES[self.theme]
-        return picture(stage.items(state), stage.water(state), camera, theme)
+        return picture(stage.items(state), stage.water(state), camera)
 
 
 Pictures = Callable[[Iterable[State]], Iterator[tuple[Pixels, ...]]]

@@ -28,7 +28,6 @@ from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
-from katana450.server.viser_bridge.themes import LIGHT
 
 SIDES = 8
 """Number of sides of a tube."""
@@ -145,7 +144,7 @@ def stage_pictures(
             items += _lines(program, robot, trace, tick)
             look = ON_PATH
         camera = Camera(*look, FOV, SIZE)
-        pictures[f"{name}.png"] = picture(items, stage.water(state), camera, LIGHT).png
+        pictures[f"{name}.png"] = picture(items, stage.water(state), camera).png
     return pictures
 
 

@@ -25,9 +25,6 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.sdk import Preset
 
-THEME = "Light"
-"""Theme of pictures, as of the page."""
-
 PAGE_SUFFIXES = (".html", ".htm")
 FILM_SUFFIX = ".mp4"
 
@@ -47,7 +44,7 @@ class PictureViews:
             bare: whether it has no gripper.
         """
         check_traceable()
-        self._shots = [Shot(Preset[view.upper()], size, THEME) for view in views]
+        self._shots = [Shot(Preset[view.upper()], size) for view in views]
         self._urdf, self._bare = URDF_PATH if urdf is None else urdf, bare
 
     @contextmanager
