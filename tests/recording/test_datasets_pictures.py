@@ -120,7 +120,7 @@ def test_pictures_show_the_states(tmp_path: Path) -> None:
             times = file.start + 0.25 + np.arange(row["length"]) / FPS
             for state in RecordedStates(file, session).at(times):
                 for view, pictures in expected.items():
-                    shot = Shot(Preset[view], SIZE, "Light")
+                    shot = Shot(Preset[view], SIZE)
                     pictures.append(shot.taken(stage, robot, state).pixels)
     for view, pictures in expected.items():
         feature = f"observation.images.{view.lower()}"
