@@ -15,6 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 import katana450
+from katana450.arm.control.act import Request
 from katana450.client import acts
 
 PACKAGE = Path(katana450.__file__).parent
@@ -25,18 +26,17 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy.typing as npt
 
-from katana450.server.api import requests
-
+{imports}
 AtRest = TypeVar("AtRest")
 Answered = TypeVar("Answered")
 Sent = TypeVar("Sent")
 
-OWN: tuple[type[requests.Request], ...]
-METHODS: dict[str, type[requests.Request]]
+OWN: tuple[type[Request], ...]
+METHODS: dict[str, type[Request]]
 
-def way_of(kind: type[requests.Request]) -> str: ...
-def signature_of(kind: type[requests.Request]) -> Any: ...
-def documentation_of(kind: type[requests.Request]) -> str: ...
+def way_of(kind: type[Request]) -> str: ...
+def signature_of(kind: type[Request]) -> Any: ...
+def documentation_of(kind: type[Request]) -> str: ...
 
 class Acts(Generic[AtRest, Answered, Sent]):
 """
@@ -47,16 +47,25 @@ RESULTS = {"go": "AtRest", "ask": "Answered", "send": "Sent"}
 
 def acts_stub() -> str:
     """Return the content of ``client/acts.pyi``."""
-    methods = []
+    methods: list[str] = []
+    named: set[type] = {Request}
     for name, kind in acts.METHODS.items():
         hints = get_type_hints(kind)
         parameters = ["self"]
         for parameter in list(acts.signature_of(kind).parameters.values())[1:]:
             default = "" if parameter.default is inspect.Parameter.empty else " = ..."
-            parameters.append(f"{parameter.name}: {type_text(hints[parameter.name])}{default}")
+            parameters.append(
+                f"{parameter.name}: {type_text(hints[parameter.name], named)}{default}"
+            )
         result = RESULTS[acts.way_of(kind)]
         methods.append(method_text(name, parameters, result, acts.documentation_of(kind)))
-    return ACTS_HEAD + "\n".join(methods)
+    modules: dict[str, list[str]] = {}
+    for kind in sorted(named, key=lambda kind: kind.__name__):
+        modules.setdefault(kind.__module__, []).append(kind.__name__)
+    imports = "".join(
+        f"from {module} import {', '.join(names)}\n" for module, names in sorted(modules.items())
+    )
+    return ACTS_HEAD.format(imports=imports) + "\n".join(methods)
 
 
 def method_text(name: str, parameters: list[str], result: str, about: str) -> str:
@@ -70,23 +79,27 @@ def method_text(name: str, parameters: list[str], result: str, about: str) -> st
     return line + textwrap.indent(f'"""{about}"""', "        ") + "\n"
 
 
-def type_text(hint: Any) -> str:
-    """Return the type ``hint`` of a field as text. Arrays can be given as any sequence."""
+def type_text(hint: Any, named: set[type]) -> str:
+    """Return the type ``hint`` of a field as text, and add the classes in it to ``named``.
+
+    Arrays can be given as any sequence.
+    """
     if hint is NoneType:
         return "None"
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
-        return " | ".join(dict.fromkeys(type_text(argument) for argument in arguments))
+        return " | ".join(dict.fromkeys(type_text(argument, named) for argument in arguments))
     if origin is Literal:
         return f"Literal[{', '.join(repr(argument) for argument in arguments)}]".replace("'", '"')
     if origin is np.ndarray:
         return "npt.ArrayLike"
     if origin is not None:
-        inner = ", ".join("..." if part is ... else type_text(part) for part in arguments)
+        inner = ", ".join("..." if part is ... else type_text(part, named) for part in arguments)
         return f"{origin.__name__}[{inner}]"
     if hint.__module__ == "builtins":
         return str(hint.__name__)
-    return f"requests.{hint.__name__}"
+    named.add(hint)
+    return str(hint.__name__)
 
 
 STUBS: dict[Path, Callable[[], str]] = {PACKAGE / "client" / "acts.pyi": acts_stub}

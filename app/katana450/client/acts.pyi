@@ -3,21 +3,27 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy.typing as npt
 
-from katana450.server.api import requests
+from katana450.arm.control.act import Request
+from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.scene_objects import Attachment, Shape
+from katana450.arm.control.tool_commands import Frame
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.server.api.requests import FieldName, FieldSetting
 
 AtRest = TypeVar("AtRest")
 Answered = TypeVar("Answered")
 Sent = TypeVar("Sent")
 
-OWN: tuple[type[requests.Request], ...]
-METHODS: dict[str, type[requests.Request]]
+OWN: tuple[type[Request], ...]
+METHODS: dict[str, type[Request]]
 
-def way_of(kind: type[requests.Request]) -> str: ...
-def signature_of(kind: type[requests.Request]) -> Any: ...
-def documentation_of(kind: type[requests.Request]) -> str: ...
+def way_of(kind: type[Request]) -> str: ...
+def signature_of(kind: type[Request]) -> Any: ...
+def documentation_of(kind: type[Request]) -> str: ...
 
 class Acts(Generic[AtRest, Answered, Sent]):
-    def operate_arm(self, act: requests.ArmAct, confirmed: bool = ...) -> Answered:
+    def operate_arm(self, act: ArmAct, confirmed: bool = ...) -> Answered:
         """Connect, calibrate or switch the motors of a real arm. It must be stopped and at rest.
 
         The state lists the acts that are possible; its ``arm.mode`` tells what becomes of an act.
@@ -136,7 +142,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             name: Name of the object.
         """
 
-    def attach(self, name: str, to: requests.Attachment, T: npt.ArrayLike | None = ...) -> Answered:
+    def attach(self, name: str, to: Attachment, T: npt.ArrayLike | None = ...) -> Answered:
         """Fix an object to the hand, for example a camera or a tool, or release it to the world.
 
         Args:
@@ -147,7 +153,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
                 stays where it is.
         """
 
-    def position(self, p: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+    def position(self, p: npt.ArrayLike, frame: Frame = ...) -> AtRest:
         """Move the tool point to a position; the orientation of the target is kept.
 
         Args:
@@ -155,7 +161,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             frame: Frame of ``p``: {S} at the shoulder, or the base frame on the table.
         """
 
-    def pose(self, T: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+    def pose(self, T: npt.ArrayLike, frame: Frame = ...) -> AtRest:
         """Move the tool to a pose, or as near to it as the arm can.
 
         The priority (``set_priority``) decides which part of the pose is kept.
@@ -175,7 +181,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             roll: Angle about the tool's own axis [rad].
         """
 
-    def orient(self, R: npt.ArrayLike, frame: requests.Frame = ...) -> AtRest:
+    def orient(self, R: npt.ArrayLike, frame: Frame = ...) -> AtRest:
         """Turn the tool of an arm outside the five-axis family; its target position is kept.
 
         Args:
@@ -183,7 +189,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             frame: Frame of ``R``: {S} at the shoulder, or the base frame on the table.
         """
 
-    def step_tool(self, by: npt.ArrayLike, frame: requests.JogFrame = ...) -> AtRest:
+    def step_tool(self, by: npt.ArrayLike, frame: JogFrame = ...) -> AtRest:
         """Move the target of the tool by one step. Steps in a row add up.
 
         Where the target cannot be reached, the nearest pose becomes the target.
@@ -195,7 +201,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
                 it also turns about them.
         """
 
-    def jog(self, rates: npt.ArrayLike, frame: requests.JogFrame = ...) -> Sent:
+    def jog(self, rates: npt.ArrayLike, frame: JogFrame = ...) -> Sent:
         """Move the tool at given rates for 0.2 s. Repeat the request to continue the motion.
 
         A client sends it repeatedly while a key, pad or stick is held.
@@ -218,7 +224,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             name: Name of the tool frame; the answer ``arm`` lists them.
         """
 
-    def set_priority(self, priority: requests.Priority) -> Answered:
+    def set_priority(self, priority: Priority) -> Answered:
         """Choose which part of a target is kept when the arm cannot satisfy all of it.
 
         A present target of the tool is projected again.
@@ -295,8 +301,8 @@ class Acts(Generic[AtRest, Answered, Sent]):
         name: str,
         T: npt.ArrayLike | None = ...,
         near: tuple[float, float] | None = ...,
-        frame: requests.Frame = ...,
-        shape: requests.Shape | None = ...,
+        frame: Frame = ...,
+        shape: Shape | None = ...,
         size: list[float] | None = ...,
         mesh: str | None = ...,
         can_be_held: bool | None = ...,
@@ -340,7 +346,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
         node: str,
         field: str,
         value: float | list[float] | None,
-        more: tuple[requests.FieldSetting, ...] = ...,
+        more: tuple[FieldSetting, ...] = ...,
     ) -> AtRest:
         """Set fields of the VRML world by the DEF names of their nodes, as VR Sink does.
 
@@ -355,7 +361,7 @@ class Acts(Generic[AtRest, Answered, Sent]):
             more: Further fields to set at the same time.
         """
 
-    def get(self, node: str, field: str, more: tuple[requests.FieldName, ...] = ...) -> Answered:
+    def get(self, node: str, field: str, more: tuple[FieldName, ...] = ...) -> Answered:
         """Read fields of the VRML world by the DEF names of their nodes, as VR Source does.
 
         Args:
