@@ -1,9 +1,8 @@
-"""The progress bar is drawn only on a terminal."""
+"""Progress is shown only on a terminal."""
 
 from __future__ import annotations
 
 import io
-import time
 
 import pytest
 
@@ -15,21 +14,10 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_items_pass_and_a_terminal_shows_their_count() -> None:
+def test_items_pass_and_a_terminal_shows_their_fraction() -> None:
     terminal = Terminal()
     assert list(progress(range(4), 4, "Work", terminal)) == [0, 1, 2, 3]
-    text = terminal.getvalue()
-    assert "\rWork [" in text
-    assert "   0%" in text
-    assert "#" * 30 + "] 100%" in text
-    assert text.endswith("\n")
-
-
-def test_remaining_distance_is_reported() -> None:
-    terminal = Terminal()
-    for _ in progress(range(4), 4, "Work", terminal):
-        time.sleep(0.11)
-    assert " s left" in terminal.getvalue()
+    assert terminal.getvalue() == "\rWork  25%\rWork 100%\n"
 
 
 def test_other_streams_get_nothing() -> None:

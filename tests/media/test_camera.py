@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from katana450.errors import InputError
 from katana450.extensions.media.scene import Camera
 
 spot = st.floats(-2.0, 2.0)
@@ -34,23 +33,3 @@ def test_a_ray_passes_through_the_point_projected_to_its_pixel(
     scale = 200.0 / math.tan(0.5 * fov) / (way @ ahead)
     assert 320.0 + scale * (way @ right) == pytest.approx(x, abs=0.01)
     assert 200.0 + scale * (way @ down) == pytest.approx(y, abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("position", "target", "fov", "size"),
-    [
-        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.7, (10, 10)),
-        ((1.0, 0.0, 1.0), (1.0, 0.0, 1.0), 0.7, (10, 10)),
-        ((math.nan, 0.0, 1.0), (0.0, 0.0, 0.0), 0.7, (10, 10)),
-        ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0), math.pi, (10, 10)),
-        ((1.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.7, (10, 0)),
-    ],
-)
-def test_invalid_camera_is_refused(
-    position: tuple[float, float, float],
-    target: tuple[float, float, float],
-    fov: float,
-    size: tuple[int, int],
-) -> None:
-    with pytest.raises(InputError):
-        Camera(position, target, fov, size)

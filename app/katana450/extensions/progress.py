@@ -1,7 +1,8 @@
-"""A progress bar on a terminal; no output on other streams, and reports to another program."""
+"""Progress in percent on a terminal; no output on other streams, and reports to another program."""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from time import monotonic
@@ -9,8 +10,8 @@ from typing import TextIO, TypeVar
 
 T = TypeVar("T")
 
-_WIDTH = 30
-_PERIOD = 0.1  # s between two drawings
+PERIOD = 0.1
+"""[s] Time between two lines."""
 
 
 _listeners: list[Callable[[float], None]] = []
@@ -37,30 +38,12 @@ def progress(
             report(done / max(total, 1))
             yield item
         return
-    start = drawn = monotonic()
-    done = 0
+    shown = -math.inf
     try:
-        print(_line(label, 0, total, 0.0), end="", file=stream, flush=True)
-        for item in items:
-            done += 1
-            now = monotonic()
-            if now - drawn >= _PERIOD or done == total:
-                print(_line(label, done, total, now - start), end="", file=stream, flush=True)
-                drawn = now
+        for done, item in enumerate(items, 1):
+            if monotonic() - shown >= PERIOD or done == total:
+                print(f"\r{label} {done / total:4.0%}", end="", file=stream, flush=True)
+                shown = monotonic()
             yield item
     finally:
         print(file=stream, flush=True)
-
-
-def _line(label: str, done: int, total: int, elapsed: float) -> str:
-    fraction = done / total if total else 1.0
-    filled = int(fraction * _WIDTH)
-    left = f"{_clock(elapsed * (1.0 - fraction) / fraction)} left" if fraction else ""
-    bar = "#" * filled + "." * (_WIDTH - filled)
-    # Trailing blanks overwrite the rest of a longer line.
-    return f"\r{label} [{bar}] {fraction:4.0%}  {left:<14}"
-
-
-def _clock(seconds: float) -> str:
-    minutes, seconds = divmod(round(seconds), 60)
-    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"

@@ -17,7 +17,6 @@ from PIL import Image
 
 from katana450.extensions.media.scene import (
     FLOOR,
-    NOWHERE,
     Bools,
     Camera,
     Floats,
@@ -59,19 +58,6 @@ def floor_light(camera: Camera, hits: Hits, lit: Bools, behind: Floats) -> Float
     east, north = (hits.points[:, :2] - np.array(camera.position[:2], dtype=np.float32)).T
     left = np.clip(1.0 - np.hypot(east, north) / FADE_DISTANCE, 0.0, 1.0)[:, None]
     return np.asarray(behind + left * (shown - behind), dtype=np.float32)
-
-
-def dithered(colours: Floats, rows: Ints, columns: Ints) -> Floats:
-    """Return colours (n, 3) of the background with the pattern of their pixels added.
-
-    Its low contrast would show steps.
-    """
-    finer = (TILE[rows % 4, columns % 4] - 7.5) / (16.0 * 255.0)
-    return np.clip(colours + finer[:, None], 0.0, 1.0).astype(np.float32)
-
-
-TILE = np.array(((0, 8, 2, 10), (12, 4, 14, 6), (3, 11, 1, 9), (15, 7, 13, 5)))
-"""Order of the sixteen pixels of a tile in which they become brighter; neighbours are far apart."""
 
 
 def _lines(camera: Camera, hits: Hits, apart: float, wide: float) -> Floats:
@@ -244,8 +230,6 @@ class _Renderer:
                 self._samples(_spots(columns[edge], right), _spots(rows[edge], down)).colours
                 for right, down in CORNERS
             ) / np.float32(len(CORNERS))
-        plain = samples.item == NOWHERE
-        colours[plain] = dithered(colours[plain], rows[plain], columns[plain])
         return Picture(
             np.rint(255.0 * colours).astype(np.uint8).reshape(height, width, 3),
             samples.item.reshape(height, width),
