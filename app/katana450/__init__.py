@@ -19,50 +19,27 @@ poses. Each name below is loaded on first use, so that ``import katana450`` is f
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from katana450.client import Client, connect
-    from katana450.errors import (
-        BlockedError,
-        ConfigurationError,
-        InputError,
-        KatanaError,
-        RobotDescriptionError,
-    )
-    from katana450.extensions.general_arms.nearest import NearestPose
-    from katana450.extensions.reachability.map import ReachabilityMap
-    from katana450.library.arm import Arm
-    from katana450.library.loading import load
-    from katana450.library.motion_plan import MotionPlan
-    from katana450.library.recording import Recording, open
-    from katana450.library.script_writer import ScriptWriter, program
-    from katana450.library.solutions import IKSolutions
-    from katana450.library.trajectory import Trajectory
-    from katana450.library.viewer import Viewer
-    from katana450.maths.kinematics.branch import Branch
-    from katana450.maths.kinematics.solution import Solution
-
-__all__ = [
-    "Arm",
-    "BlockedError",
-    "Branch",
-    "Client",
-    "ConfigurationError",
-    "IKSolutions",
-    "InputError",
-    "KatanaError",
-    "MotionPlan",
-    "NearestPose",
-    "ReachabilityMap",
-    "Recording",
-    "RobotDescriptionError",
-    "ScriptWriter",
-    "Solution",
-    "Trajectory",
-    "Viewer",
-    "connect",
-    "load",
-    "open",
-    "program",
-]
+    from katana450.client import Client as Client
+    from katana450.client import connect as connect
+    from katana450.errors import BlockedError as BlockedError
+    from katana450.errors import ConfigurationError as ConfigurationError
+    from katana450.errors import InputError as InputError
+    from katana450.errors import KatanaError as KatanaError
+    from katana450.errors import RobotDescriptionError as RobotDescriptionError
+    from katana450.extensions.general_arms.nearest import NearestPose as NearestPose
+    from katana450.extensions.reachability.map import ReachabilityMap as ReachabilityMap
+    from katana450.library.arm import Arm as Arm
+    from katana450.library.loading import load as load
+    from katana450.library.motion_plan import MotionPlan as MotionPlan
+    from katana450.library.recording import Recording as Recording
+    from katana450.library.recording import open as open
+    from katana450.library.script_writer import ScriptWriter as ScriptWriter
+    from katana450.library.script_writer import program as program
+    from katana450.library.solutions import IKSolutions as IKSolutions
+    from katana450.library.trajectory import Trajectory as Trajectory
+    from katana450.library.viewer import Viewer as Viewer
+    from katana450.maths.kinematics.branch import Branch as Branch
+    from katana450.maths.kinematics.solution import Solution as Solution
 
 _MODULES = {
     "Arm": "library.arm",
@@ -87,6 +64,8 @@ _MODULES = {
     "open": "library.recording",
     "program": "library.script_writer",
 }
+
+__all__ = list(_MODULES)
 
 
 # Hidden from type checkers, which would otherwise accept every name.
