@@ -1,4 +1,4 @@
-"""Branches and the velocity ellipsoid on the page."""
+"""Branches on the page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Speeds, ellipsoids, singularities, and jogging through them."""
+"""Speeds, singularities, and jogging through them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import pytest
 
 from katana450.arm.control.tool_targets import BranchMetrics
 from katana450.errors import InputError
-from katana450.extensions.ellipsoid.layer import velocity_ellipsoid
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
@@ -67,23 +66,6 @@ def test_singular_values_against_finite_differences(chain: Chain, rng: np.random
 )
 def test_in_a_singularity_the_smallest_singular_value_is_zero(chain: Chain, q: FloatArray) -> None:
     assert singular_values(chain, q)[-1] < 1e-12
-
-
-def test_the_ellipsoid_holds_every_velocity_and_touches_the_fastest(
-    chain: Chain, rng: np.random.Generator
-) -> None:
-    for q in postures(chain, rng, 10):
-        ellipsoid = velocity_ellipsoid(chain, q)
-        assert np.allclose(ellipsoid.axes.T @ ellipsoid.axes, np.eye(3), atol=1e-12)
-        assert np.linalg.det(ellipsoid.axes) == pytest.approx(1.0)
-        J = np.column_stack([finite_twist(chain, q, qd)[3:] for qd in np.eye(5)])
-        for _ in range(30):
-            qd = rng.normal(size=5)
-            v = ellipsoid.axes.T @ J @ (qd / np.linalg.norm(qd))
-            assert np.linalg.norm(v / ellipsoid.radii) <= 1.0 + 1e-7
-        for axis, radius in zip(ellipsoid.axes.T, ellipsoid.radii, strict=True):
-            fastest = J.T @ axis
-            assert np.linalg.norm(fastest) == pytest.approx(radius, abs=1e-8)
 
 
 def test_limit_distances(chain: Chain) -> None:

@@ -220,7 +220,6 @@ EXTENSIONS = (
     Extension("joint_view", joint_view=f"{HERE}.joint_view:MachineView"),
     Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water:WaterLayer"),
-    Extension("ellipsoid", view_layer=f"{HERE}.ellipsoid.layer:EllipsoidLayer"),
     Extension("general_arms", find_arm=f"{HERE}.general_arms.driven_tool:driven_arm"),
 )
 """Each with where its parts are, so that nothing is imported before it is used."""

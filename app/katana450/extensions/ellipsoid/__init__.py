@@ -1,1 +1,0 @@
-"""The velocity ellipsoid of the tool."""
