@@ -147,7 +147,7 @@ def test_tables_bags_and_datasets_have_six_axes(path: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.long
-def test_pages_films_and_the_viewer_show_it(path: Path, urdf: Path, tmp_path: Path) -> None:
+def test_pages_and_films_show_it(path: Path, urdf: Path, tmp_path: Path) -> None:
     export = ["record", "export", str(path), "--urdf", str(urdf), "--to", "1", "--format"]
     page, film = tmp_path / "run.html", tmp_path / "run.mp4"
     assert main([*export, "html", "--out", str(page)]) == 0
@@ -156,14 +156,6 @@ def test_pages_films_and_the_viewer_show_it(path: Path, urdf: Path, tmp_path: Pa
     pictures = decoded(film, (160, 120))
     assert len(pictures) == 6
     assert np.abs(pictures[0].astype(int) - pictures[-1].astype(int)).max() > 50
-    with katana450.open(path).replay(20.0, urdf=urdf) as viewer:
-        seen = set[float]()
-
-        def turned() -> bool:
-            seen.add(round(viewer._scenery.arm._joints[0].angle, 3))
-            return len(seen) > 3
-
-        waited_for(turned, "the arm to move in the viewer")
 
 
 @pytest.mark.long

@@ -18,7 +18,7 @@ from katana450.caching import cached_property
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.recording.datasets.recorded_robot import orientations
 from katana450.extensions.recording.episodes.episode import Episode
-from katana450.extensions.recording.episodes.episode_folder import episodes_in, shown_part
+from katana450.extensions.recording.episodes.episode_folder import episodes_in
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.script_runs import script_runs, sha256
 from katana450.extensions.recording.files.simulation import (
@@ -40,7 +40,6 @@ from katana450.maths.geometry.arrays import FloatArray
 
 if TYPE_CHECKING:
     from katana450.client import Client
-    from katana450.library.viewer import Viewer
     from katana450.server.api.answers import State
 
 
@@ -291,50 +290,6 @@ class Recording:
         wanted = {name: np.asarray(place, dtype=float) for name, place in (targets or {}).items()}
         path = None if urdf is None else Path(urdf)
         return score_file(self.path, start, end, wanted, path)
-
-    def replay(
-        self,
-        speed: float = 1.0,
-        start: float | None = None,
-        end: float | None = None,
-        *,
-        port: int = 8090,
-        host: str = "127.0.0.1",
-        urdf: str | os.PathLike[str] | None = None,
-    ) -> Viewer:
-        """Show the recorded arm and objects in a 3D scene, repeatedly, as `Arm.show` shows a plan.
-
-        It is only a picture: no arm moves. ``run.replay(0.5).wait()`` keeps a script from ending.
-
-        Args:
-            speed: factor on the recorded time, above 0.
-            start: start of the part [s] after that of the recording; None for that of the episode
-                if the file is one, which may be trimmed, or else of the recording.
-            end: its end [s]; None as for ``start``.
-            port: TCP port of the scene, or the next free one above it.
-            host: address to listen on, without a password.
-            urdf: file of the recorded robot, if it is not the Katana450 of this package.
-
-        Raises:
-            InputError: the speed is not above 0, or the part has no states.
-            ConfigurationError: no port could be opened.
-        """
-        from katana450.library.planner import Planner
-        from katana450.library.pose_frame import PoseFrame
-        from katana450.library.recorded_frames import RecordedFrames
-        from katana450.library.viewer import Viewer, check_speed
-
-        check_speed(speed)
-        with RecordingFile.open(self.path) as file:
-            robot = session_for(file, None if urdf is None else Path(urdf))
-            part = shown_part(file, start, end)
-        frames = RecordedFrames(self.path, robot, *part)
-        arm = robot.robot.require_arm()
-        T, frame = arm.T_base_shoulder, PoseFrame.of(arm.T_base_shoulder, "base")
-        planner = Planner(arm.kinematics, robot.session, T, frame, ())
-        viewer = Viewer(robot.robot, planner, np.eye(4), port, host)
-        viewer.replay(frames, speed)
-        return viewer
 
     def to_dataframe(self) -> Any:
         """Return the states as a pandas DataFrame with the index ``t`` [s].

@@ -30,7 +30,7 @@ from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
 
 if TYPE_CHECKING:
-    from katana450.library.recorded_frames import RecordedFrames
+    pass
 
 FRAME_TIME = 1.0 / 60.0
 """[s] Time from one frame to the next."""
@@ -104,27 +104,13 @@ class Viewer:
 
         ``speed``: factor on real time, above 0. Raises InputError for another ``speed``.
         """
-        check_speed(speed)
+        if not (np.isfinite(speed) and speed > 0.0):
+            raise InputError(f"The speed is {speed!r}; give a number above 0.")
         samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
         T_base_frame = self._T_base_frame
         points = plan.sample(plan.duration / PATH_POINTS).points
         points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
         self._play(samples.t / speed, points, lambda number: self._show(samples.q[number]))
-
-    def replay(self, frames: RecordedFrames, speed: float = 1.0) -> None:
-        """Draw the tool's path and show a recording repeatedly, in a separate thread.
-
-        ``speed``: factor on real time, above 0. Raises InputError for another ``speed``.
-        """
-        check_speed(speed)
-
-        def show(number: int) -> None:
-            self._scenery.show(frames.state(number))
-
-        show(0)
-        step = max(len(frames.points) // PATH_POINTS, 1)
-        points = np.concatenate((frames.points[:-1:step], frames.points[-1:]))
-        self._play(frames.t / speed, points, show)
 
     def _play(self, t: FloatArray, points: FloatArray, show: Callable[[int], None]) -> None:
         """Draw a path through ``points`` (k, 3) [m] and ``show`` each frame at its time ``t``."""
@@ -195,9 +181,3 @@ class Viewer:
 
     def _show(self, q: FloatArray) -> None:
         self._scenery.show(self._planner.standing(q))
-
-
-def check_speed(speed: float) -> None:
-    """Raise InputError unless ``speed`` is a number above 0."""
-    if not (np.isfinite(speed) and speed > 0.0):
-        raise InputError(f"The speed is {speed!r}; give a number above 0.")
