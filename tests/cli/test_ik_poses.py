@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.cli.lines import ask
@@ -99,7 +100,7 @@ def test_wrong_pose_is_refused_with_the_key_at_fault(
     assert expected in answer["error"]
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_priority_chooses_what_is_kept(arm: MountedArm, priority: Priority) -> None:
     T = np.eye(4)
     T[:3, 3] = (0.1, 0.3, 0.7)

@@ -9,6 +9,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.control.modes import JointTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
@@ -17,7 +18,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 
 TICK = 0.01
@@ -184,7 +185,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
         assert gap == pytest.approx(math.dist(point(arm, state.goal), FAR_OUT), abs=1e-12)
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_each_priority_loses_its_own_part_in_a_drag_out_of_reach(
     arm: ArmModel, session: Session, state: State, priority: Priority
 ) -> None:

@@ -15,6 +15,7 @@ import pytest
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.gripper_model import NO_GRIPPER
+from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status
 from katana450.arm.control.tool_targets import current_target
@@ -24,7 +25,7 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from tests.kinematics.family import random_member, random_pose
@@ -204,7 +205,7 @@ def check_tick(
 
 
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_drags_keep_branch_limits_and_progress(
     arm: ArmModel, session: Session, priority: Priority
 ) -> None:
@@ -237,7 +238,7 @@ def test_drags_of_other_arms_keep_branch_limits_and_progress(chain: Chain) -> No
     arm = ArmModel(chain, {"tool": chain.M}, "tool", NO_GRIPPER)
     session = Session(arm, 0.5 * (chain.lower + chain.upper))
     seen: Counter[Status] = Counter()
-    for number, trip in enumerate(trips(chain, FIVE_AXIS_PRIORITIES, DRAGS_OF_OTHER_ARMS)):
+    for number, trip in enumerate(trips(chain, tuple(PRIORITIES), DRAGS_OF_OTHER_ARMS)):
         seen.update(state.status for state in drag(chain, session, trip, number))
     assert sum(seen.values()) == DRAGS_OF_OTHER_ARMS
     assert set(seen) == {Status.OK, Status.LIMITED, Status.GAP}

@@ -9,6 +9,7 @@ from hypothesis.stateful import precondition, rule, run_state_machine_as_test
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.following import Following
+from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.control.modes import Jogging, Positioning, Tracking
 from katana450.arm.control.plans import detour_from, plan_to
 from katana450.arm.control.tool_targets import current_target
@@ -16,7 +17,7 @@ from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.planning.plan import Plan
@@ -136,7 +137,7 @@ class ArmRules(JointRules):
     def take_branch(self, branch: Branch, ticks: int) -> None:
         self.run([cmd.Branch(name=str(branch))], ticks)
 
-    @rule(priority=st.sampled_from(FIVE_AXIS_PRIORITIES), ticks=ticks)
+    @rule(priority=st.sampled_from(tuple(PRIORITIES)), ticks=ticks)
     def set_priority(self, priority: Priority, ticks: int) -> None:
         self.run([cmd.SetPriority(priority)], ticks)
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.lease import Role
+from katana450.arm.control.messages import PRIORITIES
 from katana450.client import Client, RefusedError, connect
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
 from tests.api.test_documented import EVERY_REQUEST
@@ -45,7 +45,7 @@ def test_every_query_is_answered(program: Client) -> None:
         requests.Home(), requests.Jog(rates=np.array((0.0, 0.0, 0.05, 0.0, 0.0))),
         requests.Servo(q=READY), requests.Fill(ml=150.0), requests.Query(at="loop"),
         requests.Branch(shoulder="front", elbow="up"), requests.Watch(hz=0.0),
-        *(requests.SetPriority(priority=each) for each in reversed(FIVE_AXIS_PRIORITIES)),
+        *(requests.SetPriority(priority=each) for each in reversed(PRIORITIES)),
     ]  # fmt: skip
     for request in asked:
         answer = program.ask(request)

@@ -14,13 +14,13 @@ from msgspec.inspect import FloatType, IntType, StructType, type_info
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm_commands import ArmAct
 from katana450.arm.control.lease import Role
+from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Outcome
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.robot_choice.choose_robot import ChooseRobot
 from katana450.maths.geometry import se3
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import Breakpoints, Program, ProgramOrder, Steer
 from katana450.server.service import pending_answer, serialize
@@ -110,7 +110,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Position: [requests.Position(p=np.array((0.3, 0.1, 0.0)))],
         requests.Tool: [requests.Tool(name="flange"), requests.Tool(name="tcp")],
         requests.SetPriority: [
-            requests.SetPriority(priority=each) for each in reversed(FIVE_AXIS_PRIORITIES)
+            requests.SetPriority(priority=each) for each in reversed(PRIORITIES)
         ],
         requests.Branch: [requests.Branch(shoulder="front", elbow="down")],
         requests.Hold: [requests.Hold()],

@@ -9,13 +9,14 @@ import os
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.kinematics.conftest import katana
@@ -87,7 +88,7 @@ def gained(before: tuple[float, ...], after: tuple[float, ...], least: float) ->
     return 0
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 @pytest.mark.parametrize("name", CHAINS)
 def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Priority) -> None:
     chain, rng = CHAINS[name], np.random.default_rng(7)
@@ -123,7 +124,7 @@ def test_reported_limits_are_exactly_the_binding_ones(name: str, priority: Prior
     assert idle <= 0.01 * limited
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_the_limit_of_the_roll_is_named_where_it_binds(priority: Priority) -> None:
     chain, rng = CHAINS["katana"], np.random.default_rng(8)
     named = 0

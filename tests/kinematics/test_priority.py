@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from tests.kinematics.brute_force import tool_points
@@ -35,7 +36,7 @@ def pitch_distance(a: float, b: float) -> float:
     return abs(math.remainder(a - b, math.tau))
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
 def test_reported_errors_are_the_measured_ones(
     chain: Chain, priority: Priority, branch: Branch, rng: np.random.Generator

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch
@@ -14,7 +15,7 @@ from katana450.maths.kinematics.branch import BRANCHES, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.inverse_batch import inverse_batch
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.kinematics.tracker import leap
@@ -127,7 +128,7 @@ def test_no_search_satisfies_a_priority_better(seed: int) -> None:
     assert kept > 0
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_reachable_pose_is_unchanged_by_every_priority(
     priority: Priority, rng: np.random.Generator
 ) -> None:
@@ -143,7 +144,7 @@ def test_reachable_pose_is_unchanged_by_every_priority(
         assert p.limits == ()
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_five_numbers_of_a_posture_lead_back_to_it(
     priority: Priority, rng: np.random.Generator
 ) -> None:

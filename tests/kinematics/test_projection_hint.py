@@ -8,11 +8,12 @@ import math
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from tests.kinematics.brute_force import least_rotation
 from tests.kinematics.targets import targets
@@ -65,7 +66,7 @@ def test_no_hint_and_no_branch_is_better(chain: Chain, priority: Priority) -> No
             assert not beaten(found, misses(other, priority)), T.tolist()
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_pose_in_the_gap_of_axis_1_is_approached_from_the_better_side(
     chain: Chain, priority: Priority
 ) -> None:

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from katana450.arm.control.messages import PRIORITIES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics import tracker
 from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES, Priority
+from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.kinematics.tracker import HOP, MAX_POSES, Tracked, leap, track
@@ -178,7 +179,7 @@ def test_beside_axis_1_the_arm_turns_with_the_hand(chain: Chain) -> None:
     assert q[0] > math.radians(155.0)
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_a_fast_drag_ends_where_the_slow_one_does(
     chain: Chain, priority: Priority, rng: np.random.Generator
 ) -> None:
@@ -236,7 +237,7 @@ def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
     assert len(seen) == 4
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_very_far_target_has_an_answer(chain: Chain, priority: Priority) -> None:
     for position in ([9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 5.0], [-3.0, 0.0, -3.0]):
         target = ToolTarget(np.array(position), 40.0, -40.0)
@@ -257,7 +258,7 @@ def test_long_drag_continues_in_the_next_call(chain: Chain) -> None:
         assert np.allclose(forward(chain, best.q)[:3, 3], target.position, atol=1e-12)
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 def test_one_call_searches_a_bounded_number_of_poses(
     chain: Chain, priority: Priority, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -281,7 +282,7 @@ def test_one_call_searches_a_bounded_number_of_poses(
     assert MAX_POSES // 2 < maximum <= MAX_POSES + 1
 
 
-@pytest.mark.parametrize("priority", FIVE_AXIS_PRIORITIES)
+@pytest.mark.parametrize("priority", PRIORITIES)
 @pytest.mark.parametrize("far", [1e3, 1e9, 1e300])
 def test_very_long_drag_ends(chain: Chain, priority: Priority, far: float) -> None:
     since = ToolTarget.at(chain, READY)

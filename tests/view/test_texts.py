@@ -29,7 +29,6 @@ from katana450.arm.control.state import Finding, Reason, State, Status
 from katana450.arm.control.tool_targets import BranchMetrics, BranchOption
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
-from katana450.maths.kinematics.priority import FIVE_AXIS_PRIORITIES
 from katana450.server.view.branches import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS
 
@@ -53,7 +52,7 @@ def test_every_reason_has_a_sentence(state: State, reason: Reason) -> None:
 def test_texts_and_kinds_match() -> None:
     assert set(REASONS) == set(Reason)
     assert set(STATUS) == set(Status)
-    assert set(PRIORITIES) == set(PRIORITY_HINTS) == set(FIVE_AXIS_PRIORITIES)
+    assert set(PRIORITIES) == set(PRIORITY_HINTS)
     assert set(GHOST_COLOURS) == set(Status)
     assert len(AXIS_NAMES) == 5
 

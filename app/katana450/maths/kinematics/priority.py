@@ -27,7 +27,3 @@ class Priority(Enum):
     PITCH = "position and pitch"
     POSITION = "position"
     ORIENTATION = "orientation"
-
-
-FIVE_AXIS_PRIORITIES = (Priority.POSE, Priority.PITCH, Priority.POSITION)
-"""The priorities of five axes."""
