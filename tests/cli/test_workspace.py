@@ -14,14 +14,13 @@ import numpy as np
 import pytest
 
 from katana450.cli.main import main
-from katana450.errors import InputError
 from katana450.extensions.reachability import map as map_module
 from katana450.extensions.reachability import workspace as workspace_module
 from katana450.extensions.reachability.reachability_file import load_map
 from tests.general_arms.links_of_arms import ur5e
 
 ROOT = Path(__file__).resolve().parents[2]
-COARSE = ("--voxel", "170", "--pitches", "3", "--rolls", "4")
+COARSE = ("--voxel", "250")
 
 
 def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -29,35 +28,13 @@ def test_a_map_is_written_and_summed_up(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["workspace", *COARSE, "--tool", "grasp", "--out", str(out)]) == 0
     printed = capsys.readouterr()
     stored = load_map(out)
-    assert f"The tool grasp reaches {len(stored.points)} voxels of 170 mm" in printed.out
+    assert f"The tool grasp reaches {len(stored.points)} voxels of 250 mm" in printed.out
     assert f"{stored.fraction.max():.1%}" in printed.out
     assert f"Written: {out}" in printed.out
     assert printed.err == ""
     assert sorted(tmp_path.iterdir()) == [out]
     assert (stored.robot, stored.tool) == ("katana450", "grasp")
-    assert stored.voxel == pytest.approx(0.17)
-
-
-def test_map_of_six_axes_tells_where_the_tool_can_be_as_at_home(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    urdf, out = (tmp_path / name for name in ("ur5e.urdf", "map.npz"))
-    urdf.write_text(ur5e())
-    coarse = ("--voxel", "350", "--pitches", "3", "--rolls", "1")
-    assert main(["workspace", "--urdf", str(urdf), *coarse, "--out", str(out)]) == 0
-    printed, stored = capsys.readouterr().out, load_map(out)
-    assert stored.at_home is not None
-    assert 0 < stored.at_home.sum() < len(stored.points)
-    share = (
-        f"In {stored.at_home.mean():.1%} of them it can have the orientation that it has at Home."
-    )
-    assert share in printed
-    assert "Of 4 orientations" in printed
-    with np.load(out) as arrays:
-        wrong = {**arrays, "at_home": arrays["fraction"]}
-    np.savez_compressed(out, allow_pickle=False, **wrong)
-    with pytest.raises(InputError, match="must have a truth value for each point"):
-        load_map(out)
+    assert stored.voxel == pytest.approx(0.25)
 
 
 def test_map_that_takes_too_long_is_refused_at_once(
@@ -105,8 +82,6 @@ def test_a_table_removes_the_space_below(tmp_path: Path) -> None:
         (["--voxel", "0"], "edge of a voxel"),
         (["--voxel", "-5"], "edge of a voxel"),
         (["--voxel", "inf"], "edge of a voxel"),
-        (["--pitches", "0"], "number of pitches is 0"),
-        (["--rolls", "100000"], "must be from 1 to 720"),
         (["--out", "map.txt"], "must end in .npz"),
         (["--out", "/nowhere/at/all/map.npz"], "no directory"),
     ],

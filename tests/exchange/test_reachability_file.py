@@ -2,38 +2,31 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
-from katana450.extensions.reachability.map import ReachabilityMap, Survey
-from katana450.extensions.reachability.reachability import Reachability
 from katana450.extensions.reachability.reachability_file import (
     FORMAT,
+    StoredMap,
     load_map,
     write_npz,
 )
 
 POINTS = np.array([[0.11, -0.2, 0.3], [0.13, -0.2, 0.3], [0.15, 0.2, 0.5]])
 FRACTION = np.array([0.25, 1.0, 1 / 3])
-FOUND = ReachabilityMap(POINTS, FRACTION)
-
-
-@pytest.fixture(scope="module")
-def survey(arm: MountedArm) -> Survey:
-    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.05, 36, 24, arm.ready((0.0,) * 5))
-    return Survey(reachability, voxel=0.02)
+MAP = StoredMap(POINTS, FRACTION, 0.02, 0.05, "katana450", "tcp")
 
 
 @pytest.fixture
-def npz(survey: Survey, tmp_path: Path) -> Path:
+def npz(tmp_path: Path) -> Path:
     path = tmp_path / "map.npz"
     with path.open("wb") as file:
-        write_npz(file, survey, FOUND, "katana450", "tcp")
+        write_npz(file, MAP)
     return path
 
 
@@ -53,24 +46,22 @@ def test_the_file_has_the_documented_keys(npz: Path) -> None:
         "format": FORMAT,
         "voxel": 0.02,
         "table": 0.05,
-        "pitches": 36,
-        "rolls": 24,
         "robot": "katana450",
         "tool": "tcp",
     }
 
 
-def test_the_same_map_is_the_same_bytes(npz: Path, survey: Survey) -> None:
+def test_the_same_map_is_the_same_bytes(npz: Path) -> None:
     again = io.BytesIO()
-    write_npz(again, survey, FOUND, "katana450", "tcp")
+    write_npz(again, MAP)
     assert again.getvalue() == npz.read_bytes()
 
 
-def test_an_empty_map_is_a_map(survey: Survey, tmp_path: Path) -> None:
+def test_an_empty_map_is_a_map(tmp_path: Path) -> None:
     path = tmp_path / "empty.npz"
-    empty = ReachabilityMap(np.empty((0, 3)), np.empty(0))
+    empty = dataclasses.replace(MAP, points=np.empty((0, 3)), fraction=np.empty(0))
     with path.open("wb") as file:
-        write_npz(file, survey, empty, "katana450", "tcp")
+        write_npz(file, empty)
     stored = load_map(path)
     assert stored.points.shape == (0, 3)
     assert stored.fraction.shape == (0,)
@@ -81,6 +72,7 @@ GOOD = {
     "points": POINTS,
     "fraction": FRACTION,
     "voxel": np.array(0.02),
+    "table": np.array(0.05),
     "robot": np.array("katana450"),
     "tool": np.array("tcp"),
 }
@@ -103,6 +95,7 @@ GOOD = {
         ({"voxel": np.array(np.nan)}, "is nan m"),
         ({"voxel": np.array("wide")}, "'voxel'"),
         ({"voxel": FRACTION}, "corrupt"),
+        ({"table": np.array("low")}, "'table'"),
         ({"robot": np.array(3)}, "'robot'"),
         ({"tool": np.array(1.5)}, "'tool'"),
     ],
@@ -127,10 +120,8 @@ def test_a_file_without_a_key_is_refused(tmp_path: Path, key: str) -> None:
 
 def test_map_of_an_older_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "map.npz"
-    old = {key: value for key, value in GOOD.items() if key != "fraction"}
-    arrays = old | {"format": np.array("katana450 reachability 1"), "share": FRACTION}
-    np.savez(path, allow_pickle=False, **arrays)
-    with pytest.raises(InputError, match=r"map\.npz was made by an older version.*again"):
+    np.savez(path, allow_pickle=False, **(GOOD | {"format": np.array("katana450 reachability 1")}))
+    with pytest.raises(InputError, match=r"map\.npz is corrupt or not .*reachability 1, not"):
         load_map(path)
 
 

@@ -95,10 +95,9 @@ def test_five_axis_arm_of_the_family_stays_what_it_was(urdf: Urdf) -> None:
 
 
 def test_map_of_reachability_is_that_of_six_axes(urdf: Urdf) -> None:
-    found = load(urdf("ur5")).reachability(0.4, pitches=3, rolls=1)
-    assert found.at_home is not None
-    assert 0 < found.at_home.sum() < len(found.points)
-    assert set(np.unique(found.fraction * 4).round(9)) <= {1.0, 2.0, 3.0, 4.0}
+    found = load(urdf("ur5")).reachability(0.4)
+    assert len(found.points) > 10
+    assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
 
 
 PLANS: dict[str, Callable[[katana450.Arm], Any]] = {

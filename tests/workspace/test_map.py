@@ -14,7 +14,7 @@ from katana450.extensions.reachability.view import fraction_colors
 
 @pytest.fixture(scope="module")
 def survey(arm: MountedArm) -> Survey:
-    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 3, 4, np.zeros(5))
+    reachability = Reachability(arm.chain, arm.T_base_shoulder, 0.0, 3, 4)
     return Survey(reachability, voxel=0.16)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
 from katana450.extensions.programs.language.places import ROOMIEST
-from katana450.extensions.reachability.map import MapOptions, ReachabilityMap, survey_of
+from katana450.extensions.reachability.map import ReachabilityMap, survey_of
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.planner import Planner
 from katana450.library.pose_frame import PoseFrame, dimensions
@@ -32,7 +32,6 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.planning.plan import Plan
-from katana450.settings import Settings
 
 if TYPE_CHECKING:
     from katana450.library.viewer import Viewer
@@ -260,26 +259,6 @@ class Arm:
         )
         return replace(best, T=self.pose_frame.from_shoulder(best.T))
 
-    def nearest_poses(
-        self, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = None, **options: Any
-    ) -> tuple[NearestPose, ...]:
-        """Return the feasible pose nearest to each of the poses ``T`` (N, 4, 4), as on a path.
-
-        Of equally good postures each one is that nearest to the one before; ``q_hint`` (n,) [rad]
-        stands before the first. ``options`` and errors are those of `nearest`.
-
-        >>> poses = arm.nearest_poses(np.stack([arm.fk(arm.ready)] * 3))
-        >>> [pose.reason for pose in poses]
-        ['', '', '']
-        """
-        if dimensions(T) != 3:
-            raise InputError(f"The poses must have the shape (N, 4, 4), not {np.shape(T)}.")
-        nearest_poses: list[NearestPose] = []
-        for pose in np.asarray(T):
-            nearest_poses.append(self.nearest(pose, q_hint=q_hint, **options))
-            q_hint = nearest_poses[-1].q
-        return tuple(nearest_poses)
-
     def jacobian(self, q: npt.ArrayLike, *, body: bool = False) -> FloatArray:
         """Return the (6, n) Jacobian at joint angles ``q`` (n,) [rad].
 
@@ -418,33 +397,28 @@ class Arm:
         voxel: float | None = None,
         *,
         table: float = 0.0,
-        pitches: int | None = None,
-        rolls: int | None = None,
     ) -> ReachabilityMap:
         """Map where the tool can be, and which fraction of orientations it can have there.
 
         The map respects joint limits and keeps elbow, wrist and tool point above the table. It
-        ignores collisions. What is None suits the arm: its map then takes seconds to minutes.
+        ignores collisions. It takes seconds to minutes.
 
         Args:
-            voxel: edge of a voxel [m]; half the edge takes eight times as long.
+            voxel: edge of a voxel [m]; half the edge takes eight times as long. None for what suits
+                the arm.
             table: height of the table in the base frame [m].
-            pitches: number of pitches to try. From six axes on they are directions, spread evenly.
-            rolls: number of rolls to try for each pitch or direction. Four axes have none.
 
         Returns:
             a map with ``points`` (N, 3) [m], always in the base frame, and ``fraction`` (N,), the
-            fraction of orientations. Of arms with four axes, and from six on, its ``at_home`` tells
-            where the tool can have the orientation that it has in ``ready``.
+            fraction of orientations; of arms without a closed form, and of fewer than five axes, 1.
 
         Raises InputError for invalid numbers, and for a map that would take too long.
 
-        >>> map = arm.reachability(0.1, pitches=12, rolls=8)
+        >>> map = arm.reachability(0.2)
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
-        home, T = self._planned.ready(Settings.ready), self.mounted.T_base_shoulder
-        survey = survey_of(self.chain, T, home, MapOptions(table, voxel, pitches, rolls))
+        survey = survey_of(self.chain, self._planned.T_base_shoulder, table, voxel)
         return survey.map(survey.count(chunk) for chunk in survey.chunks())
 
     def show(

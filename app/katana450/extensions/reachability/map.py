@@ -13,9 +13,9 @@ import numpy.typing as npt
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm
+from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.swivel import SevenAxes
-from katana450.extensions.reachability.reachability import BoolArray, IntArray, Reachability
+from katana450.extensions.reachability.reachability import FREE_AXES, IntArray, Reachability
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
@@ -93,13 +93,10 @@ class ReachabilityMap:
         points: (N, 3) centres of the voxels with at least one orientation, in the order of the
             grid.
         fraction: (N,) fraction of orientations in each voxel, above 0 and up to 1.
-        at_home: (N,) whether the orientation of the tool at Home is possible there; None for an arm
-            whose map does not tell.
     """
 
     points: FloatArray
     fraction: FloatArray
-    at_home: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,21 +128,16 @@ class Survey:
         return self.grid.chunks(max(1, POSES // self.reachability.poses_at_once))
 
     def count(self, chunk: range) -> IntArray:
-        """Return what is possible in each voxel of ``chunk``, see ``count`` of the reachability."""
+        """Return the number of orientations that are possible in each voxel of ``chunk``."""
         return self.reachability.count(self.grid.centers(chunk))
 
     def map(self, counts: Iterable[IntArray]) -> ReachabilityMap:
         """Return the map from the counts of all chunks in their order."""
         totals = np.concatenate(list(counts))
-        at_home = None
-        if totals.ndim == 2:
-            totals, home = totals.T
-            at_home = home[totals > 0] > 0
         reached = np.flatnonzero(totals)
         return ReachabilityMap(
             points=self.grid.centers(reached),
             fraction=totals[reached] / self.reachability.orientations,
-            at_home=at_home,
         )
 
 
@@ -154,7 +146,7 @@ ROUND: Final = 0.005
 
 
 class Fineness(NamedTuple):
-    """The fineness of the map of an arm: its defaults, and its maximum.
+    """The fineness of the map of an arm.
 
     Attributes:
         voxels: number of voxels from the middle of the reach to its end.
@@ -170,51 +162,26 @@ class Fineness(NamedTuple):
 
 FAMILY: Final = Fineness(32, 36, 24, 20_000_000_000)
 CLOSED: Final = Fineness(16, 24, 6, 100_000_000)
-PLANE: Final = Fineness(20, 36, 1, 100_000_000)
 SWIVEL: Final = Fineness(10, 12, 4, 10_000_000)
-SEARCHED: Final = Fineness(5, 8, 2, 200_000)
 POINTS: Final = Fineness(10, 1, 1, 200_000)
 
 
-class MapOptions(NamedTuple):
-    """Values that decide what is mapped; None for what suits the arm.
-
-    Attributes:
-        table: height of the table in the base frame [m].
-        voxel: edge of a voxel [m].
-        pitches, rolls: numbers of steps of the orientation.
-    """
-
-    table: float = 0.0
-    voxel: float | None = None
-    pitches: int | None = None
-    rolls: int | None = None
-
-
 def survey_of(
-    chain: Chain, T_base_shoulder: FloatArray, home: FloatArray, options: MapOptions
+    chain: Chain, T_base_shoulder: FloatArray, table: float = 0.0, voxel: float | None = None
 ) -> Survey:
     """Return the survey of the arm ``chain``.
 
     Args:
         chain: the arm with its tool, in {S}.
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
-        home: (n,) joint angles of Home [rad].
-        options: what is mapped.
+        table: height of the table in the base frame [m].
+        voxel: edge of a voxel [m]; None for what suits the arm.
 
     Raises InputError for a value out of range, and for a map that would take too long.
     """
-    table, voxel, pitches, rolls = options
     kinematics = kinematics_of(chain)
     fineness = _fineness(kinematics)
-    reachability = Reachability(
-        chain,
-        T_base_shoulder,
-        table,
-        fineness.pitches if pitches is None else pitches,
-        fineness.rolls if rolls is None else rolls,
-        home,
-    )
+    reachability = Reachability(chain, T_base_shoulder, table, fineness.pitches, fineness.rolls)
     if voxel is None:
         voxel = ROUND * math.ceil(reachability.reach / fineness.voxels / ROUND)
     survey = Survey(reachability, voxel)
@@ -222,8 +189,7 @@ def survey_of(
     if poses > fineness.poses:
         raise InputError(
             f"The map would take {poses:.2g} poses, and at most {fineness.poses:.0e} are tried for "
-            f"this arm ({kinematics.method}). Choose larger voxels than {1e3 * voxel:g} mm, or "
-            "fewer pitches and rolls."
+            f"this arm ({kinematics.method}). Choose larger voxels than {1e3 * voxel:g} mm."
         )
     return survey
 
@@ -231,8 +197,7 @@ def survey_of(
 def _fineness(kinematics: Kinematics) -> Fineness:
     if isinstance(kinematics, FiveAxisKinematics):
         return FAMILY
-    if isinstance(kinematics, ClosedForm):
-        return CLOSED if kinematics.chain.n == 6 else PLANE
     if isinstance(kinematics, SevenAxes):
         return SWIVEL
-    return SEARCHED if kinematics.chain.n >= 6 else POINTS
+    is_closed = not isinstance(kinematics, Numerical) and kinematics.chain.n >= FREE_AXES
+    return CLOSED if is_closed else POINTS

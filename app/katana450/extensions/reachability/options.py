@@ -27,20 +27,6 @@ def add_workspace_options(parser: argparse.ArgumentParser) -> None:
         metavar="MM",
         help="edge of a voxel, mm (default: what suits the arm, 20 for the Katana450)",
     )
-    parser.add_argument(
-        "--pitches",
-        type=int,
-        metavar="N",
-        help="pitches of the tool tried in each voxel, all round (default: 36); from six axes on, "
-        "directions all over the sphere (default: 8, 12 or 24)",
-    )
-    parser.add_argument(
-        "--rolls",
-        type=int,
-        metavar="N",
-        help="rolls of the tool tried for each pitch or direction, all round (default: 24; from "
-        "six axes on 2, 4 or 6)",
-    )
     parser.add_argument("--out", type=Path, metavar="FILE.npz", help="file for the map")
     add_arm_options(parser)
 

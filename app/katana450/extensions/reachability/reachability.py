@@ -2,21 +2,18 @@
 
 The orientations that are tried depend on what the arm can choose:
 
-    six and more axes   directions of the z axis of the tool, spread evenly over the sphere, with
-                        turns about each; orientations in the base frame.
+    six and seven axes  directions of the z axis of the tool, spread evenly over the sphere, with
+    in closed form      turns about each; orientations in the base frame.
     five-axis family    pitches and rolls in equal steps over a full turn. The roll axis leans by
                         the pitch in the plane of the arm through the point. Where this plane passes
                         beside axis 1, there are two, one for each shoulder posture; the same pitch
                         and roll in both count once.
-    four axes           directions of the tool in the upright plane of the arm through the point.
-                        Either shoulder posture may hold them.
     all others          any orientation counts as one.
 
-Of six and four axes the orientation of the tool at Home is tried too, and reported by itself. With
-four axes that is its direction in the plane. An orientation counts if a posture takes it with every
-joint inside its limits, and no axis from the third on is below the table where its link begins.
-Contacts of bodies are not checked. Of seven axes the swivel is tried at some angles, and a
-numerical search begins at few postures; so both can miss an orientation, but count none too many.
+An orientation counts if a posture takes it with every joint inside its limits, and no axis from the
+third on is below the table where its link begins. Contacts of bodies are not checked. Of seven axes
+the swivel is tried at some angles, and the search of a point begins at few postures; so both can
+miss an orientation, but count none too many.
 """
 
 from __future__ import annotations
@@ -31,7 +28,6 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.caching import cached_property
-from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.descent import Descent, Regularity
@@ -43,7 +39,6 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
@@ -54,14 +49,11 @@ BoolArray = npt.NDArray[np.bool]
 IntArray = npt.NDArray[np.int64]
 """An array of 64-bit integers."""
 
-MAX_STEPS: Final = 720
-"""Maximum number of steps of a turn: half a degree, finer than the straightness of the links."""
+FREE_AXES: Final = 6
+"""Minimum number of axes with which a tool has every orientation."""
 
 SWIVELS: Final = 16
 """Number of angles of the swivel of seven axes that are tried for a pose."""
-
-SEEDS: Final = 6
-"""Number of postures from which a numerical search for a pose begins."""
 
 
 class Orientations(Protocol):
@@ -70,15 +62,12 @@ class Orientations(Protocol):
     Attributes:
         number: how many are tried.
         poses_at_once: the number of poses that are solved at once for each point.
-        has_home: whether the last one is that at Home.
     """
 
     @property
     def number(self) -> int: ...  # noqa: D102
     @property
     def poses_at_once(self) -> int: ...  # noqa: D102
-    @property
-    def has_home(self) -> bool: ...  # noqa: D102
 
     def possible(self, p: FloatArray) -> BoolArray:
         """Return (N, number) whether each is possible at `p` (N, 3) [m] in {S}."""
@@ -103,13 +92,8 @@ class PoseSolver:
 
     def taken(self, T: FloatArray) -> BoolArray:
         """Return (N,) whether a posture inside the limits takes the pose, for `T` (N, 4, 4)."""
-        match self.solver:
-            case ClosedForm():
-                return self._exact(self.solver.solve_batch(T), T)
-            case SevenAxes():
-                return self._with_swivel(self.solver, T)
-            case Numerical():
-                return self._searched(self.solver, T)
+        if isinstance(self.solver, SevenAxes):
+            return self._with_swivel(self.solver, T)
         return self._exact(self.solver.inverse_batch(T), T)
 
     def _with_swivel(self, solver: SevenAxes, T: FloatArray) -> BoolArray:
@@ -122,16 +106,6 @@ class PoseSolver:
             left = np.flatnonzero(~is_taken)
             q = solver.at_swivels(T[left], np.full(len(left), swivel))
             is_taken[left] = self._exact(q, T[left])
-        return is_taken
-
-    def _searched(self, solver: Numerical, T: FloatArray) -> BoolArray:
-        is_taken = np.zeros(len(T), dtype=np.bool)
-        hint = None
-        for number, pose in enumerate(T):
-            q = np.array(solver.solve(pose, hint, SEEDS))
-            is_taken[number] = self._exact(q[None, None], pose[None])[0]
-            # The next pose is often near this one.
-            hint = q if is_taken[number] else None
         return is_taken
 
     def _exact(self, q: FloatArray, T: FloatArray) -> BoolArray:
@@ -177,8 +151,6 @@ class PitchesAndRolls:
     solver: PoseSolver
     pitches: int
     rolls: int
-
-    has_home: ClassVar[bool] = False
 
     @property
     def number(self) -> int:
@@ -290,7 +262,6 @@ class PointSearch:
     number: ClassVar[int] = 1
     poses_at_once: ClassVar[int] = 64
     """A search takes about as long as this number of poses in closed form."""
-    has_home: ClassVar[bool] = False
 
     @cached_property
     def _descent(self) -> Descent:
@@ -324,108 +295,21 @@ class PointSearch:
         return False
 
 
-UPRIGHT: Final = 1e-6
-"""[1] Cosine between axes 1 and 4 up to which the plane of the arm is upright."""
-
-FACING: Final = 2
-"""Number of branches whose shoulder faces the tool point; they come first."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlaneDirections:
-    """The directions that are tried for one arm.
-
-    Attributes:
-        form: its closed form.
-        solver: the test of poses.
-        turns: (2, K) the turn about axis 4 [rad] that gives each direction: if the shoulder faces
-            the point, and if it has its back to it.
-    """
-
-    form: ClosedForm
-    solver: PoseSolver
-    turns: FloatArray
-
-    has_home: ClassVar[bool] = True
-
-    @classmethod
-    def of(
-        cls, form: ClosedForm, solver: PoseSolver, steps: int, home: FloatArray
-    ) -> PlaneDirections | None:
-        """Return ``steps`` directions in a turn, and as the last that at ``home`` (4,) [rad].
-
-        None for an arm whose plane is not upright.
-        """
-        chain = form.chain
-        up, across = chain.S[:3, 0], chain.S[:3, 3]
-        if abs(float(up @ across)) > UPRIGHT:
-            return None
-        outward = np.cross(up, across)
-        # A turn about axis 4 adds to an angle in this plane.
-        plane = np.stack((outward, np.cross(across, outward)))
-        axes = plane @ chain.M[:3, :3]
-        # The axis of the tool that lies in the plane; of two the first.
-        axis = int(np.round(np.linalg.norm(axes, axis=0), 6).argmax())
-        start = math.atan2(axes[1, axis], axes[0, axis])
-        T = forward(chain, home)
-        at_home = plane @ so3.exp(-float(home[0]) * up) @ T[:3, axis]
-        home_angle = math.atan2(at_home[1], at_home[0])
-        away = np.array(form.solve(T, home.tolist())) - home
-        away -= math.tau * np.round(away / math.tau)
-        if int(np.abs(away).max(axis=1).argmin()) >= FACING:
-            home_angle = math.pi - home_angle
-        angles = np.append(np.linspace(0.0, math.tau, steps, endpoint=False), home_angle)
-        # Seen from the back of the arm, outward is opposite.
-        return cls(form, solver, np.stack((angles - start, math.pi - angles - start)))
-
-    @property
-    def number(self) -> int:
-        """The number of directions, and that at Home."""
-        return int(self.turns.shape[1])
-
-    @property
-    def poses_at_once(self) -> int:
-        """All of them."""
-        return self.number
-
-    def possible(self, p: FloatArray) -> BoolArray:
-        """Return (N, K) whether each direction is possible at `p` (N, 3) [m] in {S}."""
-        chain, count = self.form.chain, self.turns.shape[1]
-        T = np.zeros((len(p), count, 4, 4))
-        T[..., 3, 3] = 1.0
-        T[..., :3, 3] = p[:, None]
-        T[:, 0, :3, :3] = chain.M[:3, :3]
-        # The point alone decides axis 1, apart from the side that faces it.
-        pans = self.form.solve_batch(T[:, 0])[:, ::FACING, 0]
-        possible = np.zeros((len(p), count), dtype=np.bool)
-        for pan, turns in zip(pans.T, self.turns, strict=True):
-            turned = np.array([so3.exp(turn * chain.S[:3, 3]) for turn in turns])
-            panned = np.array([so3.exp(angle * chain.S[:3, 0]) for angle in pan]).reshape(-1, 3, 3)
-            T[..., :3, :3] = panned[:, None] @ (turned @ chain.M[:3, :3])
-            possible |= self.solver.taken(T.reshape(-1, 4, 4)).reshape(len(p), count)
-        return possible
-
-
-POSES_OF_SEARCH: Final = 64
-"""Number of poses in closed form that take about as long as a search."""
-
 GOLDEN: Final = math.pi * (3.0 - math.sqrt(5.0))
 """[rad] Golden angle, by which neighbouring directions on a sphere are turned."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rotations:
-    """The orientations that six and more axes choose from.
+    """The orientations that six and seven axes choose from.
 
     Attributes:
         solver: the test of poses.
-        R: rotations (K, 3, 3) in {S}, that at Home last.
+        R: rotations (K, 3, 3) in {S}.
     """
 
     solver: PoseSolver
     R: FloatArray
-
-    has_home: ClassVar[bool] = True
 
     @property
     def number(self) -> int:
@@ -434,9 +318,8 @@ class Rotations:
 
     @property
     def poses_at_once(self) -> int:
-        """All of them. A search counts as many, so that its progress is seen."""
-        is_search = isinstance(self.solver.solver, Numerical)
-        return self.number * (POSES_OF_SEARCH if is_search else 1)
+        """All of them."""
+        return self.number
 
     def possible(self, p: FloatArray) -> BoolArray:
         """Return (N, number) whether each is possible at `p` (N, 3) [m] in {S}."""
@@ -455,11 +338,8 @@ class Reachability:
         chain: the arm with its tool, in {S}.
         T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
         table: height z of the table in the base frame [m].
-        pitches: number of pitches in a turn; from six axes on of directions of the tool.
+        pitches: number of pitches in a turn; of six and seven axes that of directions of the tool.
         rolls: number of rolls in a turn, for each pitch or direction.
-        home: (n,) joint angles of Home [rad].
-
-    Raises InputError for a number of steps outside 1 to MAX_STEPS.
     """
 
     chain: Chain
@@ -467,14 +347,6 @@ class Reachability:
     table: float
     pitches: int
     rolls: int
-    home: FloatArray
-
-    def __post_init__(self) -> None:
-        for name, steps in (("pitches", self.pitches), ("rolls", self.rolls)):
-            if not 1 <= steps <= MAX_STEPS:
-                raise InputError(
-                    f"The number of {name} is {steps}; it must be from 1 to {MAX_STEPS}."
-                )
 
     @cached_property
     def _links(self) -> DHLinks:
@@ -482,17 +354,14 @@ class Reachability:
 
     @cached_property
     def _orientations(self) -> Orientations:
-        kinematics, chain = kinematics_of(self.chain), self.chain
-        solver, plane = PoseSolver(kinematics, self.clear), None
-        if chain.n >= 6:
-            R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
-            at_home = forward(chain, self.home)[None, :3, :3]
-            return Rotations(solver, np.concatenate((R, at_home)))
+        kinematics = kinematics_of(self.chain)
+        solver = PoseSolver(kinematics, self.clear)
         if isinstance(kinematics, FiveAxisKinematics):
             return PitchesAndRolls(solver, self.pitches, self.rolls)
-        if chain.n == 4 and isinstance(kinematics, ClosedForm):
-            plane = PlaneDirections.of(kinematics, solver, self.pitches, self.home)
-        return PointSearch(chain, self.clear) if plane is None else plane
+        if isinstance(kinematics, Numerical) or self.chain.n < FREE_AXES:
+            return PointSearch(self.chain, self.clear)
+        R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
+        return Rotations(solver, R)
 
     @property
     def orientations(self) -> int:
@@ -515,19 +384,13 @@ class Reachability:
         return (self.T_base_shoulder @ self._links.T_S_1)[:3, 3]
 
     def count(self, points: FloatArray) -> IntArray:
-        """Return the counts (N, 2) at ``points`` (N, 3), in the base frame [m].
-
-        The first is the number of possible orientations, the second 1 if that at Home is one. Of an
-        arm without that at Home, it is the first alone (N,).
-        """
+        """Return the number of possible orientations (N,) at ``points`` (N, 3) in the base [m]."""
         far = ((points - self.middle) ** 2).sum(axis=1) > self.reach**2
         near = np.flatnonzero((points[:, 2] >= self.table) & ~far)
         p = (points[near] - self.T_base_shoulder[:3, 3]) @ self.T_base_shoulder[:3, :3]
-        possible = self._orientations.possible(p)
-        counts = np.zeros((len(points), 2), dtype=np.int64)
-        counts[near, 0] = possible.sum(axis=1)
-        counts[near, 1] = possible[:, -1]
-        return counts if self._orientations.has_home else counts[:, 0]
+        counts = np.zeros(len(points), dtype=np.int64)
+        counts[near] = self._orientations.possible(p).sum(axis=1)
+        return counts
 
     def clear(self, q: FloatArray) -> BoolArray:
         """Return (N,) whether no axis from the third on is below the table at `q` (N, n) [rad]."""

@@ -34,9 +34,6 @@ def fraction_colors(fraction: FloatArray) -> npt.NDArray[np.uint8]:
 FILL = 0.2
 """Ratio of a point's radius to its voxel's edge; the arm is visible between the points."""
 
-ANY, AT_HOME = "Any", "As at Home"
-"""The orientations that a point is shown for."""
-
 STOPS = 9
 """Number of colours of the scale; the browser interpolates between them."""
 
@@ -85,23 +82,13 @@ class ReachabilityLayer(ViewLayer):
             initial_value=Cut.HIDDEN.value,
             hint="Points that the tool reaches, from the map that the server was started with",
         )
-        # Only maps of arms that choose among all orientations tell which of them is that at Home.
-        which = gui.add_dropdown(
-            "Orientation",
-            (ANY, AT_HOME),
-            initial_value=ANY,
-            visible=False,
-            hint="All points that the tool reaches, or those where it can be turned as at Home",
-        )
         legend = gui.add_html(self._cloud.legend, visible=False)
 
         @cuts.on_update
-        @which.on_update
         def _(_: viser.GuiEvent[Any]) -> None:
             cut = Cut(cuts.value)
             legend.visible = cut is not Cut.HIDDEN
-            which.visible = legend.visible and self._cloud.tells_home
-            self._cloud.show(cut, at_home=which.value == AT_HOME)
+            self._cloud.show(cut)
 
 
 class ReachabilityCloud:
@@ -119,7 +106,6 @@ class ReachabilityCloud:
     def legend(self) -> str:
         """The legend as HTML: a colour scale, with labels at its ends."""
         top = self._stored.fraction.max(initial=0.0)
-        choices = "orientations" if self.tells_home else "pitches and rolls"
         stops = ", ".join(
             f"rgb({red}, {green}, {blue})"
             for red, green, blue in fraction_colors(np.linspace(0.0, 1.0, STOPS)).tolist()
@@ -128,16 +114,11 @@ class ReachabilityCloud:
             "<div class='k450'><p class='scale'>"
             f"How freely {escape(self._stored.tool)} can be turned there"
             f"<i style='background: linear-gradient(to right, {stops})'></i>"
-            f"0 %<span>{100.0 * top:.0f} % of all {choices}</span></p></div>"
+            f"0 %<span>{100.0 * top:.0f} % of all orientations</span></p></div>"
         )
 
-    @property
-    def tells_home(self) -> bool:
-        """True if the map tells where the orientation at Home is possible."""
-        return self._stored.at_home is not None
-
-    def show(self, cut: Cut, *, at_home: bool = False) -> None:
-        """Draw the part ``cut`` of the map, with ``at_home`` where the tool can be as at Home."""
+    def show(self, cut: Cut) -> None:
+        """Draw the part ``cut`` of the map."""
         if self._node is not None:
             self._node.remove()
             self._node = None
@@ -151,8 +132,6 @@ class ReachabilityCloud:
             Cut.HALF: across >= 0.0,
             Cut.WHOLE: np.ones(len(across), dtype=bool),
         }[cut]
-        if at_home and self._stored.at_home is not None:
-            shown &= self._stored.at_home
         self._node = self._server.scene.add_point_cloud(
             "/reachability",
             self._stored.points[shown].astype(np.float32),

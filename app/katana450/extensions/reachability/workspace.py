@@ -17,10 +17,9 @@ from katana450.assembly.robot_session import find_arm
 from katana450.atomic import check_writable, write_files
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
-from katana450.extensions.reachability.map import MapOptions, ReachabilityMap, Survey, survey_of
+from katana450.extensions.reachability.map import ReachabilityMap, Survey, survey_of
 from katana450.extensions.reachability.reachability import IntArray
-from katana450.extensions.reachability.reachability_file import write_npz
-from katana450.settings import Settings
+from katana450.extensions.reachability.reachability_file import StoredMap, write_npz
 
 MIN_SHARED_CHUNKS = 8
 """Number of chunks from which on starting further processes saves time."""
@@ -38,20 +37,15 @@ def workspace(options: argparse.Namespace) -> int:
     for note in (*arm.notes, *robot.notes):
         print(f"katana450: {note}", file=sys.stderr)
     tool = arm.default_tool
-    survey = survey_of(
-        arm.chain_to(tool),
-        arm.T_base_shoulder,
-        arm.ready(Settings.ready),
-        MapOptions(
-            1e-3 * options.table,
-            None if options.voxel is None else 1e-3 * options.voxel,
-            options.pitches,
-            options.rolls,
-        ),
-    )
+    voxel = None if options.voxel is None else 1e-3 * options.voxel
+    chain, T = arm.chain_to(tool), arm.T_base_shoulder
+    survey = survey_of(chain, T, 1e-3 * options.table, voxel)
     reach_map = survey.map(_counts(survey))
     if out is not None:
-        write_files({out: lambda file: write_npz(file, survey, reach_map, robot.name, tool)})
+        points, fraction = reach_map.points, reach_map.fraction
+        table = survey.reachability.table
+        stored = StoredMap(points, fraction, survey.voxel, table, robot.name, tool)
+        write_files({out: lambda file: write_npz(file, stored)})
     print(_summary(survey, reach_map, tool))
     if out is not None:
         print(f"Written: {out}")
@@ -99,9 +93,6 @@ def _summary(survey: Survey, reach_map: ReachabilityMap, tool: str) -> str:
     )
     if reachability.orientations == 1:
         return f"{reached}\nThe arm cannot choose its orientation there, so it is not mapped."
-    if reach_map.at_home is not None:
-        fraction = reach_map.at_home.mean()
-        reached += f"\nIn {fraction:.1%} of them it can have the orientation that it has at Home."
     return (
         f"{reached}\n"
         f"Of {reachability.orientations} orientations {reach_map.fraction.mean():.1%} on average, "
