@@ -59,7 +59,6 @@ ELSEWHERE = {
     "docker": "needs a container service; .ci/image builds and runs the image without one",
     "export": "sets a variable for docker",
     "git": "reads the history, which an archive of the sources does not have",
-    "colcon": "tests/exchange/test_ros2_package.py",
     "ros2": "needs ROS 2, which is not here",
     "./viewer": "tests/exchange compiles and runs it",
     "make": "tests/exchange runs the Makefile that is exported with the viewer",

@@ -11,7 +11,6 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 import trimesh
@@ -24,11 +23,6 @@ from katana450.extensions.export.urdf_package import package_files
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY
 
-MASS = 9.271
-"""[kg] Mass of the robot."""
-
-SHAPES = 53
-
 
 @pytest.fixture(scope="module")
 def folder(ros_package: Path) -> Path:
@@ -38,11 +32,6 @@ def folder(ros_package: Path) -> Path:
 @pytest.fixture(scope="module")
 def urdf(folder: Path) -> Path:
     return folder / "urdf" / "katana450.urdf"
-
-
-@pytest.fixture(scope="module")
-def model(urdf: Path) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_path(str(urdf))
 
 
 def test_yourdfpy_finds_the_same_robot_in_it(urdf: Path) -> None:
@@ -59,38 +48,6 @@ def test_yourdfpy_finds_the_same_robot_in_it(urdf: Path) -> None:
     for name, joint in here.joint_map.items():
         assert there.joint_map[name].limit == joint.limit
         assert there.joint_map[name].mimic == joint.mimic
-
-
-def test_mujoco_loads_the_same_robot(model: mujoco.MjModel) -> None:
-    here = mujoco.MjModel.from_xml_path(str(URDF_PATH))
-    assert (model.nbody, model.nmesh, model.ngeom) == (here.nbody, SHAPES, SHAPES)
-    assert model.body_mass.sum() == pytest.approx(MASS, abs=1e-9)
-    np.testing.assert_allclose(model.body_mass, here.body_mass)
-    np.testing.assert_allclose(model.jnt_range, here.jnt_range)
-    np.testing.assert_allclose(model.geom_pos, here.geom_pos, atol=1e-5)
-
-
-def test_driven_joints_have_a_transmission_each(urdf: Path, katana: Robot) -> None:
-    """Drake makes an actuator of each."""
-    driven = [
-        (transmission.findtext("type"), joint.get("name"))
-        for transmission in ET.parse(urdf).getroot().iterfind("transmission")
-        for joint in transmission.iterfind("joint")
-    ]
-    simple = "transmission_interface/SimpleTransmission"
-    assert driven == [(simple, name) for name in katana.driven]
-
-
-def test_mujoco_finds_no_contact_between_neighbours(model: mujoco.MjModel) -> None:
-    """There is no contact at zero, and none of column and shoulder at any angle of axis 1."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    assert data.ncon == 0
-    lower, upper = model.joint("axis_1").range
-    for angle in np.linspace(lower, upper, 100):
-        data.joint("axis_1").qpos[0] = angle
-        mujoco.mj_forward(model, data)
-        assert data.ncon == 0, angle
 
 
 def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
@@ -153,7 +110,6 @@ def test_a_package_of_another_robot_leaves_its_licence_to_be_stated() -> None:
 
 FOREIGN = """<robot name="two">
   <material name="red"><color rgba="1 0 0 1"/></material>
-  <mujoco><compiler balanceinertia="true" strippath="false"/></mujoco>
   <link name="base">
     <visual name="look"><origin xyz="0 0 1"/>
       <geometry><mesh filename="both.glb" scale="2 2 2"/></geometry></visual>
@@ -196,13 +152,6 @@ def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: P
     ]  # fmt: skip
     colours = {m.get("name"): m[0].get("rgba") for m in root.findall("material")}
     assert colours == {"red": "1 0 0 1", "red_2": "0 0 1 1", "blue": "0 1 0 1"}
-    (compiler,) = root.iter("compiler")
-    assert compiler.attrib == {
-        "balanceinertia": "true",
-        "strippath": "true",
-        "meshdir": "../meshes",
-        "fusestatic": "false",
-    }
     assert frame.find("inertial/mass[@value='0']") is not None
     assert moving.find("inertial") is None
     there = yourdfpy.URDF.load(str(path))

@@ -36,13 +36,7 @@ PACKAGES = {
     "view3dscene": "view3dscene",
     "firefox-esr": "firefox-esr",
     "node": "nodejs",
-    "check_urdf": "liburdfdom-tools",
     PIVY: "python3-pivy",
-    "colcon": "colcon",
-    "/usr/share/doc/python3-colcon-cmake": "python3-colcon-cmake",
-    "/usr/share/doc/python3-colcon-recursive-crawl": "python3-colcon-recursive-crawl",
-    "/usr/share/doc/python3-colcon-ros": "python3-colcon-ros",
-    "/usr/share/doc/ament-cmake": "ament-cmake",
 }
 """Programs and files, and the Debian packages that provide them."""
 
@@ -90,11 +84,6 @@ ROSLIB = Package("roslib@2.1.0", "node_modules/roslib/dist/RosLib.js", alone=Fal
 NPM_PACKAGES = (X_ITE, THREE, GLTF_VALIDATOR, ROSLIB)
 """Packages of npm; nothing of them is executed when they are unpacked."""
 
-PINOCCHIO = Package(
-    "pin==4.1.0", "cmeel.prefix/lib/python*/site-packages/pinocchio/__init__.py", alone=False
-)
-"""A library of rigid body dynamics that reads URDF."""
-
 OPENAPI_VALIDATOR = Package(
     "openapi-spec-validator==0.9.0", "openapi_spec_validator/__init__.py", alone=False
 )
@@ -106,13 +95,10 @@ ROSLIBPY = Package("roslibpy==2.1.0", "roslibpy/__init__.py", alone=False)
 FOXGLOVE = Package("foxglove-sdk==0.30.3", "foxglove/__init__.py")
 """The server for Foxglove of the extra `foxglove`, 54 MB."""
 
-WHEELS = (PINOCCHIO, OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
+WHEELS = (OPENAPI_VALIDATOR, ROSLIBPY, FOXGLOVE)
 """Packages of PyPI."""
 
 SCREEN = ("xvfb-run", "--auto-servernum", "--server-args=-screen 0 1280x1024x24")
-
-COLCON = ("cmake", "make", *(name for name in PACKAGES if "colcon" in name or "ament" in name))
-"""Programs and files that are needed to build ROS 2 packages."""
 
 VIEWER = ("gcc", "make", "/usr/include/GL/freeglut.h", "xvfb-run", "xauth")
 """Programs and files that are needed to build and run the C viewer."""

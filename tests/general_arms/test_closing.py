@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from katana450.arm.control.state import Reason, State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
-from katana450.extensions.export.ros2_package import srdf_text
 from katana450.extensions.hands.sides import FixedJaw, with_sides
 from katana450.extensions.programs.run.simulation import Planned, run_by_clock
 from katana450.maths.geometry import se3, so3
@@ -29,9 +27,7 @@ from tests.general_arms.published_hands import (
     RADIAL,
     ROBOTIQ_2F_85,
     SO101_BOXES,
-    closing_upwards,
     hand_urdf,
-    px150_urdf,
     so101_urdf,
 )
 from tests.general_arms.test_grasping import item, planned
@@ -223,21 +219,6 @@ def test_answer_and_description_name_the_closed_end_first(tmp_path: Path) -> Non
     path.write_text(hand_urdf("UR5e", ROBOTIQ_2F_85), encoding="utf-8")
     robot, session, _ = find_robot(Settings(), path, None)
     assert serialize.arm(robot, session.ready.tolist()).gripper == (0.8, 0.0, 2.0)
-
-
-@pytest.mark.parametrize("upwards", [False, True])
-def test_export_for_moveit_opens_and_closes_as_the_fingers_do(
-    upwards: bool, tmp_path: Path
-) -> None:
-    path, sign = tmp_path / "arm.urdf", -1.0 if upwards else 1.0
-    path.write_text(closing_upwards(px150_urdf()) if upwards else px150_urdf(), encoding="utf-8")
-    states = {
-        state.attrib["name"]: float(state[0].attrib["value"])
-        for state in ET.fromstring(srdf_text(load(path))).iter("group_state")
-        if state.attrib["group"] == "gripper" and state[0].attrib["name"] == "left_finger"
-    }
-    assert states["closed"] == pytest.approx(0.015 * sign)
-    assert states["open"] == pytest.approx(0.037 * sign)
 
 
 def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:

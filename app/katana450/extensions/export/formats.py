@@ -112,7 +112,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         "binary glTF 2.0, for browsers, Blender and game engines", _glb, posed=True, animated=True
     ),
     "urdf": ExportFormat(
-        "a zip of a ROS 2 package: URDF, meshes, launch files, ros2_control, SRDF",
+        "a zip of a ROS 2 package of URDF and meshes",
         _urdf,
     ),
     "mjcf": ExportFormat(

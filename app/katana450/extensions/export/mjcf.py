@@ -233,7 +233,7 @@ class _Model:
             )
         self._add_body(ET.SubElement(root, "worldbody"), robot.links[0])
         contact = ET.SubElement(root, "contact")
-        for first, second, _ in excluded_pairs(robot):
+        for first, second in excluded_pairs(robot):
             ET.SubElement(contact, "exclude", body1=_body(first), body2=_body(second))
         self._add_couplings(root)
         self._add_actuators(root)

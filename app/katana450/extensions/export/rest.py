@@ -8,7 +8,6 @@ from itertools import combinations
 import numpy as np
 
 from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.structure import ARM_JOINTS
 from katana450.extensions.bodies.pairs_at_rest import pairs_at_rest
@@ -36,50 +35,27 @@ def home_vector(robot: Robot) -> FloatArray:
     return np.append(arm.ready(Settings.ready), arm.gripper.clamp(0.0))
 
 
-ADJACENT, NEVER, DEFAULT = "Adjacent", "Never", "Default"
-"""Reasons of MoveIt: neighbours in the tree, never in contact, in contact at home."""
-
-
-def excluded_pairs(robot: Robot) -> list[tuple[str, str, str]]:
-    """Return (link, link, reason) of the pairs of links with collision shapes that cannot meet.
+def excluded_pairs(robot: Robot) -> list[tuple[str, str]]:
+    """Return the names of the pairs of links with collision shapes that cannot meet.
 
     For an arm of the five-axis family these are all pairs that this project does not check either:
     neighbours, pairs that no sampled posture brings near each other, and those that always overlap.
     For any other robot these are the neighbours, and the pairs whose hulls touch at home.
     """
-    touching: set[tuple[str, str]] = set()
 
     def at_home(linkage: Linkage, parts: Sequence[Part]) -> CollisionWorld:
         rest = pairs_at_rest(linkage, parts, home_vector(robot))
-        touching.update((parts[a].name, parts[b].name) for a, b in rest.touching)
         return CollisionWorld(linkage, parts, rest.checked)
 
-    links = {link.name: link for link in robot.links if link.collisions}
+    links = {link.name for link in robot.links if link.collisions}
     if not links:
         return []
     family = robot.arm is not None and robot.arm.chain.n == ARM_JOINTS
     world, _ = world_of(robot, make=None if family else at_home)
     names = [] if world is None else [part.name for part in world.parts]
     checked = set() if world is None else {(names[a], names[b]) for a, b in world.pairs}
-
-    def reason(a: str, b: str) -> str:
-        if (a, b) in touching:
-            return DEFAULT
-        near = not family or len(_joints_between(robot, links[a], links[b])) <= 1
-        return ADJACENT if near else NEVER
-
     return [
-        (a, b, reason(a, b))
-        for a, b in combinations([name for name in names if name in links], 2)
-        if (a, b) not in checked
+        pair
+        for pair in combinations([name for name in names if name in links], 2)
+        if pair not in checked
     ]
-
-
-def _joints_between(robot: Robot, a: Link, b: Link) -> set[str]:
-    """Return the driven joints that move ``b`` relative to ``a``."""
-    above = [
-        {link.joint.name: link.joint.leader for link in robot.path_to(end) if link.joint}
-        for end in (a, b)
-    ]
-    only = above[0].keys() ^ above[1].keys()
-    return {(above[0] | above[1])[name] for name in only}

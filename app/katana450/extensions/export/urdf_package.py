@@ -1,10 +1,8 @@
 """A URDF with its meshes as a zip of a ROS package, to be unpacked into a workspace.
 
 Programs differ in the files that they find and read. `package://` names are for ROS, yourdfpy and
-PyBullet. MuJoCo drops folders from names, so the URDF names the folder for it. PyBullet does not
-read glTF, so such meshes become OBJ, one file per material, and the URDF names the colours. Drake
-refuses the STL of a collision, so collisions become OBJ too. It drives the joints that have a
-<transmission>.
+PyBullet. PyBullet does not read glTF, so such meshes become OBJ, one file per material, and the
+URDF names the colours. Drake refuses the STL of a collision, so collisions become OBJ too.
 """
 
 from __future__ import annotations
@@ -14,43 +12,52 @@ import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
+from xml.sax.saxutils import escape
 
 import numpy as np
 
-from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual, mesh_file
-from katana450.assembly.robot_files import read_robot, read_urdf
-from katana450.assembly.robot_session import find_arm
+from katana450.assembly.robot_files import read_urdf
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.files import distinct, zipped
 from katana450.extensions.export.obj_text import LIBRARY, mtl_text, obj_text
-from katana450.extensions.export.ros2_package import (
-    RVIZ,
-    cmake_text,
-    control_launch,
-    control_xacro,
-    controllers_yaml,
-    display_launch,
-    groups_of,
-    manifest_text,
-    rviz_text,
-    srdf_text,
-)
 from katana450.resources import URDF_PATH
 
 CONVERTED = (".glb", ".gltf")
 """Suffixes of visual meshes that become OBJ; others are copied unchanged."""
-
-MUJOCO = {"strippath": "true", "meshdir": "../meshes", "fusestatic": "false"}
-"""Attributes for MuJoCo's compiler: find meshes without `package://`, keep links on fixed joints.
-"""
 
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 """Attributes of an inertia."""
 
 OWN_LICENSE, UNSTATED_LICENSE = "MIT", "TODO: License declaration"
 """Licence of the Katana450's description, and ROS's placeholder for that of another robot."""
+
+
+CMAKE = """\
+cmake_minimum_required(VERSION 3.8)
+project({name} NONE)
+find_package(ament_cmake REQUIRED)
+install(DIRECTORY {folders} DESTINATION share/${{PROJECT_NAME}})
+ament_package()
+"""
+"""Template of CMakeLists.txt, which installs the folders."""
+
+MANIFEST = """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>{name}</name>
+  <version>0.1.0</version>
+  <description>{robot}: URDF and meshes</description>
+  <maintainer email="todo@todo.todo">TODO: Maintainer</maintainer>
+  <license>{license}</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"""
+"""Template of package.xml. Its placeholders are those of ROS's package generator."""
 
 
 class _Part(NamedTuple):
@@ -75,36 +82,16 @@ def package_files(path: Path) -> dict[str, bytes]:
     (plain,) = distinct([robot])
     package = f"{plain.lower()}_description"
     _weigh_frames(root)
-    model = read_robot(path, None, find_arm)
-    _add_transmissions(root, model)
     meshes = _with_meshes(root, path.parent, f"package://{package}/")
+    licence = OWN_LICENSE if path.resolve() == URDF_PATH.resolve() else UNSTATED_LICENSE
+    folders = "urdf meshes" if meshes else "urdf"
     files = {
+        "package.xml": MANIFEST.format(name=package, robot=escape(robot), license=licence).encode(),
+        "CMakeLists.txt": CMAKE.format(name=package, folders=folders).encode(),
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,
-        **_launched(model, package, plain),
-    }
-    licence = OWN_LICENSE if path.resolve() == URDF_PATH.resolve() else UNSTATED_LICENSE
-    files = {
-        "package.xml": manifest_text(package, robot, licence).encode(),
-        "CMakeLists.txt": cmake_text(package, files).encode(),
-        **files,
     }
     return {f"{package}.zip": zipped({f"{package}/{n}": c for n, c in files.items()}, mode=0o644)}
-
-
-def _launched(robot: Robot, package: str, plain: str) -> dict[str, bytes]:
-    """Return the files by which ROS shows and drives ``robot``; ``plain`` is its name in files."""
-    xacro = f"{plain}.control.xacro"
-    controllers = ["joint_state_broadcaster", *(group.controller for group in groups_of(robot))]
-    texts = {
-        f"urdf/{xacro}": control_xacro(robot, f"{plain}.urdf"),
-        "config/controllers.yaml": controllers_yaml(robot),
-        f"config/{plain}.srdf": srdf_text(robot),
-        "launch/display.launch.py": display_launch(package, f"{plain}.urdf"),
-        "launch/control.launch.py": control_launch(package, xacro, controllers),
-        f"rviz/{RVIZ}": rviz_text(robot),
-    }
-    return {name: text.encode() for name, text in texts.items()}
 
 
 def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes]:
@@ -153,7 +140,6 @@ def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes
             parent.insert(index + k, _pointed(element, prefix + place, part.material, k))
     for k, (material, name) in enumerate(names.items()):
         root.insert(k, _material(name, material))
-    _configure_mujoco(root)
     files = {place: part.content for group in placed.values() for place, part in group}
     if names:
         files[f"meshes/{LIBRARY}"] = mtl_text({n: m for m, n in names.items()}).encode()
@@ -227,21 +213,6 @@ def _material(name: str, material: Material) -> ET.Element:
     return element
 
 
-def _add_transmissions(root: ET.Element, robot: Robot) -> None:
-    """Give each driven joint a transmission by position, unless the URDF has one for it."""
-    known = {joint.get("name") for joint in root.iterfind("transmission/joint")}
-    for name in robot.driven:
-        if name in known:
-            continue
-        element = ET.SubElement(root, "transmission", name=f"{name}_transmission")
-        ET.SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
-        joint = ET.SubElement(element, "joint", name=name)
-        interface = "hardware_interface/PositionJointInterface"
-        ET.SubElement(joint, "hardwareInterface").text = interface
-        actuator = ET.SubElement(element, "actuator", name=f"{name}_motor")
-        ET.SubElement(actuator, "mechanicalReduction").text = "1"
-
-
 def _weigh_frames(root: ET.Element) -> None:
     """Set the mass of links without inertia on fixed joints to 0; PyBullet would assume 1 kg."""
     fixed = {
@@ -254,16 +225,3 @@ def _weigh_frames(root: ET.Element) -> None:
             inertial = ET.SubElement(link, "inertial")
             ET.SubElement(inertial, "mass", value="0")
             ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
-
-
-def _configure_mujoco(root: ET.Element) -> None:
-    """Set the attributes of `MUJOCO`; other attributes for MuJoCo stay."""
-    extension = root.find("mujoco")
-    if extension is None:
-        extension = ET.Element("mujoco")
-        extension.tail = "\n  "
-        root.insert(0, extension)
-    compiler = extension.find("compiler")
-    if compiler is None:
-        compiler = ET.SubElement(extension, "compiler")
-    compiler.attrib.update(MUJOCO)
