@@ -26,7 +26,7 @@ from katana450.server.viser_bridge.flow import (
     OVERDUE,
     FlowControl,
 )
-from katana450.server.web.limits import TokenBucket
+from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 
 class Clocks:
@@ -241,3 +241,13 @@ def test_impossible_acknowledgement_is_ignored(count: int) -> None:
     assert flow.seen(2, 2.0)
     assert not flow.seen(count, 2.5)
     assert flow.age(3.0) == pytest.approx(1.0)
+
+
+def test_senders_have_buckets_of_their_own_and_one_together() -> None:
+    buckets = SenderBuckets(1.0, 2.0, 3, TokenBucket(0.0, 5.0, 0.0))
+    assert [buckets.take("Anna", 0.0) for _ in range(3)] == [True, True, False]
+    assert [buckets.take(sender, 0.0) for sender in ("Bert", "Cleo", "Dora", "Eve")] == [
+        *(True, True, True, False)
+    ]
+    # The oldest one was replaced.
+    assert len(buckets) == 3

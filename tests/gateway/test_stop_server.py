@@ -139,7 +139,7 @@ def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
 def test_delayed_press_counts_once_the_stop_is_cleared(
     port: Port, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stop_server, "RATE", 0.0)
+    monkeypatch.setattr(port.server._often, "_rate", 0.0)
 
     async def act() -> None:
         port.pipe.status = STOPPED
@@ -182,20 +182,6 @@ def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Port) -> 
         assert port.pipe.presses == []
         # They do not use up the rate of a link.
         assert await port.stop(port.vera) == (202, "requested")
-
-    asyncio.run(act())
-
-
-def test_number_of_counted_clients_is_bounded(port: Port, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stop_server, "MAX_CLIENTS", 1)
-
-    async def act() -> None:
-        port.pipe.status = STOPPED
-        await exhaust(port, port.vera)
-        assert await port.stop(port.otto) == (200, "confirmed")
-        assert list(port.server._often) == [
-            each.actor.key for each in port.pipe.presses if each.cause.by == "Otto, Program"
-        ]
 
     asyncio.run(act())
 

@@ -41,7 +41,7 @@ from katana450.server.web.bodies import (
     as_json,
     body_of,
 )
-from katana450.server.web.limits import ConnectionLimit, TokenBucket
+from katana450.server.web.limits import ConnectionLimit, SenderBuckets
 
 
 def keep_mesh(hub: Hub, mesh: Mesh) -> answers.Mesh:
@@ -127,7 +127,7 @@ class Uploads:
         self._hub = hub
         self._authenticator = authenticator
         self._identity = identity
-        self._often: dict[str, TokenBucket] = {}
+        self._often = SenderBuckets(RATE, UPLOAD_BURST, MAX_SENDERS)
         self._reading = asyncio.Lock()
         self._places = ConnectionLimit(WAITING, WAITING_EACH)
 
@@ -193,7 +193,7 @@ class Uploads:
         assert client is not None
         places = reserved(self._hub, self._authenticator, client, RESERVED)
         with self._places.taken(client.session, places) as free:
-            if not free or not self._is_due(client.session):
+            if not free or not self._often.take(client.session, self._hub.clock()):
                 why = "Too many files at once. Wait a moment."
                 self._hub.recorder.refuse(
                     "upload", actor_of(sender, CommandChannel.HTTP), InputError(why)
@@ -212,15 +212,6 @@ class Uploads:
                 return as_json(answers.Refused(why=str(error)), NOT_UNDERSTOOD)
             except (LeaseError, CancelledError) as error:
                 return as_json(answers.Refused(why=str(error)), NOT_NOW)
-
-    def _is_due(self, session: str) -> bool:
-        """Count an upload of ``session``; return whether the identity may upload again."""
-        t = self._hub.clock()
-        often = self._often.pop(session, None) or TokenBucket(RATE, UPLOAD_BURST, t)
-        self._often[session] = often
-        while len(self._often) > MAX_SENDERS:
-            del self._often[next(iter(self._often))]
-        return often.take(t)
 
     async def _in_thread(self, request: Request, read: Callable[[], T]) -> T:
         """Return the result of ``read``, run in a thread, or cancel it if the client leaves.

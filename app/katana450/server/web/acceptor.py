@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from ipaddress import IPv6Address
 
 from katana450.caching import cached_property
-from katana450.server.web.limits import TokenBucket
+from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 log = logging.getLogger(__name__)
 
@@ -116,8 +116,8 @@ class Acceptor:
         self._surplus: dict[_Connection, asyncio.TimerHandle] = {}
         self._tasks: list[asyncio.Task[None]] = []
         self._logged: dict[str, float] = {}
-        self._budget = TokenBucket(RATE, BURST, 0.0)
-        self._budgets: dict[str, TokenBucket] = {}
+        total = TokenBucket(RATE, BURST, 0.0)
+        self._budgets = SenderBuckets(PREFIX_RATE, PREFIX_BURST, MAX_PREFIXES, total)
 
     def start(
         self, protocol: Callable[[], asyncio.Protocol], tls: ssl.SSLContext | None = None
@@ -173,7 +173,7 @@ class Acceptor:
                         await asyncio.sleep(BACK_OFF)
                     break
                 connection = _Connection(sock, (address[0], address[1]), loop.time())
-                if self._within_budget(connection):
+                if self._budgets.take(connection.prefix, connection.since):
                     self._admit(connection)
                     continue
                 timer = loop.call_later(FIRST_CHECK, self._judge, connection, GRACE)
@@ -182,17 +182,6 @@ class Acceptor:
                     self._judge(next(iter(self._surplus)))
             # An accept that returns at once does not yield to other tasks.
             await asyncio.sleep(0)
-
-    def _within_budget(self, connection: _Connection) -> bool:
-        """Count ``connection``; return whether its prefix, and all together, may open one more."""
-        t = connection.since
-        budget = self._budgets.pop(connection.prefix, None)
-        budget = self._budgets[connection.prefix] = budget or TokenBucket(
-            PREFIX_RATE, PREFIX_BURST, t
-        )
-        if len(self._budgets) > MAX_PREFIXES:
-            del self._budgets[next(iter(self._budgets))]
-        return budget.take(t) and self._budget.take(t)
 
     def _judge(self, connection: _Connection, grace: float = 0.0) -> None:
         """Open the surplus ``connection`` if it has sent something; else close it after ``grace``.

@@ -1,4 +1,4 @@
-"""Token bucket: a rate limit with bursts."""
+"""Rate limits with bursts, of one sender or of each, and limits of what is open at once."""
 
 from __future__ import annotations
 
@@ -25,6 +25,33 @@ class TokenBucket:
             return False
         self._left -= tokens
         return True
+
+
+class SenderBuckets:
+    """A bucket for each sender, filled at its first event, and one for all together."""
+
+    def __init__(
+        self, rate: float, size: float, maximum: int, total: TokenBucket | None = None
+    ) -> None:
+        """Create no bucket yet; ``rate`` and ``size`` are those of each.
+
+        ``maximum``: number of buckets that are kept; a new one replaces the oldest. ``total``: the
+        bucket for all senders together; None for none.
+        """
+        self._rate, self._size, self._maximum, self._total = rate, size, maximum, total
+        self._buckets: dict[str, TokenBucket] = {}
+
+    def take(self, sender: str, t: float) -> bool:
+        """Take a token of ``sender`` at time ``t`` [s]; return False if none is left."""
+        bucket = self._buckets.pop(sender, None) or TokenBucket(self._rate, self._size, t)
+        self._buckets[sender] = bucket
+        if len(self._buckets) > self._maximum:
+            del self._buckets[next(iter(self._buckets))]
+        return bucket.take(t) and (self._total is None or self._total.take(t))
+
+    def __len__(self) -> int:
+        """Return the number of buckets."""
+        return len(self._buckets)
 
 
 class ConnectionLimit:

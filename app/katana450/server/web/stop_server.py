@@ -39,7 +39,7 @@ from katana450.server.web.authenticator import (
     Authenticator,
     framing_fault,
 )
-from katana450.server.web.limits import TokenBucket
+from katana450.server.web.limits import SenderBuckets
 
 log = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ class StopServer:
         self._address = address
         self._main_port = main_port
         self._acceptor = acceptor
-        self._often: dict[str, TokenBucket] = {}
+        self._often = SenderBuckets(RATE, BURST, MAX_CLIENTS)
         self._kept = 0
 
     async def reply(self, request: h11.Request, client: tuple[str, int] | None) -> Reply:
@@ -163,12 +163,7 @@ class StopServer:
 
     def _takes(self, who: str) -> bool:
         """Count a request of ``who``; return False if there are too many."""
-        now = time.monotonic()
-        bucket = self._often.pop(who, None) or TokenBucket(RATE, BURST, now)
-        self._often[who] = bucket
-        while len(self._often) > MAX_CLIENTS:
-            del self._often[next(iter(self._often))]
-        return bucket.take(now)
+        return self._often.take(who, time.monotonic())
 
     def _refusal(self, method: bytes, path: str, host: str, origin: str | None) -> Reply | None:
         if not self._address.is_ours(host):
