@@ -97,52 +97,6 @@ def test_record_of_a_megabyte_is_replaced_by_its_length(tmp_path: Path) -> None:
     assert max(map(len, lines(tmp_path))) <= MAX_LINE_BYTES
 
 
-def test_show_filters_by_time_participant_and_kind(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    anna = {"name": "Anna", "role": "operator", "address": "10.0.0.7"}
-    old = {"time": "2026-01-01T00:00:00.000Z", "kind": "stop", "who": anna}
-    write(tmp_path, [old, record("stop", who=anna), record("lease", who={"name": "Bert"})])
-
-    def shown(*options: str) -> list[str]:
-        assert main(["log", "show", str(tmp_path), *options]) == 0
-        lines = [line.split("  ") for line in capsys.readouterr().out.splitlines()]
-        return [f"{parts[2]} {parts[1].split()[0]}" for parts in lines]
-
-    assert len(shown()) == 5
-    assert shown("--kind", "stop") == 2 * ["stop Anna"]
-    assert shown("--kind", "stop", "--kind", "lease") == [*2 * ["stop Anna"], "lease Bert"]
-    assert shown("--who", "anna", "--since", "10m") == ["stop Anna"]
-    assert shown("--who", "10.0.0.7", "--since", "2025-12-31") == 2 * ["stop Anna"]
-
-
-@pytest.mark.parametrize(
-    ("since", "shown"),
-    [
-        ("2026-01-31T11:59:59", True),
-        ("2026-01-31 12:00:01", False),
-        ("2026-01-31T13:59:59+02:00", True),
-        ("2026-01-31T14:00:01+02:00", False),
-        ("2026-01-31T09:00:01-03:00", False),
-        ("2026-01-31T12:00:00Z", True),
-        ("2026-01-31", True),
-    ],
-)
-def test_show_takes_a_time_of_any_zone(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], since: str, shown: bool
-) -> None:
-    write(tmp_path, [{"time": "2026-01-31T12:00:00.000Z", "kind": "stop"}])
-    assert main(["log", "show", str(tmp_path), "--since", since, "--kind", "stop"]) == 0
-    assert bool(capsys.readouterr().out) == shown
-
-
-def test_show_refuses_a_time_that_is_none(capsys: pytest.CaptureFixture[str]) -> None:
-    for since in ("noon", "0001-01-01T00:00+02:00"):
-        with pytest.raises(SystemExit):
-            main(["log", "show", "--since", since])
-        assert "a time such as 30m, 12h, 7d" in capsys.readouterr().err
-
-
 def test_end_that_nobody_requested_is_recorded_as_a_failure(tmp_path: Path) -> None:
     for requested in (True, False):
         DiskLog(tmp_path, 8080).close(requested=requested)

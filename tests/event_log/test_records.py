@@ -56,23 +56,15 @@ def made(*notes: Note, end: float = 1000.0) -> list[Record]:
     return RecordMaker().made(list(notes), end, closing=True)
 
 
-def what(found: list[Record]) -> list[tuple[str, str, object]]:
-    return [(each["kind"], each["what"]["command"], each["what"].get("count")) for each in found]
+def what(found: list[Record]) -> list[tuple[str, str]]:
+    return [(each["kind"], each["what"]["command"]) for each in found]
 
 
-def test_stream_makes_a_record_at_its_start_and_at_its_end() -> None:
+def test_stream_makes_a_record_of_its_first_command() -> None:
     notes = [command(n / 50, cmd.Servo(np.full(5, n / 10)), n + 1) for n in range(100)]
-    first, end = made(*notes)
+    (first,) = made(*notes)
     assert first["what"]["q"] == [0.0] * 5
-    assert (end["kind"], end["what"]["count"]) == ("stream", 100)
-    assert end["what"]["seconds"] == pytest.approx(1.98)
-    assert end["what"]["first"]["q"] == [0.0] * 5
-    assert end["what"]["last"]["q"] == [9.9] * 5
-    assert (end["t"], end["grounds"]) == (1.98, "holds the lease")
-
-
-def test_single_command_of_a_stream_makes_one_record() -> None:
-    assert what(made(command(1.0, cmd.Joint(1, 0.5)))) == [("command", "Joint", None)]
+    assert (first["t"], first["grounds"]) == (0.0, "holds the lease")
 
 
 def test_pause_another_joint_and_another_participant_begin_new_streams() -> None:
@@ -84,35 +76,33 @@ def test_pause_another_joint_and_another_participant_begin_new_streams() -> None
         command(later, cmd.Joint(1, 0.3)),
         command(later, cmd.Joint(1, 0.4), actor=BERT),
     )
-    assert what(found) == [
-        ("command", "Joint", None),
-        ("command", "Joint", None),
-        ("stream", "Joint", 2),
-        ("command", "Joint", None),
-        ("command", "Joint", None),
-    ]
-    assert [each["what"].get("axis") for each in found] == [1, 2, None, 1, 1]
+    assert what(found) == 4 * [("command", "Joint")]
+    assert [each["what"].get("axis") for each in found] == [1, 2, 1, 1]
 
 
-def test_streams_end_before_the_stop_that_ends_them() -> None:
+def test_stop_ends_a_stream() -> None:
     jogs = [command(n / 10, cmd.Jog(np.array([0.1, 0, 0, 0, 0]))) for n in range(5)]
-    stop = Note(0.5, "stop", BERT, {"stop": "pressed"}, always=True)
-    found = made(*jogs, stop)
-    assert [each["kind"] for each in found] == ["command", "stream", "stop"]
+    stop = Note(0.25, "stop", BERT, {"stop": "pressed"}, always=True)
+    found = made(*jogs[:3], stop, *jogs[3:])
+    assert [each["kind"] for each in found] == ["command", "stop", "command"]
 
 
 def test_released_key_ends_the_stream_of_jogs() -> None:
-    maker = RecordMaker()
     jogs = [cmd.Jog(np.array([0.1, 0, 0, 0, 0])), cmd.Jog(np.zeros(5))]
-    found = maker.made([command(n / 10, each) for n, each in enumerate(jogs)], 0.1)
-    assert what(found) == [("command", "Jog", None), ("stream", "Jog", 2)]
-    assert maker.is_idle
+    found = made(*(command(n / 10, each) for n, each in enumerate((*jogs, *jogs))))
+    assert [each["t"] for each in found] == [0.0, 0.2]
 
 
 def test_long_stream_makes_records_on_the_way() -> None:
     notes = [command(n / 2, cmd.Servo(np.zeros(5))) for n in range(300)]
-    ends = [each for each in made(*notes) if each["kind"] == "stream"]
-    assert [each["what"]["count"] for each in ends] == [121, 121, 58]
+    assert [each["t"] for each in made(*notes)] == [0.0, 60.5, 121.0]
+
+
+def test_streams_that_have_ended_are_forgotten() -> None:
+    maker = RecordMaker()
+    maker.made([command(0.0, cmd.Joint(1, 0.1))], 0.0)
+    maker.made([], 1.01 * STREAM_GAP)
+    assert maker._streams == {}
 
 
 def test_nudges_are_recorded_one_by_one() -> None:
@@ -188,8 +178,7 @@ def test_flood_of_one_participant_is_counted_and_leaves_room_for_others() -> Non
     more = [each for each in found if each["kind"] == "more"]
     assert len(more) <= 3
     assert sum(each["what"]["count"] for each in more) + kinds.count("refusal") == 20_000
-    assert {each["who"]["name"] for each in more} == {"Bert"}
-    assert list(more[0]["what"]["of"]) == ["refusal Home"]
+    assert list(more[0]["what"]["of"]) == ["Bert: refusal Home"]
 
 
 def test_flood_of_many_strangers_is_counted() -> None:
@@ -272,7 +261,7 @@ def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
     stops = [each for each in found if each["kind"] == "stop" and each["who"]["name"] == "Flood"]
     more = [each for each in found if each["kind"] == "more"]
     assert len(stops) < 100
-    assert len(stops) + sum(each["what"]["of"]["stop"] for each in more) == 400
+    assert len(stops) + sum(each["what"]["of"]["Flood: stop"] for each in more) == 400
     assert "repeated" not in stops[0]["what"]
     commands = [each["what"]["command"] for each in found if each["kind"] in ("command", "clear")]
     assert commands == ["Speed", "ClearStop", "Nudge"]

@@ -24,21 +24,9 @@ def log(options: Namespace) -> int:
         if line.record is None:
             print(f"{line.place}: this is not a record.", file=sys.stderr)
             status = 1
-        elif _matches(line.record, options):
+        else:
             print(_shown(line.record))
     return status
-
-
-def _matches(record: Record, options: Namespace) -> bool:
-    if _text(record, "time") < options.since:
-        return False
-    if options.kind and record.get("kind") not in options.kind:
-        return False
-    if options.who is None:
-        return True
-    who = record.get("who")
-    values = who.values() if isinstance(who, dict) else ()
-    return any(options.who.casefold() in str(value).casefold() for value in values)
 
 
 def _shown(record: Record) -> str:

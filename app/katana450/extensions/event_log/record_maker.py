@@ -1,20 +1,20 @@
 """Records of the event log, made from notes in a thread, and sent to the process that writes them.
 
-Who did what, on what grounds, with what outcome. Commands that come in streams make one record at
-the start and one at the end. Of the records that one participant can cause, more than a limit are
-counted, so that nobody can quickly fill the log, or displace older records by new ones.
+Who did what, on what grounds, with what outcome. Commands that come in streams make one record, of
+the first. Of the records that one participant can cause, more than a limit are counted, so that
+nobody can quickly fill the log, or displace older records by new ones.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from argparse import Namespace
 from collections import Counter, OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from queue import Empty
 from typing import Any
@@ -30,13 +30,13 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.extensions.event_log.record_content import content_of
 from katana450.extensions.event_log.records import Record, record, text, utc
 from katana450.server.service.recorder import LeaseChange, Note, Recorder
-from katana450.server.web.limits import TokenBucket
+from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 STREAM_GAP = 1.0
 """[s] Time without another command after which a stream has ended."""
 
 MAX_STREAM_SECONDS = 60.0
-"""[s] Duration after which a long stream gets a record, and continues as a new one."""
+"""[s] Duration after which a long stream gets another record."""
 
 MAX_TICKETS = 1024
 """Maximum number of commands whose outcome is awaited."""
@@ -49,8 +49,8 @@ StreamKey = tuple[str, str, str, object]
 SUMMARY_INTERVAL = 10.0
 """[s] Time between two summaries of what was not written."""
 
-MAX_ACCOUNTS = 512
-"""Maximum number of accounts; beyond it the oldest ones are counted with all others."""
+MAX_SENDERS = 512
+"""Maximum number of participants whose records are counted, for each kind."""
 
 SESSION = (60.0, 0.2)
 
@@ -69,8 +69,8 @@ kind leaves the others as they are."""
 COMMANDS = (600.0, 2.0)
 """The same for all other kinds."""
 
-EVERYBODY, EVERYBODY_FACTOR = "everybody", 4.0
-"""Source of the records of all participants together, and their limits in limits of one."""
+EVERYBODY_FACTOR = 4.0
+"""Limits of all participants together, in limits of one."""
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ COLLECTING = 0.02
 """[s] Minimum time between two turns of the thread, so that a stream wakes it rarely."""
 
 TURN = 0.25
-"""[s] Maximum time between two turns while a stream or a summary is open."""
+"""[s] Maximum time between two turns while a summary is open."""
 
 IDLE_TURN = 1.0
 """[s] Maximum time between two turns otherwise, after which a problem of the writer is known."""
@@ -87,25 +87,11 @@ CLOSE_TIMEOUT = 1.0
 """[s] Time for the last records at the end of the process."""
 
 
-@dataclass
-class CommandStream:
-    """Commands of one kind from one participant, in quick succession."""
-
-    first: Note
-    last: Note
-    count: int = 1
-
-    def add(self, note: Note) -> None:
-        """Add the next command."""
-        self.last = note
-        self.count += 1
-
-
 class RecordMaker:
     """Makes records of notes. For one thread."""
 
     def __init__(self) -> None:
-        self._streams: dict[StreamKey, CommandStream] = {}
+        self._streams: dict[StreamKey, tuple[float, float]] = {}
         self._commands: OrderedDict[int, Note] = OrderedDict()
         self._outcomes: list[Note] = []
         self._limits = RecordLimits()
@@ -128,14 +114,9 @@ class RecordMaker:
             self._take(note)
         for note in self._outcomes if closing else ():
             self._outcome(note)
-        ended = [
-            key
-            for key, stream in self._streams.items()
-            if closing or t - stream.last.t > STREAM_GAP
-        ]
-        for key in ended:
-            self._end(key)
-        for summary in self._limits.summaries(t, all_now=closing):
+        spans = self._streams.items()
+        self._streams = {key: span for key, span in spans if t - span[1] <= STREAM_GAP}
+        if (summary := self._limits.summary(t, at_once=closing)) is not None:
             self._made.append({"time": utc(self._epoch + t), **summary})
         records, self._made = self._made, []
         return records
@@ -143,7 +124,7 @@ class RecordMaker:
     @property
     def is_idle(self) -> bool:
         """True if no record will become due without another note."""
-        return not (self._streams or self._outcomes or self._limits.counts)
+        return not (self._outcomes or self._limits.unwritten)
 
     def _take(self, note: Note) -> None:
         match note.what:
@@ -157,7 +138,7 @@ class RecordMaker:
                 self._lease(note, note.what)
             case _:
                 if note.kind in ("stop", "leave"):
-                    self._end_all()
+                    self._streams.clear()
                 self._stopped |= note.kind == "stop"
                 self._add(note, content_of(note.what))
 
@@ -168,25 +149,19 @@ class RecordMaker:
                 self._commands.popitem(last=False)
         key = _stream_key(note, command)
         if key is None:
-            self._end_all()
+            self._streams.clear()
             if isinstance(command, cmd.ClearStop):
                 note = note._replace(kind="clear", always=self._stopped)
                 self._stopped = False
             self._add(note, content_of(command))
             return
-        stream = self._streams.get(key)
-        if (
-            stream is not None
-            and note.t - stream.last.t <= STREAM_GAP
-            and note.t - stream.first.t <= MAX_STREAM_SECONDS
-        ):
-            stream.add(note)
-        else:
-            self._end(key)
-            self._streams[key] = CommandStream(note, note)
+        first, last = self._streams.get(key, (-math.inf, -math.inf))
+        if note.t - last > STREAM_GAP or note.t - first > MAX_STREAM_SECONDS:
+            first = note.t
             self._add(note, content_of(command))
+        self._streams[key] = first, note.t
         if isinstance(command, cmd.Jog) and not command.rates.any():
-            self._end(key)
+            del self._streams[key]
 
     def _outcome(self, note: Note) -> None:
         """Record that a command was limited or refused."""
@@ -216,7 +191,7 @@ class RecordMaker:
         old, new = before.holder, after.holder
         what: dict[str, Any]
         if new != old:
-            self._end_all()
+            self._streams.clear()
             what, grounds = _transfer(change, by)
             if old is not None:
                 what["from"] = text(old.name)
@@ -231,25 +206,6 @@ class RecordMaker:
         else:
             return
         self._add(note, what, grounds)
-
-    def _end_all(self) -> None:
-        for key in tuple(self._streams):
-            self._end(key)
-
-    def _end(self, key: StreamKey) -> None:
-        """Record the end of a stream; a single command is no stream."""
-        stream = self._streams.pop(key, None)
-        if stream is None or stream.count == 1:
-            return
-        first, last = content_of(stream.first.what), content_of(stream.last.what)
-        what = {
-            "command": first.pop("command"),
-            "count": stream.count,
-            "seconds": round(stream.last.t - stream.first.t, 3),
-            "first": first,
-            "last": {name: value for name, value in last.items() if name != "command"},
-        }
-        self._add(stream.last._replace(kind="stream", outcome=""), what)
 
     def _add(self, note: Note, what: Any, grounds: str = "") -> None:
         """Add the record of ``note``, unless its participant causes too many."""
@@ -325,78 +281,54 @@ def _transfer(change: LeaseChange, by: Actor) -> tuple[dict[str, Any], str]:
     return {"lease": "handed over"}, "holds the lease"
 
 
-class _Account:
-    """Records of one kind that one participant may cause now, and those that were not written."""
-
-    def __init__(self, kind: str, factor: float, t: float) -> None:
-        burst, rate = LIMITS.get(kind, COMMANDS)
-        self.records = TokenBucket(factor * rate, factor * burst, t)
-        self.since = t
-        self.who: Any = None
-        self.unwritten: Counter[str] = Counter()
-
-    def add(self, unwritten: Counter[str], who: Any, t: float) -> None:
-        """Count records that are not written since ``t`` [s]."""
-        if not self.unwritten:
-            self.since, self.who = t, who
-        self.unwritten += unwritten
-
-    def summary(self, t: float) -> Record:
-        """Return the record of what was not written up to ``t`` [s], and count from zero."""
-        counts, self.unwritten = self.unwritten, Counter()
-        seconds = round(t - self.since, 1)
-        what = {"count": counts.total(), "seconds": seconds, "of": dict(counts.most_common(8))}
-        return {"kind": "more", "what": what, "t": round(t, 3), "who": self.who}
-
-
 class RecordLimits:
-    """Limits by participant and kind, and for all participants by kind."""
+    """Limits by participant and kind, and for all participants by kind.
+
+    Attributes:
+        unwritten: number of records that were not written since the last summary, by participant,
+            kind and name.
+    """
 
     def __init__(self) -> None:
-        self._accounts: OrderedDict[tuple[str, str], _Account] = OrderedDict()
+        self.unwritten: Counter[str] = Counter()
+        self._kinds: dict[str, SenderBuckets] = {}
+        self._since = 0.0
 
     def admits(self, source: str, record: Record, t: float) -> bool:
         """Return whether ``record`` of ``source`` is written at ``t`` [s]; count it otherwise."""
         kind = record["kind"]
-        own, total = self._account(source, kind, t), self._account(EVERYBODY, kind, t)
-        if own.records.take(t) and total.records.take(t):
+        if kind not in self._kinds:
+            burst, rate = LIMITS.get(kind, COMMANDS)
+            total = TokenBucket(EVERYBODY_FACTOR * rate, EVERYBODY_FACTOR * burst, t)
+            self._kinds[kind] = SenderBuckets(rate, burst, MAX_SENDERS, total)
+        if self._kinds[kind].take(source, t):
             return True
-        own.add(Counter([_label(record)]), record.get("who"), t)
+        if not self.unwritten:
+            self._since = t
+        self.unwritten[_label(record)] += 1
         return False
 
-    def summaries(self, t: float, *, all_now: bool = False) -> list[Record]:
-        """Return the summaries that are due at ``t`` [s], or all of them."""
-        return [
-            account.summary(t)
-            for account in self._accounts.values()
-            if account.unwritten and (all_now or t - account.since >= SUMMARY_INTERVAL)
-        ]
+    def summary(self, t: float, *, at_once: bool = False) -> Record | None:
+        """Return the record of what was not written up to ``t`` [s], and count from zero.
 
-    @property
-    def counts(self) -> bool:
-        """True if a summary will be due."""
-        return any(account.unwritten for account in self._accounts.values())
-
-    def _account(self, source: str, kind: str, t: float) -> _Account:
-        """Return an account, as the newest one."""
-        factor = EVERYBODY_FACTOR if source == EVERYBODY else 1.0
-        account = self._accounts.pop((source, kind), None) or _Account(kind, factor, t)
-        self._accounts[source, kind] = account
-        if len(self._accounts) > MAX_ACCOUNTS:
-            (_, oldest_kind), oldest = self._accounts.popitem(last=False)
-            if oldest.unwritten:
-                everybody = self._account(EVERYBODY, oldest_kind, t)
-                everybody.add(oldest.unwritten, {"name": "several participants"}, oldest.since)
-        return account
+        None if nothing is due; ``at_once``: whether all is.
+        """
+        counts, seconds = self.unwritten, t - self._since
+        if not counts or not (at_once or seconds >= SUMMARY_INTERVAL):
+            return None
+        self.unwritten = Counter()
+        commonest = dict(counts.most_common(8))
+        what = {"count": counts.total(), "seconds": round(seconds, 1), "of": commonest}
+        return {"kind": "more", "what": what, "t": round(t, 3)}
 
 
 def _label(record: Record) -> str:
-    """Return the kind of ``record``, with the name of its command or request."""
+    """Return participant and kind of ``record``, with the name of its command or request."""
     what = record.get("what")
     name = ""
     if isinstance(what, dict):
         name = what.get("command") or what.get("request") or what.get("lease") or ""
-    return f"{record['kind']} {name}".strip()
+    return f"{record['who']['name']}: {record['kind']} {name}".strip()
 
 
 def send_records(
