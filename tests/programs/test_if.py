@@ -62,14 +62,15 @@ def turned(state: State, end: State, axis: int) -> float:
 
 
 def test_steps_are_repeated_until_a_condition_holds(stage: Stage, empty: State) -> None:
-    text = "  - repeat: {times: 4, until: {joint: {axis: 5, at_least: 15}}, steps: [TURN]}\n"
-    program = planned(stage, text.replace("TURN", "{nudge: {axis: 5, by: 10}}"), empty)
+    turn = "[{nudge: {axis: 5, by: 10}}, {wait: 2}]"
+    text = f"  - repeat: {{times: 4, until: {{time: {{at_least: TIME}}}}, steps: {turn}}}\n"
+    program = planned(stage, text.replace("TIME", "3"), empty)
     _, states = stage.play(program, empty)
     assert turned(empty, states[-1], 5) == pytest.approx(20.0, abs=1e-6)
     # One that never holds ends after the last repetition.
-    program = planned(stage, text.replace("TURN", "{nudge: {axis: 5, by: 3}}"), empty)
+    program = planned(stage, text.replace("TIME", "90"), empty)
     _, states = stage.play(program, empty)
-    assert turned(empty, states[-1], 5) == pytest.approx(12.0, abs=1e-6)
+    assert turned(empty, states[-1], 5) == pytest.approx(40.0, abs=1e-6)
     for until, why in (("{}", "An until needs exactly one of"), ("{held: 1}", "Expected a text")):
         with pytest.raises(ScriptError, match=why):
             parse(f"steps:\n  - repeat: {{times: 2, until: {until}, steps: [home]}}\n")
@@ -176,8 +177,6 @@ def test_state_is_measured_when_the_step_is_reached(stage: Stage, empty: State) 
         ("time: {at_most: 2 min}", True),
         ("gripper: {at_least: 1}", False),
         ("held: cup", False),
-        ("tool: {x: {at_least: -2000}, z: {at_least: 0}}", True),
-        ("tool: {z: {at_most: 0}}", False),
     ],
 )
 def test_conditions_are_measured(stage: Stage, empty: State, condition: str, holds: bool) -> None:
@@ -187,16 +186,6 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
     assert run.choices == ((1, holds),)
     taken = program.tasks[program.predicted[-1]].action
     assert taken.fraction(empty, 0.1) == (1.0 if holds else 0.5)
-
-
-def test_tool_point_is_measured_in_the_frame_of_the_script(stage: Stage, empty: State) -> None:
-    p = PlanState(stage.plan_context, empty).target.position
-    T = stage.plan_context.T_base_shoulder
-    for frame, z in (("shoulder", p[2]), ("base", (T[:3, :3] @ p + T[:3, 3])[2])):
-        bounds = f"{{at_least: {1e3 * z - 0.1:.4f}, at_most: {1e3 * z + 0.1:.4f}}}"
-        text = f"frame: {frame}\nsteps:\n  - wait_for: {{tool: {{z: {bounds}}}}}\n"
-        (task,) = compiled(parse(text), stage.plan_context, empty).conditions
-        assert task.action.done(empty, 0.0), frame
 
 
 def test_alternatives_in_loops_and_definitions(stage: Stage, empty: State) -> None:
@@ -282,9 +271,8 @@ def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State
         ("{held: cup, then: [hme]}", "did you mean 'home'"),
         ("{time: {}, then: [home]}", "A time needs `at_least` or `at_most`"),
         ("{time: {at_least: 3 mm}, then: [home]}", "not a length"),
-        ("{tool: {}, then: [home]}", "A tool needs `x`, `y` or `z`"),
-        ("{tool: {x: 3}, then: [home]}", "must be a mapping"),
-        ("{tool: {u: {at_least: 3}}, then: [home]}", "A tool has no 'u'"),
+        ("{gripper: 3, then: [home]}", "must be a mapping"),
+        ("{gripper: {u: 3}, then: [home]}", "A gripper has no 'u'"),
         ("held", "must be a mapping"),
     ],
 )

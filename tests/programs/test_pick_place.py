@@ -1,4 +1,4 @@
-"""Tests of the steps that pick objects up, place them, stack them and let them go."""
+"""Tests of the steps that pick objects up, place them and let them go."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def place(scene_object: SceneObject) -> list[float]:
 
 @pytest.mark.long
 def test_three_boxes_are_stacked(stage: Stage) -> None:
-    steps = "- stack: {object: b, on: a}\n- stack: {object: c, on: b}\n- home\n"
+    steps = "- pick: b\n- place: {on: a}\n- pick: c\n- place: {on: b}\n- home\n"
     end = played(
         stage,
         steps,
@@ -242,8 +242,6 @@ def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
         ("place: {on: a, at: {x: 1, y: 2, z: 3}}", "either `on` or the height z"),
         ("place: {at: {x: 1}}", "The place of an object needs 'y'"),
         ("place: a", "A place step must be a mapping"),
-        ("stack: {object: a, on: a}", "a cannot stand on itself"),
-        ("stack: {object: a}", "A stack needs 'on'"),
         ("pick: {object: a, side: left}", "Expected one of front, above"),
         ("release: a", "`release` takes no value"),
     ],

@@ -86,7 +86,7 @@ def test_schema_accepts_every_script_of_the_project(name: str) -> None:
 
 def test_schema_has_every_field_of_a_script_and_every_step() -> None:
     assert known_fields("zzz: 1\nsteps: [home]") == set(script_schema()["properties"])
-    assert set(STEP_VALUES) == {*STEPS, *BLOCKS, "stack"}
+    assert set(STEP_VALUES) == {*STEPS, *BLOCKS}
     for name in WITHOUT_VALUE:
         parse(f"steps: [{name}]")
 

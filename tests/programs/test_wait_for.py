@@ -69,13 +69,10 @@ def test_conditions_are_measured(stage: Stage) -> None:
     state = stage.begin()
     state = stage.session.step(state, (cmd.Fill(100.0),), state.t + TICK)
     state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
-    axis_2 = float(np.degrees(state.q[1]))
     for condition, holds in (
         ("volume: {of: cup, at_least: 99.9}", True),
         ("volume: {of: cup, at_least: 50, at_most: 99}", False),
         ("volume: {of: basin, at_most: 1}", True),
-        (f"joint: {{axis: 2, at_least: {axis_2 - 1:.3f}, at_most: {axis_2 + 1:.3f}}}", True),
-        (f"joint: {{axis: 2, at_least: {axis_2 + 1:.3f}}}", False),
         ("gripper: {at_most: 1}", True),
         ("gripper: {at_least: 1}", False),
         ("held: cup", False),
@@ -98,12 +95,11 @@ def test_simulation_takes_conditions_for_true(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        ("{timeout: 3}", "needs exactly one of held, placed, volume, joint, gripper"),
+        ("{timeout: 3}", "needs exactly one of held, placed, volume, gripper"),
         ("{held: cup, gripper: {at_most: 1}}", "exactly one"),
         ("{hold: cup}", "did you mean 'held'"),
         ("{held: cup, timeout: 0}", "not between"),
         ("{volume: {of: cup}}", "A volume needs `at_least` or `at_most`"),
-        ("{joint: {axis: 33, at_most: 3}}", "not between 1 and 32"),
         ("{placed: {object: cup}}", "needs 'at'"),
         ("held", "mapping of names to values"),
     ],
@@ -118,8 +114,6 @@ def test_mistake_is_refused_with_its_place(value: str, said: str) -> None:
     ("value", "said"),
     [
         ("{held: jug}", "no object 'jug'"),
-        ("{joint: {axis: 1, at_least: 400}}", "Axis 1 never gets there: its range is"),
-        ("{joint: {axis: 6, at_most: 3}}", "There is no axis 6: the robot has 5 axes"),
         ("{volume: {of: cup, at_least: 3}}", "There is no water"),
         ("{volume: {of: jug, at_least: 3}}", "no object 'jug'"),
     ],

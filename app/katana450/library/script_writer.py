@@ -301,10 +301,6 @@ class ScriptWriter:
         """
         self._add("place", at=at, on=on)
 
-    def stack(self, name: str, *, on: str) -> None:
-        """Pick an object and place it on the middle of another."""
-        self._add("stack", object=name, on=on)
-
     def release(self) -> None:
         """Open the fingers on the held object where it is."""
         self._steps.append("release")

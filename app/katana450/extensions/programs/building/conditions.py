@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Self
 
 import numpy as np
 
-from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.pouring import BASIN, CUP, is_vessel
 from katana450.arm.control.scene_objects import named
 from katana450.arm.control.state import State
@@ -18,27 +17,21 @@ from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared, Group, Kind, record
 from katana450.extensions.programs.language.kinds import (
     FINGER_PLACE,
-    XYZ,
-    Axis,
-    Length,
     Object,
     ObjectName,
-    angle,
     bound,
     millimetres,
     number,
     one_of,
 )
 from katana450.extensions.programs.language.places import Point
-from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.kinematics.forward import forward
+from katana450.maths.geometry.arrays import frozen
 from katana450.maths.water.units import MILLILITRE
 
 MAX_TIME = 86_400.0
 """[s] Maximum time of a condition."""
 
 Millilitres = Annotated[float, number(0.0, 10_000.0, "ml")]
-JointBound = Annotated[float, angle(-720.0, 720.0)]
 FingerBound = Annotated[float, FINGER_PLACE]
 Seconds = Annotated[float, number(0.0, MAX_TIME, "s")]
 
@@ -175,44 +168,6 @@ class Volume(Bounded, Condition):
 
 
 @dataclass(frozen=True)
-class JointAngle(Bounded, Condition):
-    """Angle of a joint, deg.
-
-    Attributes:
-        axis: index of the joint, from 0.
-        at_least, at_most: bounds [rad].
-    """
-
-    noun = "a joint"
-
-    axis: Axis
-    at_least: JointBound = -math.inf
-    at_most: JointBound = math.inf
-
-    @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
-        return f"axis {self.axis + 1}"
-
-    def checked(self, plan: PlanState) -> Self:
-        """Return itself. Raises InputError if the arm or the limits of the joint exclude it."""
-        chain = plan.plan_context.arm.chain
-        if self.axis >= chain.n:
-            raise InputError(f"There is no axis {self.axis + 1}: the robot has {chain.n} axes.")
-        lower, upper = float(chain.lower[self.axis]), float(chain.upper[self.axis])
-        if self.at_least > upper or self.at_most < lower:
-            raise InputError(
-                f"Axis {self.axis + 1} never gets there: its range is {math.degrees(lower):.1f} to "
-                f"{math.degrees(upper):.1f} deg."
-            )
-        return self
-
-    def holds(self, state: State) -> bool:
-        """Return whether the angle is within the bounds."""
-        return self.has(float(state.q[self.axis]))
-
-
-@dataclass(frozen=True)
 class FingerPlace(Bounded, Condition):
     """Angle of the fingers, deg, or their place, mm, if they slide.
 
@@ -244,66 +199,6 @@ class FingerPlace(Bounded, Condition):
 
 
 @dataclass(frozen=True)
-class CoordinateBounds(Bounded):
-    """Bounds of a coordinate [m]."""
-
-    noun = "a coordinate"
-
-    at_least: Length = -math.inf
-    at_most: Length = math.inf
-
-
-Coordinate = Annotated[CoordinateBounds | None, record(CoordinateBounds)]
-
-
-@dataclass(frozen=True, eq=False)
-class ToolPlace(Condition):
-    """Coordinates of the tool point, mm.
-
-    Attributes:
-        x, y, z: bounds of each, in the frame of the script; None for any.
-        in_base: whether they are in the base frame, not in {S}.
-        arm: the arm model, once it is known.
-        T_base_shoulder: (4, 4) pose of {S} in the base frame [m].
-    """
-
-    noun = "a tool"
-    needs = XYZ
-
-    x: Coordinate = None
-    y: Coordinate = None
-    z: Coordinate = None
-    in_base: bool = False
-    arm: ArmModel | None = None
-    T_base_shoulder: FloatArray = field(default_factory=lambda: np.eye(4))
-
-    @property
-    def bounds(self) -> dict[str, CoordinateBounds]:
-        """The bounds by the names of their coordinates."""
-        bounds = {"x": self.x, "y": self.y, "z": self.z}
-        return {name: bound for name, bound in bounds.items() if bound is not None}
-
-    @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
-        return f"{' and '.join(self.bounds)} of the tool"
-
-    def checked(self, plan: PlanState) -> Self:
-        """Return the condition for the arm of ``plan``."""
-        context = plan.plan_context
-        return replace(self, arm=context.arm, T_base_shoulder=context.T_base_shoulder)
-
-    def holds(self, state: State) -> bool:
-        """Return whether the point of the present tool frame is within the bounds."""
-        assert self.arm is not None
-        p = forward(self.arm.chain_to(state.tool), state.q)[:3, 3]
-        if self.in_base:
-            p = self.T_base_shoulder[:3, :3] @ p + self.T_base_shoulder[:3, 3]
-        coordinates = dict(zip(XYZ, p.tolist(), strict=True))
-        return all(bounds.has(coordinates[name]) for name, bounds in self.bounds.items())
-
-
-@dataclass(frozen=True)
 class ProgramTime(Bounded):
     """Time since the program began, with pauses, s."""
 
@@ -322,9 +217,7 @@ CONDITIONS: dict[str, Kind[Condition]] = {
     "held": record(Held),
     "placed": record(Placed),
     "volume": record(Volume),
-    "joint": record(JointAngle),
     "gripper": record(FingerPlace),
-    "tool": record(ToolPlace),
 }
 """The conditions on the state, by their names in a script."""
 

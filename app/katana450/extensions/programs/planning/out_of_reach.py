@@ -127,8 +127,8 @@ def unreached(
     for text, place in near_places(frame, target, moved.pose):
         if planning.joints(q, place, branch) is not None:
             is_turned = (place.pitch, place.roll) != (target.pitch, target.roll)
-            kept = "" if is_turned else f" with {planning.orientation}"
-            remedy = f" It can be at `{text}`{kept}."
+            orientation = "" if is_turned else f" with {planning.orientation}"
+            remedy = f" It can be at `{text}`{orientation}."
             break
     missed = _missed(moved)
     if not missed:

@@ -28,7 +28,6 @@ from katana450.extensions.programs.language.kinds import (
 )
 from katana450.extensions.programs.language.scope import Definition, ScriptContext
 from katana450.extensions.programs.language.source import Problem, ScriptError, YamlValue
-from katana450.extensions.programs.steps.place import Stack
 from katana450.extensions.programs.steps.steps import STEPS
 
 MAX_STEPS = 1000
@@ -79,12 +78,10 @@ def _read_step(item: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ..
         if count(steps) > MAX_STEPS:
             raise name.wrong(f"This gives {count(steps)} steps; the maximum is {MAX_STEPS}.")
         return steps
-    known = (*STEPS, "stack", *BLOCKS)
+    known = (*STEPS, *BLOCKS)
     if name.held not in known:
         raise name.wrong(f"There is no step {name}{or_known(word, known)}")
     value = context.scope.bound(value)
-    if word == "stack":
-        return _located(name, *Stack.read(value, context).steps)
     return _located(name, STEPS[word].read(value, context))
 
 

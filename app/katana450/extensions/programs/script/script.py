@@ -46,7 +46,6 @@ from katana450.extensions.programs.script.blocks import (
 )
 from katana450.extensions.programs.script.measures import MEASURES
 from katana450.extensions.programs.script.script_scene import SCENE, ScriptScene
-from katana450.extensions.programs.steps.place import Stack
 from katana450.extensions.programs.steps.settings_steps import Tool
 from katana450.extensions.programs.steps.steps import STEPS
 
@@ -317,7 +316,6 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 STEP_VALUES: dict[str, Schema] = {
     **{name: STEPS[name].schema() for name in sorted(STEPS)},
-    "stack": Stack.schema(),
     **{name: block.schema() for name, block in BLOCKS.items()},
 }
 """Schemas of the values of all steps, by the names of the steps."""

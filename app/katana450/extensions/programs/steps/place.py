@@ -1,4 +1,4 @@
-"""The steps that lift an object and put it somewhere: ``pick``, ``place``, ``stack`` and others."""
+"""The steps that lift an object and put it somewhere: ``pick``, ``place`` and others."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from katana450.extensions.programs.building.actions import MoveFingers
 from katana450.extensions.programs.building.hand_motions import APPROACHES, carry, with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.language.declaration import Declared
-from katana450.extensions.programs.language.kinds import NAME, Object, ObjectName
+from katana450.extensions.programs.language.kinds import NAME
 from katana450.extensions.programs.language.places import SPOT, Spot
 from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.planning.curves import line_between
@@ -243,25 +242,3 @@ class Pick(Grasp, word="pick"):
             return plan.first(LIFTS, lift)
         except InputError as error:
             raise error.after(f"{self.name} cannot be lifted") from error
-
-
-@dataclass(frozen=True)
-class Stack(Declared):
-    """Pick an object and place it on the middle of another."""
-
-    noun = "a stack"
-
-    name: Object
-    on: ObjectName
-    in_base: bool = False
-
-    @classmethod
-    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-        """Yield the mistake of an object on itself."""
-        if values.get("name") is not None and values["name"] == values.get("on"):
-            yield "", f"{values['name']} cannot stand on itself."
-
-    @property
-    def steps(self) -> tuple[Step, Step]:
-        """Two steps, so that the object is picked in another way if it cannot be placed."""
-        return Pick(self.name), PlaceHeld(on=self.on, in_base=self.in_base)
