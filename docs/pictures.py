@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from katana450.client import Client, connect
-from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.server.api import answers
 from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
@@ -121,7 +121,7 @@ def pouring(page: ViserPage) -> None:
     url = page.page.url.split("/?")[0].rstrip("/")
     pictures = []
     with connect(url, "Pictures") as arm:
-        send(arm, PourDemo().text)
+        send(arm, script_text(library_file("pour")))
         program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
         for task, fraction in STAGES:
@@ -155,7 +155,7 @@ def instruments(page: ViserPage) -> None:
     page.frame.evaluate("() => harness.draw(false)")
     with connect(url, "Circle") as arm:
         page.press_in_bar("Instruments")
-        send(arm, CircleDemo(tool="tcp").text)
+        send(arm, script_text(library_file("circle_with_gripper")))
         program(arm, lambda progress: progress.status in ("ready", "refused"))
         arm.ask(Steer(order=ProgramOrder.RUN))
         # The fraction would also count the path to the start of the circle, from 0 to 1.

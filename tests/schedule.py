@@ -33,7 +33,6 @@ KINDS = {
     "tests/runtime": SERVERS[1],
     "tests/cli/test_lines.py": SERVERS[1],
     "tests/cli/test_live.py": SERVERS[1],
-    "tests/cli/test_run_control.py": BROWSER,
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs/test_code_blocks.py": SERVERS[0],
     "tests/examples": SERVERS[1],

@@ -20,7 +20,7 @@ from tests.browser.server import AppServer
 from tests.waiting import until
 
 pytest.importorskip("pty", reason="Windows has no pseudo-terminals")
-from tests.cli.test_run_control import Terminal
+from tests.cli.terminal import Terminal
 from tests.leader.emulated_leader import START, EmulatedLeader, EmulatedMotors, write_calibration
 
 SINE = math.radians(6.0), 0.5

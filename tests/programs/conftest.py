@@ -15,11 +15,22 @@ from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
 TICK = 0.01
+
+
+def pour_text(**spots: tuple[float, float] | None) -> str:
+    """Return the demo of pouring with cup and basin at other ``spots`` on the table [mm]."""
+    puts = "".join(
+        f"  - put: {{object: {name}, x: {spot[0]:g}, y: {spot[1]:g}}}\n"
+        for name, spot in spots.items()
+        if spot is not None
+    )
+    return script_text(library_file("pour")).replace("steps:\n", f"steps:\n{puts}")
 
 
 class Stage:

@@ -8,21 +8,19 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase
-from katana450.extensions.programs.script.demos import CircleDemo
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import Stage
 
 
-@pytest.mark.parametrize("tool", ["flange", "tcp"])
+@pytest.mark.parametrize(("tool", "name"), [("flange", "circle"), ("tcp", "circle_with_gripper")])
 def test_the_circle_keeps_every_limit_at_every_tick(
-    arm: MountedArm, stage: Stage, tool: str
+    arm: MountedArm, stage: Stage, tool: str, name: str
 ) -> None:
     staged = Stage(arm, bare=True) if tool == "flange" else stage
-    demo = CircleDemo(tool=tool)
-    run, states = staged.play(
-        compiled(parse(demo.text), staged.plan_context, staged.begin()), staged.begin()
-    )
+    script = parse(script_text(library_file(name)))
+    run, states = staged.play(compiled(script, staged.plan_context, staged.begin()), staged.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
     assert staged.loads(states).max() <= 1.0 + 1e-6
     chain = staged.plan_context.arm.chain_to(tool)

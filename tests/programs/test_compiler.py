@@ -13,10 +13,9 @@ from katana450.extensions.programs.building.plan_state import PlanState, Untimed
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.compiler import FINDING, TIMING, Compiler, PlanningStage
 from katana450.extensions.programs.run.program import compiled
-from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.planning.checkpoint import checked_by
-from tests.programs.conftest import Stage
+from tests.programs.conftest import Stage, pour_text
 
 NEAR = (165.0, 286.0)
 """[mm] A place so near the arm that the basin can only be reached at a steep pitch."""
@@ -139,7 +138,7 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
         begun = now
 
     with checked_by(measure):
-        compiled(parse(PourDemo().text), stage.plan_context, stage.begin())
+        compiled(parse(pour_text()), stage.plan_context, stage.begin())
     assert len(gaps) > 1000
     assert max(gaps) < 0.25
 
@@ -176,7 +175,7 @@ def layout(stage: Stage, text: str) -> Compiler:
 
 @pytest.mark.usefixtures("untimed")
 def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: Stage) -> None:
-    names = [task.name for task in layout(stage, PourDemo(basin=NEAR).text).tasks()]
+    names = [task.name for task in layout(stage, pour_text(basin=NEAR)).tasks()]
     # Failed attempts leave no actions behind.
     assert names.count("grasp cup: close") == 1
     assert names.count("pour") == 1
@@ -184,7 +183,7 @@ def test_the_next_pitch_is_tried_if_the_first_does_not_reach_the_basin(stage: St
 
 @pytest.mark.usefixtures("untimed")
 def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
-    text = PourDemo(basin=NEAR).text.replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
+    text = pour_text(basin=NEAR).replace("grasp: cup", "grasp: {object: cup, pitch: 30}")
     with pytest.raises(InputError, match="cannot be emptied into basin") as refused:
         layout(stage, text).tasks()
     assert "other pitch" not in str(refused.value)
@@ -194,5 +193,5 @@ def test_the_pitch_that_a_script_gives_is_kept(stage: Stage) -> None:
 @pytest.mark.usefixtures("untimed")
 def test_pitches_that_were_tried_are_reported(stage: Stage) -> None:
     with pytest.raises(InputError, match=r"other pitch .* tried 30, .* and \d+ deg") as refused:
-        layout(stage, PourDemo(basin=(740.0, 600.0)).text).tasks()
+        layout(stage, pour_text(basin=(740.0, 600.0))).tasks()
     assert "with a pitch of 30.0 deg" in str(refused.value)

@@ -13,9 +13,8 @@ import pytest
 import yaml
 
 from katana450.extensions.programs.language.source import Problem, ScriptError
-from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import script_text
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from tests.conftest import LONG
 from tests.programs.yaml_core import loaded
 
@@ -41,7 +40,7 @@ def scripts() -> dict[str, str]:
     page = (ROOT / "docs" / "programs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     found |= {f"docs {n}": block for n, block in enumerate(blocks) if "steps:" in block}
-    return found | {"circle": CircleDemo().text, "pour": PourDemo().text}
+    return found | {name: script_text(library_file(name)) for name in ("circle", "pour")}
 
 
 SCRIPTS = scripts()

@@ -14,7 +14,6 @@ from docs.script_schema import FILE, content
 from katana450.extensions.programs.language.declaration import Schema
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.script.blocks import BLOCKS
-from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import (
     STEP_VALUES,
     WITHOUT_VALUE,
@@ -37,8 +36,6 @@ def scripts() -> Iterator[tuple[str, str]]:
     library = ROOT / "app" / "katana450" / "extensions" / "programs" / "library"
     for path in sorted(library.glob("*.yaml")):
         yield path.name, path.read_text(encoding="utf-8")
-    yield "circle", CircleDemo().text
-    yield "pour", PourDemo().text
     for page in ("README.md", "docs/programs.md"):
         blocks = re.findall(r"```yaml\n(.*?)```", (ROOT / page).read_text("utf-8"), re.DOTALL)
         for number, block in enumerate(blocks):

@@ -11,15 +11,15 @@ import pytest
 from katana450.arm.control.state import ActiveStop
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
-from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.water.units import MILLILITRE
 from tests.programs.conftest import Stage
 
 
 @pytest.fixture(scope="module")
 def poured(stage: Stage) -> tuple[Program, Timeline, list[Moment]]:
-    program = compiled(parse(PourDemo().text), stage.plan_context, stage.begin())
+    program = compiled(parse(script_text(library_file("pour"))), stage.plan_context, stage.begin())
     timeline = Timeline.of(program)
     return program, timeline, list(moments(program, timeline, stage.session, stage.begin()))
 

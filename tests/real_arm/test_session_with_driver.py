@@ -20,8 +20,8 @@ from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
-from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.real_arm.driver.katana_driver import KatanaDriver
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm, joints_at
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
@@ -130,9 +130,9 @@ def test_stop_ends_a_calibration(operator: Operator) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        CircleDemo().text,
-        pytest.param(CircleDemo(tool="tcp").text, marks=pytest.mark.long),
-        pytest.param(PourDemo().text, marks=pytest.mark.long),
+        script_text(library_file("circle")),
+        pytest.param(script_text(library_file("circle_with_gripper")), marks=pytest.mark.long),
+        pytest.param(script_text(library_file("pour")), marks=pytest.mark.long),
     ],
     ids=["circle", "circle with gripper", "pour"],
 )

@@ -41,9 +41,9 @@ record(Path(sys.argv[1]), int(sys.argv[2]))
 RECORD_PROGRAM = """
 import sys
 from pathlib import Path
-from katana450.extensions.programs.script.demos import PourDemo
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from tests.recording.sessions import program, record_session
-record_session(Path(sys.argv[1]), int(sys.argv[2]), program(PourDemo().text))
+record_session(Path(sys.argv[1]), int(sys.argv[2]), program(script_text(library_file("pour"))))
 """
 """Script that records a program, which grasps the cup, pours the water and puts the cup back."""
 

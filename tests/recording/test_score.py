@@ -20,8 +20,8 @@ from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
-from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
+from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes.episode import (
     Episode,
@@ -180,7 +180,7 @@ def test_contacts_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_pour_has_the_measures_of_its_report(tmp_path: Path) -> None:
-    text = PourDemo().text
+    text = script_text(library_file("pour"))
     found = score(record_session(tmp_path / "pour.mcap", 3700, program(text)))
     plan = plan_script(parse(text), URDF_PATH)
     report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)

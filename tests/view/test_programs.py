@@ -21,9 +21,8 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.simulation import Timeline
-from katana450.extensions.programs.script.demos import PourDemo
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import Scripts
+from katana450.extensions.programs.script.script_files import Scripts, library_file, script_text
 from katana450.extensions.programs.server.panel import PanelAccess, ProgramsPanel, _page
 from katana450.extensions.programs.server.preview import GHOSTS
 from katana450.extensions.programs.server.step_list import ListedStep, steps_of
@@ -210,7 +209,7 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
     state = session.begin(session.ready, 0.0, 0.0)
     panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
     plan_context = PlanContext(session, arm.T_base_shoulder)
-    program = compiled(parse(PourDemo().text), plan_context, state)
+    program = compiled(parse(script_text(library_file("pour"))), plan_context, state)
     panel._with_ghosts = True
     program_runner.program = program
     panel.follow()

@@ -14,20 +14,17 @@ from katana450.client import Client, RefusedError, connect
 from katana450.client.asynchronous import PROGRESS_RATE, UNPLANNED_STATUSES, is_over
 from katana450.client.files import LostError
 from katana450.errors import ConfigurationError, InputError, KatanaError
-from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.programs.language.attached_files import without_scene
 from katana450.extensions.programs.script.script import Script
 from katana450.platform_support import without_interrupts
-from katana450.server.api import answers, requests
-from katana450.server.api.program_requests import Breakpoints, ProgramOrder, Steer
+from katana450.server.api import answers
+from katana450.server.api.program_requests import ProgramOrder, Steer
 
 ReportRun = Callable[[Client, answers.State], int]
 """Reports the run that has just ended and returns the exit status, by the state before it."""
 
 NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
-
-HELP = "Enter pauses and resumes, a number sets the speed in percent, Ctrl-C ends."
 
 
 def run_live(text: str, script: Script, options: Namespace, report: ReportRun | None = None) -> int:
@@ -38,11 +35,10 @@ def run_live(text: str, script: Script, options: Namespace, report: ReportRun | 
     with _server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send_script(arm, text, options)
-            if options.from_step is None:
-                _planned_program(arm)
+            _planned_program(arm)
             began = arm.query(answers.State)
-            _begin(arm, options)
-            _follow(arm, Keyboard())
+            arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
+            _follow(arm)
             return 0 if report is None else report(arm, began)
         except KeyboardInterrupt:
             if options.unattended and _runs(arm):
@@ -61,16 +57,6 @@ def _runs(arm: Client) -> bool:
     """Return whether the program has begun and runs unattended."""
     program = arm.query(answers.State).program
     return program is not None and program.unattended
-
-
-def _begin(arm: Client, options: Namespace) -> None:
-    """Run the script that was sent, from a step and with breakpoints if ``options`` say so."""
-    if options.pause_before:
-        arm.ask(Breakpoints(steps=options.pause_before))
-    first_step, unattended = options.from_step, options.unattended
-    arm.ask(Steer(order=ProgramOrder.RUN, unattended=unattended, at=first_step))
-    if first_step is not None:
-        _planned_program(arm)
 
 
 def _send_script(arm: Client, text: str, options: Namespace) -> None:
@@ -93,21 +79,8 @@ def _planned_program(arm: Client) -> None:
     print(f"{now.name}: {now.steps} steps, about {now.seconds:.1f} s. {now.why}")
 
 
-def _follow(arm: Client, keyboard: Keyboard) -> None:
-    """Print the progress of the program until it ends. Raises KatanaError if it fails.
-
-    A person at a terminal may pause and slow it, and continue it after a stop.
-    """
-    if keyboard.present:
-        print(HELP, file=sys.stderr)
-    while (end := _to_end(arm, keyboard)).status != "done":
-        if not (end.can_continue and keyboard.present and _continued(arm, keyboard, end)):
-            raise KatanaError(end.why)
-    print("Done.")
-
-
-def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
-    """Print the progress of the program until it ends, and steer it; return the last progress."""
+def _follow(arm: Client) -> None:
+    """Print the progress of the program until it ends. Raises KatanaError if it fails."""
     shown = ""
     terminal = sys.stderr.isatty()
     for state in arm.states(PROGRESS_RATE):
@@ -125,43 +98,11 @@ def _to_end(arm: Client, keyboard: Keyboard) -> answers.Progress:
         if is_over(now):
             if terminal:
                 print(file=sys.stderr)
-            return now
-        if (typed := keyboard.line()) is not None:
-            _steer(arm, typed, paused=now.status == "paused")
+            if now.status != "done":
+                raise KatanaError(now.why)
+            print("Done.")
+            return
     raise LostError("The server closed the connection.")
-
-
-def _steer(arm: Client, typed: str, *, paused: bool) -> None:
-    """Pause or resume the program, or set its speed, as ``typed``; print a refusal."""
-    try:
-        if not typed:
-            arm.ask(Steer(order=ProgramOrder.RESUME if paused else ProgramOrder.PAUSE))
-        elif typed.removesuffix("%").strip().isdecimal():
-            arm.ask(requests.Speed(value=int(typed.removesuffix("%")) / 100.0))
-        else:
-            print(HELP, file=sys.stderr)
-    except (RefusedError, InputError) as error:
-        print(f"katana450: {error}", file=sys.stderr)
-
-
-def _continued(arm: Client, keyboard: Keyboard, ended: answers.Progress) -> bool:
-    """Ask the person whether the program shall continue; return whether it does."""
-    print(f"katana450: {ended.why}", file=sys.stderr)
-    while True:
-        print(f"Enter continues at step {ended.step}, Ctrl-C ends.", file=sys.stderr, flush=True)
-        try:
-            if keyboard.wait() is None:
-                return False
-        except KeyboardInterrupt:
-            print(file=sys.stderr)
-            return False
-        try:
-            arm.ask(Steer(order=ProgramOrder.CONTINUE))
-            _planned_program(arm)
-        except KatanaError as error:
-            print(f"katana450: {error}", file=sys.stderr)
-        else:
-            return True
 
 
 @contextmanager

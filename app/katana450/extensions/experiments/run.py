@@ -7,11 +7,9 @@ from argparse import Namespace
 from functools import partial
 from pathlib import Path
 
-from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
 from katana450.extensions.programs.script.script import parse
-from katana450.extensions.programs.script.script_files import script_text
+from katana450.extensions.programs.script.script_files import library_file, script_text
 
 
 def print_problems(error: ScriptError, source: str) -> None:
@@ -23,38 +21,8 @@ def print_problems(error: ScriptError, source: str) -> None:
 
 def run(options: Namespace) -> int:
     """Execute ``katana450 run``; return the exit status."""
-    alone = options.headless or options.dry_run or options.report is not None
-    if alone and (options.from_step is not None or options.pause_before):
-        raise InputError(
-            "--from-step and --pause-before need a server: leave out --headless, --dry-run and "
-            "--report."
-        )
     try:
         text = script_text(options.file)
-    except ScriptError as error:
-        print_problems(error, str(options.file))
-        return 1
-    return _run(text, str(options.file), options)
-
-
-def demo(options: Namespace) -> int:
-    """Execute ``katana450 demo``; return the exit status."""
-    if options.demo == "pour":
-        text = PourDemo(options.water, options.cup, options.basin, options.shake).text
-    else:
-        text = CircleDemo(
-            options.centre,
-            options.normal,
-            options.radius,
-            options.turns,
-            options.pitch,
-            options.tool,
-        ).text
-    return _run(text, f"demo {options.demo}", options)
-
-
-def _run(text: str, source: str, options: Namespace) -> int:
-    try:
         script = parse(text)
         report = None
         if options.headless or options.dry_run or options.report is not None:
@@ -70,5 +38,11 @@ def _run(text: str, source: str, options: Namespace) -> int:
 
         return run_live(text, script, options, report)
     except ScriptError as error:
-        print_problems(error, source)
+        print_problems(error, str(options.file))
         return 1
+
+
+def demo(options: Namespace) -> int:
+    """Execute ``katana450 demo``; return the exit status."""
+    options.file = library_file(options.demo)
+    return run(options)

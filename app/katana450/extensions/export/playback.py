@@ -211,14 +211,12 @@ def of_script(name: str, urdf: Path) -> Playback:
     # Imported here, because poses and tables do not need the extension ``programs``.
     from katana450.extensions.programs.language.source import ScriptError
     from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
-    from katana450.extensions.programs.script.demos import CircleDemo, PourDemo
     from katana450.extensions.programs.script.script import parse
-    from katana450.extensions.programs.script.script_files import script_text
+    from katana450.extensions.programs.script.script_files import library_file, script_text
 
-    demos = {"circle": CircleDemo, "pour": PourDemo}
     try:
-        text = demos[name]().text if name in demos else script_text(Path(name))
-        plan = plan_script(parse(text), urdf)
+        own = library_file(name)
+        plan = plan_script(parse(script_text(own if own.exists() else Path(name))), urdf)
     except ScriptError as error:
         problem = error.problems[0]
         file = str(Path(name).parent / problem.file) if problem.file else name

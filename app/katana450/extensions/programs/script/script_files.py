@@ -93,6 +93,11 @@ class Scripts:
         return path
 
 
+def library_file(name: str) -> Path:
+    """Return the file of the script ``name`` of the library, such as ``circle``."""
+    return LIBRARY / f"{name}{ENDING}"
+
+
 def file_name(name: str) -> str:
     """Return the file name of the script ``name``. Raises InputError for an invalid name."""
     if not NAME.fullmatch(name):
