@@ -11,7 +11,6 @@ import pytest
 from katana450.extensions.importers import guarded_reading
 from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.shape_file import SECONDS
-from katana450.extensions.importers.surface import MAX_DRAWN
 from katana450.maths.geometry.arrays import FloatArray
 
 resource = pytest.importorskip("resource")
@@ -81,6 +80,6 @@ def test_mesh_is_read_in_the_time_promised(
     mesh = read_mesh(data, name)
     own, others = spent()[0] - own, spent()[1] - others
     assert mesh.text.startswith(f"{count} triangles")
-    assert len(mesh.faces) == count or MAX_DRAWN // 2 < len(mesh.faces) <= MAX_DRAWN
+    assert len(mesh.faces) == count
     assert own + others < SECONDS
     assert own < OURS

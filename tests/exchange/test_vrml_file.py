@@ -235,7 +235,7 @@ def test_nodes_that_use_others_can_be_deep() -> None:
         ),
         (chain(40, 2), "more than 40000 nodes"),
         (chain(40, 2, "Group { }"), "more than 40000 nodes"),
-        (chain(14, 2, "Shape { geometry Sphere { } }"), "more than 2500000 triangles"),
+        (chain(14, 2, "Shape { geometry Sphere { } }"), "more than 500000 triangles"),
         ("Group { children " * 300, "line 2: nodes are nested more than 150 deep"),
         ("PROTO Bolt [ ] { Group { } }", "has no triangles"),
         (

@@ -154,5 +154,5 @@ def test_worlds_that_show_each_other_end() -> None:
     doubled = {
         f"n{i}_wrl": HEADER + f'\nInline {{ url "n{i + 1}.wrl" }}' * 4 for i in range(30)
     } | {"n30_wrl": BOX}
-    with pytest.raises(InputError, match="more than 2500000 triangles"):
+    with pytest.raises(InputError, match="more than 500000 triangles"):
         read('Inline { url "n0.wrl" }', **doubled)

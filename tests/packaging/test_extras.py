@@ -19,7 +19,7 @@ from katana450.extensions.real_arm.link import ArmUrl
 from katana450.extensions.rosbridge.serve_parts import check_installed
 from katana450.extras import MissingExtraError
 from tests.exchange.compressed_gltf import draco_glb
-from tests.exchange.test_library_formats import threemf
+from tests.exchange.test_threemf import threemf
 
 SCRIPT = """\
 frame: base

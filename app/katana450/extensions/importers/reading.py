@@ -7,7 +7,6 @@ UNIT UP MAIN``. It limits its memory and time before it reads its input.
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 
 from katana450.disk_cache import encoded
 from katana450.errors import KatanaError
@@ -18,11 +17,9 @@ from katana450.extensions.importers.shape_file import (
     MAX_MEMORY_BYTES,
     SECONDS,
     Format,
-    ShapeFile,
     Up,
     read_shape,
 )
-from katana450.extensions.importers.surface import MAX_DRAWN, MeshSurface, coarser
 from katana450.platform_support import limit_resources
 
 
@@ -52,26 +49,7 @@ def answer(
     except KatanaError as error:
         choices = error.choices if isinstance(error, ChoiceError) else ()
         return ShapeReading(error=str(error), choices=choices, missing=tuple(missing))
-    return ShapeReading(drawn(shape), body, missing=tuple(missing))
-
-
-def drawn(shape: ShapeFile) -> ShapeFile:
-    """Return the shape with at most MAX_DRAWN triangles, made coarser if it has more."""
-    if len(shape.faces) <= MAX_DRAWN:
-        return shape
-    whole = MeshSurface(shape.vertices, shape.faces, shape.colours)
-    surface, moved = coarser(whole, MAX_DRAWN)
-    note = (
-        f"It is drawn with {len(surface.faces)} triangles, whose corners are up to "
-        f"{1e3 * shape.scale * moved:.2g} mm off."
-    )
-    return replace(
-        shape,
-        vertices=surface.vertices,
-        faces=surface.faces,
-        colours=surface.colours,
-        text=f"{shape.text} {note}",
-    )
+    return ShapeReading(shape, body, missing=tuple(missing))
 
 
 def bind() -> None:

@@ -32,8 +32,8 @@ def add_serve_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE[@x,y,z][@SCALE]",
-        help="additional object from a .wrl, .stl, .obj, .ply, .off, .glb, .gltf, .dae or "
-        ".3mf file, with the files in its folder that it names, or from a .zip of them; at "
+        help="additional object from a .wrl, .stl, .obj, .ply, .glb, .gltf or .3mf "
+        "file, with the files in its folder that it names, or from a .zip of them; at "
         "x,y,z in mm or else in front of the arm; can be repeated",
     )
 

@@ -1,4 +1,4 @@
-"""Shapes of other programs as triangles in metres, z up: meshes and worlds in nine formats.
+"""Shapes of other programs as triangles in metres, z up: meshes and worlds in seven formats.
 
 Files are untrusted. Readers see no file but those of the same upload, execute nothing, and stop at
 limits of their own. `read_shape_guarded` adds limits of the system, in a disposable subprocess.
@@ -19,7 +19,6 @@ from katana450.errors import InputError, digits_beyond
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, Companions, packed, unpacked
 from katana450.extensions.importers.gltf_file import read_gltf
 from katana450.extensions.importers.obj_file import read_obj
-from katana450.extensions.importers.off_file import read_off
 from katana450.extensions.importers.ply_file import read_ply
 from katana450.extensions.importers.stl_file import read_stl
 from katana450.extensions.importers.surface import MeshReading, MeshSurface
@@ -65,9 +64,7 @@ class Format(Enum):
     PLY = "ply"
     GLB = "glb"
     GLTF = "gltf"
-    DAE = "dae"
     THREEMF = "3mf"
-    OFF = "off"
     ZIP = "zip"
 
     @property
@@ -79,10 +76,10 @@ class Format(Enum):
     def of(cls, file: str) -> Format:
         """Return the format of a file by its name. Raises InputError.
 
-        .wrz is a compressed .wrl, .zae is a .zip with a .dae.
+        .wrz is a compressed .wrl.
         """
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        others = {"wrz": cls.WRL, "zae": cls.ZIP}
+        others = {"wrz": cls.WRL}
         known = {member.value: member for member in cls} | others
         if suffix not in known:
             raise InputError(
@@ -178,7 +175,7 @@ def read_shape(
     finally:
         if missing is not None:
             missing += companions.missing
-    reading = _in_known_unit(reading, file)
+    reading = _in_known_unit(reading)
     surface = reading.surface.tidy()
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
@@ -191,12 +188,11 @@ def read_shape(
     scale = fitting_scale(longest * metres)
     if scale is None:
         raise _beyond(longest, metres, file)
-    axis = up or Up(reading.up or ("y" if format in Y_UP else "z"))
+    axis = up or (Up.Y if format in Y_UP else Up.Z)
     vertices = surface.vertices * metres
     if axis is Up.Y:
         vertices = vertices[:, (0, 2, 1)] * (1.0, -1.0, 1.0)
     text = f"{_size(vertices, surface)}; {why}; {_turned(axis, up)}."
-    text += f" {reading.note}" if reading.note else ""
     if left_out:
         text += f" Left out: {_listed(left_out)}."
     text += _not_there(companions) + _scaled(longest, metres, scale)
@@ -261,13 +257,7 @@ def _read(data: bytes, format: Format, file: str, companions: Companions) -> Mes
             return read_obj(data, file, companions)
         case Format.PLY:
             return read_ply(data, file)
-        case Format.OFF:
-            return read_off(data, file)
-        # The libraries for these formats take as long to import as a file takes to read.
-        case Format.DAE:
-            from katana450.extensions.importers.dae_file import read_dae
-
-            return read_dae(data, file)
+        # The library for this format takes longer to import than a file takes to read.
         case Format.THREEMF:
             from katana450.extensions.importers.threemf_file import read_3mf
 
@@ -292,12 +282,10 @@ def _degenerate(surface: MeshSurface, tidy: MeshSurface) -> list[str]:
     return [f"{count} degenerate triangle{'' if count == 1 else 's'}"] if count else []
 
 
-def _in_known_unit(reading: MeshReading, file: str) -> MeshReading:
+def _in_known_unit(reading: MeshReading) -> MeshReading:
     """Return the reading in metres if its unit is not in UNITS, else unchanged."""
     if reading.unit is None or reading.unit in UNITS.values():
         return reading
-    if not 1e-9 < reading.unit < 1e9:
-        raise InputError(f"{file} is corrupt: its unit is {reading.unit:g} m.")
     surface = reading.surface
     scaled = replace(surface, vertices=surface.vertices * reading.unit)
     return replace(reading, surface=scaled, unit=1.0)

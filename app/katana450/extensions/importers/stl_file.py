@@ -23,9 +23,6 @@ HEADER = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 """A triangle of a binary file."""
 
-UNCOUNTED = (0, 0xFFFFFFFF)
-"""Numbers of triangles in files that were written as a stream, before they were counted."""
-
 _VERTEX = rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)\s+"
 _FACET = re.compile(
     rb"\s*facet\s+normal\s+\S+\s+\S+\s+\S+\s+outer\s+loop\s+"
@@ -39,11 +36,7 @@ _SOLID = re.compile(rb"\s*(end)?solid\b[^\r\n]*", re.IGNORECASE)
 def read_stl(data: bytes, name: str) -> MeshReading:
     """Return all triangles of all solids. Raises InputError for an invalid file."""
     left_out: tuple[str, ...] = ()
-    note = ""
     count = int.from_bytes(data[80:84], "little")
-    whole, rest = divmod(len(data) - HEADER, TRIANGLE.itemsize)
-    if count in UNCOUNTED and whole > 0 and not rest:
-        count, note = whole, "The file does not say how many triangles it has: all were read."
     # Some binary files begin with "solid" too, so the size decides.
     if len(data) >= HEADER and len(data) == HEADER + count * TRIANGLE.itemsize:
         check_triangles(count, name)
@@ -66,7 +59,7 @@ def read_stl(data: bytes, name: str) -> MeshReading:
         )
     places = np.arange(len(points))
     surface = of_polygons(points, places, np.full(len(points) // 3, 3), name)
-    return MeshReading(surface, left_out, note=note)
+    return MeshReading(surface, left_out)
 
 
 def _corners(data: bytes, name: str) -> list[tuple[bytes, ...]]:

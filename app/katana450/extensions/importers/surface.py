@@ -1,8 +1,7 @@
-"""Triangle surfaces as all readers produce them, from polygons, and coarser ones for drawing.
+"""Triangle surfaces as all readers produce them, from polygons.
 
-Sources: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975), for the triangulation
-of concave polygons. J. Rossignac, P. Borrel, "Multi-resolution 3D approximations for rendering
-complex scenes", in: Modeling in Computer Graphics (1993), for the clustering of vertices in a grid.
+Source: G. H. Meisters, "Polygons have ears", Amer. Math. Monthly 82 (1975), for the triangulation
+of concave polygons.
 """
 
 from __future__ import annotations
@@ -139,11 +138,8 @@ def _turn(a: FloatArray, b: FloatArray, points: FloatArray) -> FloatArray:
 GREY = (204, 204, 204, 255)
 """Colour (RGBA bytes) of uncoloured parts beside coloured ones: the default of VRML97."""
 
-MAX_TRIANGLES = 2_500_000
+MAX_TRIANGLES = 500_000
 """Maximum number of triangles of a file."""
-
-MAX_DRAWN = 200_000
-"""Maximum number of triangles with which an object is drawn."""
 
 MAX_COPIES = 40_000
 """Maximum number of nodes of a scene, each counted as often as it is used."""
@@ -209,15 +205,11 @@ class MeshReading:
         surface: the surface.
         left_out: names of the parts that were not read.
         unit: unit [m], if the file gives it.
-        up: axis that points up, y or z, if the file gives it.
-        note: a sentence on a choice that the reader made; empty without one.
     """
 
     surface: MeshSurface
     left_out: tuple[str, ...] = ()
     unit: float | None = None
-    up: str | None = None
-    note: str = ""
 
 
 class MeshBuilder:
@@ -320,73 +312,3 @@ def as_bytes(colours: Iterable[Sequence[float]] | FloatArray) -> Colours:
     """Return colours 0..1 as bytes (m, 4); values outside are clipped."""
     rows = np.nan_to_num(np.asarray(colours, dtype=np.float64))
     return np.rint(np.clip(rows, 0.0, 1.0) * 255.0).astype(np.uint8).reshape(-1, 4)
-
-
-MAX_CELLS = 1 << 20
-"""Maximum number of cells along a side, so that the numbers of a cell fit into 64 bits."""
-
-ENOUGH = 0.75
-"""[1] Fraction of the maximum number of triangles with which no finer grid is tried."""
-
-FINER_GRIDS = 2
-"""Maximum number of finer grids that are tried after the first one that is coarse enough."""
-
-
-def coarser(surface: MeshSurface, maximum: int) -> tuple[MeshSurface, float]:
-    """Return a surface of at most ``maximum`` triangles, and how far a vertex was moved at most.
-
-    Vertices in the same cell of a grid become their mean. Triangles whose corners become the same,
-    and repeated triangles, are left out. The result has the same extent along each axis.
-    ``surface`` is not empty and has no equal vertices.
-    """
-    vertices, faces = surface.vertices, surface.faces
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    edges = np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1)
-    fine = float((high - low).max()) / MAX_CELLS
-    cell = max(0.5 * float(np.median(edges)), fine)
-    clusters: tuple[IntArray, FloatArray, IntArray] | None = None
-    tries, growth = FINER_GRIDS, 1.1
-    while clusters is None or tries:
-        cluster, means = _clustered(vertices, low, cell)
-        faces_left = _distinct(cluster[faces], len(means))
-        if len(faces_left) <= maximum:
-            clusters, coarse = (cluster, means, faces_left), cell
-            if len(faces_left) > ENOUGH * maximum:
-                break
-        else:
-            fine = cell
-        if clusters is None:
-            # The number of triangles of a surface falls with the square of the size of a cell. It
-            # falls later if there are many small triangles beside large ones.
-            cell *= max(float(np.sqrt(len(faces_left) / maximum)), growth)
-            growth **= 2
-        else:
-            cell = float(np.sqrt(fine * coarse)) if fine * 8.0 > coarse else coarse / 2.0
-            tries -= 1
-    cluster, means, faces_left = clusters
-    near, far = means.min(axis=0), means.max(axis=0)
-    means = low + (means - near) * ((high - low) / np.where(far > near, far - near, 1.0))
-    moved = float(np.linalg.norm(vertices - means[cluster], axis=1).max())
-    colours = None if surface.colours is None else surface.colours[faces_left]
-    return MeshSurface(means, cluster[faces[faces_left]], colours).tidy(), moved
-
-
-def _clustered(vertices: FloatArray, low: FloatArray, cell: float) -> tuple[IntArray, FloatArray]:
-    """Return the cluster (n,) of each vertex, and the mean (k, 3) of each cluster."""
-    x, y, z = np.floor((vertices - low) / cell).astype(np.int64).T
-    side = MAX_CELLS + 1
-    _, cluster = np.unique((x * side + y) * side + z, return_inverse=True)
-    count = np.bincount(cluster)
-    sums = [np.bincount(cluster, weights=column) for column in vertices.T]
-    return cluster.astype(np.int64), np.column_stack(sums) / count[:, None]
-
-
-def _distinct(faces: IntArray, count: int) -> IntArray:
-    """Return the numbers of the faces that have three corners and do not repeat another one."""
-    a, b, c = np.sort(faces, axis=1).T
-    whole = np.flatnonzero((a != b) & (b != c))
-    a, b, c = a[whole], b[whole], c[whole]
-    order = np.lexsort((c, a * count + b))
-    repeated = np.zeros(len(order), dtype=bool)
-    repeated[1:] = (np.diff(a[order]) == 0) & (np.diff(b[order]) == 0) & (np.diff(c[order]) == 0)
-    return np.sort(whole[order[~repeated]])

@@ -56,7 +56,7 @@ def read_3mf(data: bytes, name: str, maximum: int) -> MeshReading:
         unit = scene["metadata"]["units"]
     if unit not in UNITS:
         raise InputError(f"{name} is corrupt: {str(unit)[:20]!r} is not a unit of 3MF.")
-    return MeshReading(builder.surface(), _left_out(data), unit=UNITS[unit], up="z")
+    return MeshReading(builder.surface(), _left_out(data), unit=UNITS[unit])
 
 
 def _check_archive(data: bytes, name: str, maximum: int) -> None:
