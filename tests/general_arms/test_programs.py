@@ -156,7 +156,7 @@ def test_four_axes_have_a_pitch_wherever_the_tool_goes() -> None:
 
 @pytest.mark.cases(2)
 @every(SOME, {})
-def test_lines_arc_and_screw_are_planned(chain: Chain) -> None:
+def test_lines_and_arc_are_planned(chain: Chain) -> None:
     p, d = middle(chain), 0.3 * length(chain)
     corners = [p - (0.0, -d, 0.0), p - (0.0, -d, d), p - (0.0, 0.0, d)]
     made = program(
@@ -181,17 +181,6 @@ def test_lines_arc_and_screw_are_planned(chain: Chain) -> None:
     end = forward_batch(chain, plans(made)[2].end[None])[0, :3, 3]
     turn = so3.rotation_x(math.radians(45.0)) @ (corners[0] - p)
     np.testing.assert_allclose(1e3 * end, p + turn + (5.0, 0.0, 0.0), atol=1e-5)
-
-
-@every({"UR5e": UR5E, "Panda": PANDA}, {"KR 6": KR_6})
-def test_screw_moves_the_tool_as_one_rigid_body(chain: Chain) -> None:
-    beside = point(middle(chain) - (0.0, 0.0, 50.0))
-    made = program(chain, f"screw: {{point: {beside}, axis: z, angle: 30, climb: 8}}")
-    before = pose(session_of(chain), begun(session_of(chain)))
-    after = forward_batch(chain, plans(made)[0].end[None])[0]
-    turn = so3.rotation_z(math.radians(30.0))
-    np.testing.assert_allclose(after[:3, :3], turn @ before[:3, :3], atol=1e-9)
-    np.testing.assert_allclose(after[:3, 3], before[:3, 3] + (0.0, 0.0, 0.008), atol=2e-9)
 
 
 def test_swivel_of_seven_axes_turns_where_it_must() -> None:

@@ -37,7 +37,6 @@ steps:
 - lines: {through: [corner, {x: 1, y: 2, z: 3}], blend: 0}
 - arc: {centre: corner, axis: z, angle: 20, climb: 5}
 - circle: {centre: [320, 0, 150], normal: x, radius: 20, turns: 2, pitch: roomiest}
-- screw: {point: [300, 0, 150], axis: [0, 0, 1], angle: 10}
 - trajectory:
     through:
     - [0, 0, -68, 85, 8, 0]
@@ -89,7 +88,6 @@ def everything() -> katana450.ScriptWriter:
         p.lines("corner", {"x": 1, "y": 2, "z": 3}, blend=0)
         p.arc("corner", "z", 20, climb=5)
         p.circle((320, 0, 150), "x", 20, turns=2, pitch="roomiest")
-        p.screw((300, 0, 150), (0, 0, 1), angle=10)
         p.trajectory([0, 0.5], [[0, -68, 85, 8, 0], [5, -68, 85, 8, 0]])
         p.gripper("open")
         p.gripper("closed", holding="cup")

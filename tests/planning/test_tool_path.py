@@ -20,7 +20,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolArc,
     ToolLine,
     ToolLines,
-    ToolScrew,
     roomiest,
 )
 from katana450.maths.geometry import se3
@@ -29,7 +28,6 @@ from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import Path, joint_derivatives, point_derivatives
@@ -259,56 +257,6 @@ def test_a_curve_that_only_grazes_the_reach_is_refused(arm: ArmModel, beyond: fl
     ToolPath(chain, nearer, FRONT_UP, np.zeros(5))
 
 
-TWISTS = {
-    "about axis 1": (0.0, 0.0, 0.8, 0.0, 0.0, 0.0),
-    "upwards": (0.0, 0.0, 0.0, 0.0, 0.0, 0.1),
-    "climbing": (0.0, 0.0, 0.8, 0.0, 0.0, 0.1),
-}
-
-
-@pytest.mark.parametrize("name", TWISTS)
-def test_feasible_screw_is_followed_in_position_and_orientation(
-    arm: ArmModel, ready: FloatArray, name: str
-) -> None:
-    twist = np.array(TWISTS[name])
-    q = ready + np.array([0.2, 0.1, 0.0, 0.1, 0.4])
-    screw = ToolScrew(arm.chain, FRONT_UP, q, twist)
-    path, T = ToolPath(arm.chain, screw, FRONT_UP, q), forward(arm.chain, q)
-    for sigma in np.linspace(0.0, 1.0, 7).tolist():
-        wanted = se3.exp(twist * sigma) @ T
-        assert forward(arm.chain, q_at(path, sigma)) == pytest.approx(wanted, abs=1e-13)
-
-
-def test_any_screw_keeps_the_point_and_the_nearest_orientation(
-    arm: ArmModel, ready: FloatArray
-) -> None:
-    rng, chain, followed = np.random.default_rng(5), arm.chain, 0
-    for _ in range(16):
-        q = ready + rng.uniform(-0.2, 0.2, 5)
-        T = forward(chain, q)
-        turn = np.concatenate((0.4 * rng.normal(size=3), 0.03 * rng.normal(size=3)))
-        twist = np.concatenate((turn[:3], turn[3:] - np.cross(turn[:3], T[:3, 3])))
-        try:
-            path = ToolPath(chain, ToolScrew(chain, FRONT_UP, q, twist), FRONT_UP, q)
-        except InputError:
-            continue
-        followed += 1
-        for sigma in (0.0, 0.5, 1.0):
-            wanted = se3.exp(twist * sigma) @ T
-            best = project(chain, wanted, branch=FRONT_UP, q_hint=q)
-            assert q_at(path, sigma) == pytest.approx(best.q, abs=1e-7)
-            assert math.dist(forward(chain, q_at(path, sigma))[:3, 3], wanted[:3, 3]) < 1e-14
-    assert followed >= 8
-
-
-def test_a_screw_of_a_tool_beside_the_roll_axis_is_refused() -> None:
-    rng = np.random.default_rng(0)
-    chain = next(c for c, _ in (random_member(rng) for _ in range(50)) if arm_of(c).off_axis == 0.0)
-    M = chain.M @ se3.from_rotation_translation(np.eye(3), (0.02, 0.03, 0.04))
-    with pytest.raises(InputError, match="beside it"):
-        ToolScrew(chain.with_tool(M), FRONT_UP, np.zeros(5), np.ones(6))
-
-
 def test_a_tool_beside_the_roll_axis_follows_lines_exactly() -> None:
     rng, followed = np.random.default_rng(3), 0
     for _ in range(20):
@@ -339,7 +287,6 @@ def test_invalid_numbers_are_refused(arm: ArmModel, ready: FloatArray, bad: floa
         lambda: ToolArc(at.position, np.zeros(3), np.array([0.0, bad, 0.0]), 1.0, still, still),
         lambda: ToolArc(at.position, np.zeros(3), np.ones(3), bad, still, still),
         lambda: ToolArc(at.position, np.zeros(3), np.zeros(3), 1.0, still, still),
-        lambda: ToolScrew(arm.chain, FRONT_UP, ready, np.full(6, bad)),
         lambda: Linear(bad, 0.0),
         lambda: Swing(0.0, bad, 0.0, 0.0, 1.0),
         lambda: ToolPath(arm.chain, ToolLine(at, at), FRONT_UP, np.full(5, bad)),

@@ -38,7 +38,7 @@ steps:
   - gripper: open
   - wait: 0.2
   - arc: {centre: {x: 320, y: 20, z: 130}, axis: y, angle: 40, pitch: 60}
-  - screw: {point: {x: 300, y: 0, z: 150}, axis: z, angle: 10, climb: 20}
+  - arc: {centre: {x: 300, y: 0, z: 150}, axis: z, angle: 10, climb: 20}
   - via: {through: [{joints: [10, -60, 80, 10, 0]}, here]}
 """
 

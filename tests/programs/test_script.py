@@ -75,7 +75,6 @@ def test_numbers_are_read_in_degrees_and_millimetres() -> None:
         ("steps:\n  - lines: {through: [[1, 2, 3]]}", 2, "list of 2 to 50"),
         ("steps:\n  - trajectory: {}", 2, "A trajectory needs `through` or `file`"),
         ("steps:\n  - circle:\n      turns: 0\n      radius: x", 3, "`turns` must not be 0"),
-        ("steps:\n  - screw: {point: [1, 2, 3], axis: z}", 2, "needs `angle` or `climb`"),
         ("steps:\n  - line: {too: 3, to: [1, 2, 3]}", 2, "has no 'too'; did you mean 'to'?"),
         (
             "steps:\n  - lines: {through: [{x: 1, y: 2, z: 3}, {joints: [1, 2, 3, 4, 5]}]}",

@@ -117,7 +117,6 @@ def test_schema_has_every_field_of_a_place() -> None:
         "steps: [{line: {to: {x: 1, y: 2}}}]",
         "steps: [{line: {too: [1, 2, 3]}}]",
         "steps: [{line: {to: [1, 2, 3], by: [1, 2, 3]}}]",
-        "steps: [{screw: {point: [1, 2, 3], axis: z}}]",
         "steps: [{trajectory: {}}]",
         "steps: [{trajectory: {through: [[0, 1, 2, 3], [1, 1, 2, 3]], file: a.csv}}]",
         "steps: [{place: {}}]",

@@ -37,7 +37,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolArc,
     ToolLine,
     ToolLines,
-    ToolScrew,
     ToolTurn,
     TurnedCurve,
 )
@@ -67,8 +66,6 @@ from katana450.settings import Settings
 from tests.conftest import LONG
 from tests.control.test_session_machine import ArmRules, bounded
 from tests.control.test_traits import KINDS, examples
-
-TWIST = np.array((0.0, 0.0, 0.1, 0.01, 0.02, 0.0))
 
 
 def copied(kind: Any, value: Any) -> Any:
@@ -109,7 +106,6 @@ def follow(arm: ArmModel) -> cmd.Follow:
         ToolTurn(point, np.array((0.1, 0.2, 0.1))),
     ]
     paths: list[Path] = [ToolPath(chain, curve, branch, near) for curve in curves]
-    paths.append(ToolPath(chain, ToolScrew(chain, branch, paths[0].end, TWIST), branch, near))
     bounds = Bounds(session.require_arm().limits, 0.5)
     # Each alone, because they do not meet.
     plans = [plan([path], bounds, session.world, 0.1) for path in paths]
@@ -470,7 +466,7 @@ def test_deep_batches_are_refused() -> None:
 
 def test_every_class_that_is_recorded_is_frozen() -> None:
     kinds = recorded_classes()
-    assert {State, cmd.Follow, Plan, ToolPath, ToolScrew, Linear, TurnedCurve} <= set(kinds)
+    assert {State, cmd.Follow, Plan, ToolPath, Linear, TurnedCurve} <= set(kinds)
     for kind in kinds:
         frozen = kind.__struct_config__ if issubclass(kind, Struct) else kind.__dataclass_params__  # type: ignore[attr-defined]
         assert frozen.frozen, kind

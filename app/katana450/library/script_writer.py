@@ -221,17 +221,6 @@ class ScriptWriter:
             "circle", centre=centre, normal=normal, radius=radius, turns=turns, branch=branch, **how
         )
 
-    def screw(
-        self,
-        point: Point,
-        axis: str | Sequence[float],
-        *,
-        angle: Number | None = None,
-        climb: Number | None = None,
-    ) -> None:
-        """Move the tool as a rigid body about an axis [deg] and along it [mm]."""
-        self._add("screw", point=point, axis=axis, angle=angle, climb=climb)
-
     def trajectory(
         self, times: Sequence[Number] | str, postures: Sequence[Sequence[Number]] = ()
     ) -> None:

@@ -37,7 +37,6 @@ from katana450.extensions.programs.planning.curves import (
     ToolArc,
     ToolLine,
     ToolLines,
-    ToolScrew,
     ToolTurn,
     TurnedCurve,
 )
@@ -126,7 +125,7 @@ class SharedValues:
 
 MEMBERS: Final[Mapping[Any, Any]] = {
     Path: JointPath | ToolPath | TrajectoryPath | PosePath,
-    Curve: ToolLine | ToolLines | ToolArc | ToolScrew | ToolTurn | TurnedCurve | PoseTurn,
+    Curve: ToolLine | ToolLines | ToolArc | ToolTurn | TurnedCurve | PoseTurn,
     Callable: Linear | Swing,
     Command: Union[classes_of(Command)],  # noqa: UP007
 }

@@ -23,11 +23,10 @@ from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.planning.jet import Jet, atan2, sin_cos, sqrt
+from katana450.maths.planning.jet import Jet, sin_cos, sqrt
 from katana450.maths.planning.polyline import Polyline
-from katana450.maths.planning.posture import ThreeJets, ToolJets, facing, posture
+from katana450.maths.planning.posture import ThreeJets, ToolJets, posture
 
 TURN_LENGTH = 0.25
 """Length [m] that stands for a turn by 1 rad, where the legs of a path are compared by length."""
@@ -236,76 +235,6 @@ class ToolLines:
         two = (2.0 * (a * b - w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c + w * a))
         three = (2.0 * (a * c + w * b), 2.0 * (b * c - w * a), 1.0 - 2.0 * (a * a + b * b))
         return ToolJets.turned((x, y, z), (one, two, three))
-
-
-def screw_points(p: FloatArray, twist: FloatArray) -> ToolLine | ToolArc:
-    """Return the path of the point ``p`` (3,) [m] along ``twist`` (6,), with pitch and roll 0."""
-    omega, v = twist[:3], twist[3:]
-    turn = math.hypot(*omega)
-    if turn == 0.0:
-        return ToolLine(ToolTarget(p), ToolTarget(p + v))
-    centre, climb = np.cross(omega, v) / turn**2, float(omega @ v) / turn
-    return ToolArc(p, centre, omega, turn, Linear(0.0, 0.0), Linear(0.0, 0.0), climb)
-
-
-@dataclass(frozen=True, eq=False)
-class ToolScrew(_OneFormula):
-    """A motion of the tool along a twist (omega, v) in {S} from its pose at `q`, for five axes.
-
-    The tool point follows exp(twist sigma) exactly. The tool turns to the orientation nearest to
-    that motion that the arm's plane allows; yaw follows from the arm. Sources: Lynch & Park (2017),
-    ch. 3.3; for the nearest orientation `PlaneOrientation`. Raises InputError for a
-    tool point beside the roll axis: the plane then depends on the turn, and the turn on the plane.
-    """
-
-    chain: Chain
-    branch: Branch
-    q: FloatArray
-    twist: FloatArray
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "q", frozen(self.chain.check_q(self.q)))
-        twist = finite_array(self.twist, (6,), "The twist of a screw")
-        object.__setattr__(self, "twist", frozen(twist))
-        if arm_of(self.chain).off_axis > 0.0:
-            raise InputError(
-                "A screw path needs a tool point on the roll axis; this one is "
-                f"{1e3 * arm_of(self.chain).off_axis:.3g} mm beside it. Give pitch and roll "
-                "along an arc instead."
-            )
-
-    def at(self, sigma: Jet) -> ToolJets:
-        """Return the tool at `sigma`, one place or many."""
-        arm = arm_of(self.chain)
-        x, y, z = self._point_path.at(sigma)[:3]
-        # The orientation of {K} in {C} as a quaternion, turned by the twist.
-        (w0, x0, y0, z0), (a, b, c), turn = self._turning
-        s, k = sin_cos((0.5 * turn) * sigma)
-        W = k * w0 - s * (a * x0 + b * y0 + c * z0)
-        X = k * x0 + s * (a * w0 + b * z0 - c * y0)
-        Y = k * y0 + s * (b * w0 + c * x0 - a * z0)
-        Z = k * z0 + s * (c * w0 + a * y0 - b * x0)
-        # In the arm's plane.
-        alpha1, _, _ = facing(arm, self.branch.shoulder, x, y, z)
-        s, k = sin_cos(0.5 * alpha1)
-        W, X, Y, Z = k * W + s * Z, k * X + s * Y, k * Y - s * X, k * Z - s * W
-        total, difference = atan2(X + Y, W + Z), atan2(Y - X, W - Z)
-        return ToolJets(x, y, z, total + difference, total - difference)
-
-    @cached_property
-    def _point_path(self) -> ToolLine | ToolArc:
-        """The path of the tool point."""
-        return screw_points(forward(self.chain, self.q)[:3, 3], self.twist)
-
-    @cached_property
-    def _turning(self) -> tuple[list[float], list[float], float]:
-        """The quaternion of {K} in {C} at the start, the axis in {C}, and the angle."""
-        arm = arm_of(self.chain)
-        R = arm.pose(forward(self.chain, self.q))[:3, :3]
-        omega = self.twist[:3]
-        turn = math.hypot(*omega)
-        axis = arm.T_C_S[:3, :3] @ omega / (turn or 1.0)
-        return so3.to_quaternion(R).tolist(), axis.tolist(), turn
 
 
 @dataclass(frozen=True, eq=False)

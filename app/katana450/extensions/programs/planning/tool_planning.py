@@ -23,9 +23,6 @@ from katana450.extensions.programs.language.step_target import Angles
 from katana450.extensions.programs.planning.curve_path import CurveSearch, ToolPath
 from katana450.extensions.programs.planning.curves import (
     Curve,
-    ToolScrew,
-    TurnedCurve,
-    screw_points,
 )
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -257,22 +254,6 @@ class ToolPlanning:
         if abs(float(axis @ (wanted - now))) > EXACT:
             return None
         return axis * math.atan2(float(axis @ np.cross(now, wanted)), float(now @ wanted))
-
-    def screw(self, q: FloatArray, twist: FloatArray) -> Curve:
-        """Return the motion of the tool from `q` along ``twist`` (6,) in {S}, as far as it can.
-
-        Six and more axes follow it exactly, and the five-axis family with the nearest orientation.
-        """
-        branch = self.kinematics.branch_of(q)
-        if isinstance(branch, Branch):
-            return ToolScrew(self.chain, branch, q, twist)
-        if self.chain.n < 6:
-            raise InputError(
-                "A screw needs an arm with at least six axes, or one of the five-axis family. This "
-                f"one has {self.chain.n} axes. Use an arc."
-            )
-        start = self.at(q)
-        return TurnedCurve(screw_points(start.position, twist), start.R, twist[:3])
 
     def path(self, q: FloatArray, curve: Curve, branch: AnyBranch) -> Path:
         """Return the joint path along ``curve`` on ``branch``, which begins as near `q` as it can.

@@ -252,36 +252,3 @@ class Circle(_Turn, word="circle"):
         start = self.turned(plan).moved(frozen(point))
         arc = arc_between(centre, normal, math.tau * self.turns, 0.0, start, start)
         return self.follow(plan, arc, "circle", self.branch)
-
-
-@dataclass(frozen=True, eq=False)
-class Screw(Step, word="screw"):
-    """Move the tool about an axis and along it, as one rigid body.
-
-    Attributes:
-        point: (3,) of the axis [m].
-        axis: (3,) unit vector.
-        angle: about the axis [rad].
-        climb: along the axis [m].
-        in_base: whether point and axis are in the base frame, not in {S}.
-    """
-
-    needs = ("angle", "climb")
-
-    point: Point
-    axis: Direction
-    angle: Angle = 0.0
-    climb: Climb = 0.0
-    in_base: bool = False
-
-    def build(self, plan: PlanState) -> PlanState:
-        """Plan the screw. Raises InputError if the tool cannot follow it."""
-        axis = plan.direction(self.axis, in_base=self.in_base)
-        omega = self.angle * axis
-        v = np.cross(plan.point(self.point, in_base=self.in_base), omega) + self.climb * axis
-        branch = plan.branches(None)[0]
-        screw = plan.planning.screw(plan.q, np.append(omega, v))
-        try:
-            return plan.lead([screw], "screw")
-        except InputError as error:
-            raise plan.unfollowed(error, screw, branch) from error
