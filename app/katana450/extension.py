@@ -161,8 +161,6 @@ class Extension:
             RobotDescriptionError.
         find_arm: Returns the arm outside the five-axis family in a URDF, with its kinematics, or
             None; see ``FindArm``. Called when a robot is read for ``serve``.
-        joint_view: View of a robot that is driven joint by joint, called as `MachineView`, and then
-            its ``add_panel``.
         serve_options: Adds options to the parser of ``serve``.
         initial_scene: Returns the InitialScene according to the options, or None. Its second
             argument returns the session of the robot, and raises RobotDescriptionError if the robot
@@ -197,7 +195,6 @@ class Extension:
     hand: Target | None = None
     expand: Target | None = None
     find_arm: Target | None = None
-    joint_view: Target | None = None
     serve_options: Target | None = None
     initial_scene: Target | None = None
     view_layer: Target | None = None

@@ -16,12 +16,13 @@ from katana450.arm.control import commands as cmd
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.loader import load
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
-from katana450.extensions.joint_view import MachinePanel, MachineView, page
+from katana450.extensions.objects.handles import HandlesLayer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.recording.playback.drawing import RunDrawing
 from katana450.extensions.recording.playback.folder import CONTEXTS
@@ -29,9 +30,11 @@ from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.service.hub import Hub
+from katana450.server.view.panel import Panel
 from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
+from katana450.server.view.readout import joint_page
 from katana450.server.view.scene import ArmNodes
-from katana450.server.view.view import ViewOptions
+from katana450.server.view.view import Additions, View
 from katana450.server.viser_bridge.guard import PERSONAL
 from tests.exchange.trees import tree
 from tests.recording.recorded import state_message
@@ -78,7 +81,7 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
     server: viser.ViserServer, robot: Robot
 ) -> None:
     state = standing(robot)
-    MachinePanel(server.gui, robot, RecordedGestures(), state, lambda _: ())
+    Panel(server, robot, RecordedGestures(), lambda _: (), state)
     controls = {
         handle.label: handle for handle in internals.controls(server)
         if isinstance(handle, viser.GuiSliderHandle)
@@ -93,7 +96,8 @@ def test_panel_has_a_slider_per_joint_and_shows_the_reason(
         assert controls[label].max <= unit * joints.upper[axis] + 1e-9
         # No joint name can produce a label that the guard treats differently.
         assert label not in (*PERSONAL, *ProgramRunner.controls)
-    assert "mm" in page(joints, labels, state)
+    assert "mm" in joint_page(joints, labels, state)
+    assert "Pose by numbers" not in [getattr(h, "label", "") for h in internals.panel(server)]
     texts = [h.content for h in internals.panel(server) if isinstance(h, viser.GuiHtmlHandle)]
     assert any("It is &lt;b&gt;no&lt;/b&gt; arm." in text for text in texts)
 
@@ -110,7 +114,8 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
         Snapshot(session.begin(session.ready, 0.0, 0.0), 0), LoopTiming(0.01)
     )
     gestures = RecordedGestures()
-    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())
+    additions = Additions((HandlesLayer(),), Meshes())
+    view = View(server, robot, publisher, gestures, lambda: 0, session, 30.0, additions)
     view.add_panel(lambda _: ())
     floor: Any = internals.nodes(server)["/floor"]
     assert floor.position[2] == pytest.approx(-0.3, abs=1e-3)
@@ -123,7 +128,7 @@ def test_objects_and_floor_are_shown_at_the_height_of_the_table(
 
 def machine_view(
     server: viser.ViserServer, robot: Robot, hub: Hub, options: Namespace
-) -> tuple[MachineView, Session]:
+) -> tuple[View, Session]:
     """Return the view with what the extensions add to it, as in a server."""
     joints = robot.joint_group
     session = Session(joints, joints.ready, travel=robot.distance)
@@ -147,7 +152,8 @@ def machine_view(
             if (folder := make(context)) is not None:
                 yield folder
 
-    view = MachineView(server, robot, publisher, gestures, lambda: 0, session, 30.0, ViewOptions())
+    additions = Additions((HandlesLayer(),), Meshes())
+    view = View(server, robot, publisher, gestures, lambda: 0, session, 30.0, additions)
     view.add_panel(folders)
     return view, session
 

@@ -10,11 +10,12 @@ import numpy as np
 import viser
 
 from katana450.arm.control.session import Session
+from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.server.view.view import GHOST_FROM, View
+from katana450.server.view.view import GHOST_FROM, Additions, View
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge.internals import nodes
 
@@ -38,7 +39,16 @@ def test_arm_is_drawn_where_it_is_measured_and_its_setpoint_as_a_ghost(
     rest = session.begin(session.ready, 0.0, 0.0)
     measured = frozen(session.ready - 0.1)
     state_publisher: Any = SimpleNamespace(snapshot=Snapshot(rest, 0))
-    view = View(server, robot, state_publisher, RecordedGestures(), lambda: 0, session, 30.0)
+    view = View(
+        server,
+        robot,
+        state_publisher,
+        RecordedGestures(),
+        lambda: 0,
+        session,
+        30.0,
+        Additions((), Meshes()),
+    )
 
     def show(q: FloatArray) -> bool:
         """Show an arm at ``q``; return whether the ghost of its setpoint is visible."""

@@ -1,4 +1,4 @@
-"""The numbers of the panel are computed again only when the state or the units have changed."""
+"""The numbers of the panel are computed again only when the state or the frame has changed."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.server.view import readout
 from katana450.server.view.panel import Panel
+from katana450.server.view.readout import PoseDisplay
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
 
@@ -24,17 +25,17 @@ def texts(server: viser.ViserServer) -> str:
     return "".join(each.content for each in elements if isinstance(each, viser.GuiHtmlHandle))
 
 
-def test_numbers_follow_state_and_units_and_cost_nothing_at_rest(
+def test_numbers_follow_state_and_frame_and_cost_nothing_at_rest(
     server: viser.ViserServer, robot: Robot, session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     computed: list[State] = []
-    details = readout.details
+    page = readout.page
 
-    def noted(arm: MountedArm, state: State) -> str:
+    def noted(arm: MountedArm, state: State, display: PoseDisplay) -> str:
         computed.append(state)
-        return details(arm, state)
+        return page(arm, state, display)
 
-    monkeypatch.setattr(readout, "details", noted)
+    monkeypatch.setattr(readout, "page", noted)
     state = session.begin(session.ready, 0.0, 0.0)
     panel = Panel(server, robot, RecordedGestures(), session.choices, state)
     for now in range(5):
@@ -48,12 +49,12 @@ def test_numbers_follow_state_and_units_and_cost_nothing_at_rest(
     assert computed == [state, moved]
     assert texts(server) != shown
 
-    (units,) = (each for each in internals.controls(server) if each.label == "Units")
-    units.value = "cm, rad"
+    (frame,) = (each for each in internals.controls(server) if each.label == "Frame")
+    frame.value = readout.BASE
     end = time.monotonic() + 10.0
     later = 6.0
-    while "<td class='unit'>cm</td>" not in texts(server):
-        assert time.monotonic() < end, "the numbers keep their units"
+    while "tcp in base" not in texts(server):
+        assert time.monotonic() < end, "the numbers keep their frame"
         time.sleep(0.01)
         panel.follow(moved, later, caught_up=True)
         later += 1.0

@@ -15,7 +15,6 @@ from katana450.arm.control.messages import (
     REASONS,
     STATUS,
     axis_names,
-    condition,
     degrees,
     excluded,
     headline,
@@ -116,16 +115,6 @@ def test_contact_is_reported_with_both_parts_and_the_distance(state: State) -> N
         "Left finger and upper arm are 8.3 mm apart: the arm stops at 5.0 mm."
     )
     assert headline(blocked) == STATUS[Status.BLOCKED]
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [((1.2, 0.6), "2.0"), ((1.2, 0.03), "40"), ((1.2, 1e-9), "∞"), ((1.2, 0.0), "∞")],
-)
-def test_the_condition_has_no_digits_of_rounding(
-    values: tuple[float, float], expected: str
-) -> None:
-    assert condition(np.array(values)) == expected
 
 
 def test_nearest_limit_is_reported_with_its_axis() -> None:

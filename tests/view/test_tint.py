@@ -13,7 +13,7 @@ from katana450.arm.control.state import Finding, Reason, State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.paint import Tint
-from katana450.server.view.scenery import Workcell
+from katana450.server.view.scenery import add_table
 from tests.viser_bridge.internals import nodes
 
 
@@ -82,7 +82,7 @@ def test_object_near_a_contact_is_coated(robot: Robot, state: State, scene_objec
 
 
 def test_viser_accepts_the_coats(robot: Robot, state: State, server: viser.ViserServer) -> None:
-    Workcell(server, load_props())
+    add_table(server, load_props())
     paths = {body.name: f"/{body.name}" for body in robot.links}
     tint = Tint(server, robot, paths, load_props())
     tint.follow(touching(state, "wrist_link", "cup"))

@@ -16,13 +16,12 @@ from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import ConfigurationError
-from katana450.extension import ServerFacts, provided, results
+from katana450.extension import ServerFacts, results
 from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.panel_folder import FolderContext, PanelFolder, PanelTabs
-from katana450.server.view.view import View, ViewOptions
-from katana450.server.view.view_updater import ViewUpdater
+from katana450.server.view.view import Additions, View
 
 
 class Frontend:
@@ -61,10 +60,8 @@ class Frontend:
             for layer in added:
                 if layer.what:
                     raise ConfigurationError(f"{layer.what} {robot.why}")
-            make, options = next(provided("joint_view")), ViewOptions(meshes=meshes)
-        else:
-            make, options = View, ViewOptions(added, meshes)
-        self.view: ViewUpdater = make(
+            added = tuple(layer for layer in added if not layer.needs_arm)
+        self.view = View(
             gateway.viser,
             robot,
             self.pipe.state_publisher,
@@ -72,7 +69,7 @@ class Frontend:
             lambda: self.pipe.last_ticket,
             session,
             settings.frame_rate,
-            options,
+            Additions(added, meshes),
         )
         self._detours: DetourPlanner | None = None
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 
 from katana450.arm.control.state import CAUSES, Finding, Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
-from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING
 
@@ -271,19 +270,8 @@ def limit_text(number: int, name: str, angle: float) -> str:
     return f"{number + 1} {name}: {degrees(angle)} left"
 
 
-ROOM = "to each limit"
-"""Label of the distances of all axes to their nearer limits."""
-
 MAX_CONDITION = 1e6
 """Condition number above which only rounding separates the arm from a singularity."""
-
-
-def condition(values: FloatArray) -> str:
-    """Return the largest over the smallest of ``values`` (n,), which decrease; ∞ at a singularity.
-
-    values: the singular values of the Jacobian.
-    """
-    return "∞" if values[0] >= MAX_CONDITION * values[-1] else short(float(values[0] / values[-1]))
 
 
 def excluded(branch: object, axes: Sequence[int]) -> str:

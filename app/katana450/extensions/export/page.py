@@ -18,18 +18,14 @@ from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.export.playback import chosen
-from katana450.extensions.joint_view import FLOOR_GAP
 from katana450.extensions.programs.server.traces import TracesLayer
 from katana450.extensions.progress import progress
 from katana450.extensions.water import WaterLayer
 from katana450.server.view.cameras import fixed_pose
 from katana450.server.view.controls import NoGestures
-from katana450.server.view.scene import ArmNodes
-from katana450.server.view.scene_objects import SceneObjectNodes
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import Preset
 from katana450.server.viser_bridge.recording_page import titled
-from katana450.server.viser_bridge.themes import set_up_room
 from katana450.server.viser_bridge.viser_server import close_server, open_server
 
 
@@ -60,17 +56,7 @@ def recorded(
 
 def _scene(server: viser.ViserServer, robot: Robot, session: Session) -> Callable[[State], None]:
     """Build the scene of ``robot``; return what shows a state in it."""
-    if robot.arm is None:
-        set_up_room(server, session.environment.table_height - FLOOR_GAP)
-        nodes = ArmNodes(server, robot)
-        objects = SceneObjectNodes(server, load_props(), session.environment, Meshes())
-
-        def show(state: State) -> None:
-            nodes.move(robot.joint_values(state.q, state.gripper))
-            objects.follow(state)
-
-        return show
-    layers = (ConduitLayer(), WaterLayer(), TracesLayer())
+    layers = () if robot.arm is None else (ConduitLayer(), WaterLayer(), TracesLayer())
     return Scenery(server, robot, session, load_props(), NoGestures(), Meshes(), layers).show
 
 

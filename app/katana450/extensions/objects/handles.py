@@ -28,6 +28,8 @@ HANDLE = 0.09
 class HandlesLayer(ViewLayer):
     """The handles as a layer of the scene, hidden; a page shows that of the object it selects."""
 
+    needs_arm = False
+
     def attach(self, context: LayerContext) -> None:
         """Prepare for the objects of a session."""
         environment = context.session.environment

@@ -1,9 +1,9 @@
-"""Layers that extensions add to the scene of an arm."""
+"""Layers that extensions add to the scene."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import viser
 
@@ -19,7 +19,7 @@ class LayerContext(NamedTuple):
 
     Attributes:
         server: viser's server.
-        robot: The robot, which has an arm.
+        robot: The robot, which has an arm if the layer needs one.
         session: The session, which has the environment of objects and the water model.
         arm: The nodes of the robot.
         gestures: The path of gestures to the arm.
@@ -33,16 +33,22 @@ class LayerContext(NamedTuple):
 
 
 class ViewLayer:
-    """Nodes of the scene with controls in the folder "Show" of the panel. The base has none."""
+    """Nodes of the scene with controls in the folder "Show" of the panel. The base has none.
+
+    Attributes:
+        needs_arm: Whether the layer is left out for a robot without an arm.
+    """
+
+    needs_arm: ClassVar[bool] = True
 
     def __init__(self, options: Namespace | None = None) -> None:
         """Take the options of ``katana450 serve``; None outside a server."""
 
     @property
     def what(self) -> str:
-        """Sentence that names the requested feature, which needs an arm.
+        """Sentence that names the requested feature, which a robot without an arm cannot have.
 
-        If it is empty, the layer is left out for a robot without an arm.
+        If it is empty, the layer is left out there without a word.
         """
         return ""
 

@@ -1,8 +1,7 @@
-"""The form of the tool pose: tool and priority, units and frame, and numbers to type."""
+"""The form of the tool pose: tool and priority, frame, and numbers to type."""
 
 from __future__ import annotations
 
-import math
 from html import escape
 from typing import Any
 
@@ -15,13 +14,16 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.server.view.controls import Listen, set_value
-from katana450.server.view.readout import BASE, SHOULDER, UNITS, PoseDisplay
+from katana450.server.view.readout import BASE, SHOULDER, PoseDisplay
 
-MAX_TYPED_POSITION = 1.0
-"""Maximum [m] of a typed coordinate, beyond any tool point of the arm.
+MAX_TYPED_POSITION = 1000.0
+"""Maximum [mm] of a typed coordinate, beyond any tool point of the arm.
 
 It is more while a coordinate exceeds it, typed in another frame.
 """
+
+STEP, DECIMALS = 1.0, 1
+"""[mm, deg] Step of the numbers, and their decimals."""
 
 
 class PoseForm:
@@ -46,9 +48,6 @@ class PoseForm:
         )
         listen(self._priority, lambda: cmd.SetPriority(self._chosen_priority()))
         self._meaning = gui.add_html(self._hint(state.priority))
-        self._unit = gui.add_dropdown(
-            "Units", tuple(UNITS), hint="Of the pose here and above; joints are in degrees"
-        )
         self._frame = gui.add_dropdown(
             "Frame",
             (SHOULDER, BASE),
@@ -58,17 +57,19 @@ class PoseForm:
         )
         self.display = self._chosen()
         self._position = gui.add_vector3(
-            "x, y, z", (0.0, 0.0, 0.0), step=1.0, hint="Tool position in these units and this frame"
+            "x, y, z", (0.0, 0.0, 0.0), step=STEP, hint="Tool position [mm] in this frame"
         )
         self._angles = gui.add_vector3(
             "r, p, y",
             (0.0, 0.0, 0.0),
-            step=1.0,
-            hint="Roll, pitch and yaw in these units and this frame; pitch above 0 points down",
+            min=(-180.0,) * 3,
+            max=(180.0,) * 3,
+            step=STEP,
+            hint="Roll, pitch and yaw [°] in this frame; pitch above 0 points down",
         )
+        self._position.precision = self._angles.precision = DECIMALS
         self._fill(forward(self._arm.chain_to(state.tool), state.goal))
-        for choice in (self._unit, self._frame):
-            choice.on_update(self._change_display)
+        self._frame.on_update(self._change_display)
         # viser shows the label of a row as the name of the pose, and each button by its own text.
         copy = gui.add_button("Copy current", hint="Fills in the present pose of the tool")
         copy.on_click(self._copy)
@@ -96,12 +97,12 @@ class PoseForm:
         return next(priority for priority, (name, _) in self._priorities.items() if name == chosen)
 
     def _chosen(self) -> PoseDisplay:
-        return PoseDisplay(*UNITS[self._unit.value], self._frame.value, self._arm.T_base_shoulder)
+        return PoseDisplay(self._frame.value, self._arm.T_base_shoulder)
 
     # These callbacks are coroutines, because viser calls only those in the order of the messages.
 
     async def _change_display(self, _: viser.GuiEvent[Any]) -> None:
-        """Convert the numbers to the chosen units and frame."""
+        """Convert the numbers to the chosen frame."""
         T = self.display.pose(self._position.value, self._angles.value)
         self.display = self._chosen()
         self._fill(T)
@@ -113,20 +114,13 @@ class PoseForm:
 
     def _fill(self, T: FloatArray) -> None:
         """Show the pose ``T`` (4, 4) in {S}."""
-        unit, angle = self.display.length, self.display.angle
-        position, angles = self.display.numbers(T)
-        shown = _rounded(position, unit.decimals)
+        position, angles = map(_rounded, self.display.numbers(T))
         # The page sends all three numbers when one is edited, so each must be allowed.
-        end = max(MAX_TYPED_POSITION * unit.per_si, *(abs(x) + unit.step for x in shown))
+        end = max(MAX_TYPED_POSITION, *(abs(x) + STEP for x in position))
         self._position.min, self._position.max = (-end, -end, -end), (end, end, end)
-        self._position.step, self._position.precision = unit.step, unit.decimals
-        set_value(self._position, shown)
-        # Not below half a turn: 180° and 3.142 rad.
-        turn = round(math.pi * angle.per_si, angle.decimals)
-        self._angles.min, self._angles.max = (-turn, -turn, -turn), (turn, turn, turn)
-        self._angles.step, self._angles.precision = angle.step, angle.decimals
-        set_value(self._angles, _rounded(angles, angle.decimals))
+        set_value(self._position, position)
+        set_value(self._angles, angles)
 
 
-def _rounded(numbers: list[float], decimals: int) -> tuple[float, ...]:
-    return tuple(round(number, decimals) + 0.0 for number in numbers)
+def _rounded(numbers: list[float]) -> tuple[float, ...]:
+    return tuple(round(number, DECIMALS) + 0.0 for number in numbers)

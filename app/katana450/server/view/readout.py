@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.messages import ROOM, axis_names, condition, degrees, limit_text, signed
+from katana450.arm.control.joints import JointSet
+from katana450.arm.control.messages import axis_names, limit_text, signed
 from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import limit_distances, singular_values
+from katana450.maths.kinematics.velocity import limit_distances
 from katana450.resources import STATIC
 
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -31,7 +32,7 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     now, goal = (_numbers(forward(chain, q), display) for q in (state.q, state.goal))
     rows = "".join(
         f"<tr><th>{name}</th><td data-now='{name}'>{a}</td><td data-goal='{name}'>{b}</td>"
-        f"<td class='unit'>{(display.length if name in 'xyz' else display.angle).name}</td></tr>"
+        f"<td class='unit'>{'mm' if name in 'xyz' else '°'}</td></tr>"
         for name, a, b in zip(ROWS, now, goal, strict=True)
     )
     distances = limit_distances(chain, state.q)
@@ -44,36 +45,33 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     )
 
 
-def details(arm: MountedArm, state: State) -> str:
-    """Return the distances of the arm to a singularity and to every joint limit."""
-    chain = arm.chain_to(state.tool)
-    values = singular_values(chain, state.q)
-    distances = limit_distances(chain, state.q)
-    nearest = int(distances.argmin())
-    rows = (
-        ("singular", "smallest singular value", f"{values[-1]:.3f}"),
-        ("manipulability", "manipulability", f"{math.prod(values):.3f}"),
-        ("condition", "condition", condition(values)),
-    )
-    every = "".join(
-        f"<td{' class=nearest' if number == nearest else ''}>{degrees(angle, 0)}</td>"
-        for number, angle in enumerate(distances.tolist())
-    )
-    return (
-        f"<div class='k450'><table>{''.join(_row(*row) for row in rows)}</table>"
-        f"<table class='rooms' data-now='limits'><tr><th>{escape(ROOM)}</th>{every}</tr></table>"
-        f"</div>"
-    )
-
-
 def _row(key: str, name: str, value: str) -> str:
     return f"<tr><th>{escape(name)}</th><td data-now='{key}'>{escape(value)}</td></tr>"
 
 
+def joint_page(joints: JointSet, labels: Sequence[str], state: State) -> str:
+    """Return the joint values of a robot without an arm, now and at the goal."""
+    rows = "".join(
+        f"<tr><th>{escape(label)}</th>"
+        f"<td data-now='{axis}'>{signed(factor * float(state.q[axis]), 1)}</td>"
+        f"<td data-goal='{axis}'>{signed(factor * float(state.goal[axis]), 1)}</td>"
+        f"<td class='unit'>{'mm' if joints.slides[axis] else '°'}</td></tr>"
+        for axis, (label, factor) in enumerate(zip(labels, per_si(joints.slides), strict=True))
+    )
+    return (
+        f"<div class='k450'><table><thead><tr><th>joint</th><th>now</th><th>goal</th><th></th></tr>"
+        f"</thead><tbody>{rows}</tbody></table></div>"
+    )
+
+
+def per_si(slides: Sequence[bool]) -> tuple[float, ...]:
+    """Return the number of the panel's units [mm, deg] in an SI unit [m, rad], for each joint."""
+    return tuple(1e3 if slide else math.degrees(1.0) for slide in slides)
+
+
 def _numbers(T: FloatArray, display: PoseDisplay) -> list[str]:
     position, angles = display.numbers(T)
-    decimals = [display.length.decimals] * 3 + [display.angle.decimals] * 3
-    return [signed(x, n) for x, n in zip((*position, *angles), decimals, strict=True)]
+    return [signed(number, 1) for number in (*position, *angles)]
 
 
 def style() -> str:
@@ -81,45 +79,14 @@ def style() -> str:
     return f"<style>{(STATIC / 'panel.css').read_text(encoding='utf-8')}</style>"
 
 
-class DisplayUnit(NamedTuple):
-    """A unit of length or angle.
-
-    Attributes:
-        name: its symbol.
-        per_si: number of units in a metre or a radian.
-        decimals: number of decimals that are shown.
-        step: step of a number box, in this unit.
-    """
-
-    name: str
-    per_si: float
-    decimals: int
-    step: float
-
-
-LENGTHS = (
-    DisplayUnit("mm", 1e3, 1, 1.0),
-    DisplayUnit("cm", 1e2, 2, 0.1),
-    DisplayUnit("in", 1.0 / 0.0254, 3, 0.05),
-)
-ANGLES = (DisplayUnit("°", math.degrees(1.0), 1, 1.0), DisplayUnit("rad", 1.0, 3, 0.01))
-
-UNITS = {f"{length.name}, {angle.name}": (length, angle) for angle in ANGLES for length in LENGTHS}
-"""Units of length and angle, by the name of their choice."""
-
-
 class PoseDisplay(NamedTuple):
-    """Conversion between poses in {S} and the numbers of the panel.
+    """Conversion between poses in {S} and the numbers of the panel, in mm and degrees.
 
     Attributes:
-        length: unit of the position.
-        angle: unit of roll, pitch and yaw.
         frame: BASE or SHOULDER.
         T_base_shoulder: (4, 4) the frame {S} in the base frame [m].
     """
 
-    length: DisplayUnit
-    angle: DisplayUnit
     frame: str
     T_base_shoulder: FloatArray
 
@@ -129,14 +96,12 @@ class PoseDisplay(NamedTuple):
         return "base" if self.frame == BASE else "{S}"
 
     def numbers(self, T: FloatArray) -> tuple[list[float], list[float]]:
-        """Return position [length] and roll, pitch, yaw [angle] of ``T`` (4, 4) in {S}."""
+        """Return position [mm] and roll, pitch, yaw [deg] of ``T`` (4, 4) in {S}."""
         shown = self.T_base_shoulder @ T if self.frame == BASE else T
-        position = self.length.per_si * shown[:3, 3]
-        angles = [self.angle.per_si * angle for angle in so3.to_rpy(shown[:3, :3])]
-        return position.tolist(), angles
+        return (1e3 * shown[:3, 3]).tolist(), [*map(math.degrees, so3.to_rpy(shown[:3, :3]))]
 
     def pose(self, position: Sequence[float], angles: Sequence[float]) -> FloatArray:
-        """Return the pose (4, 4) in {S} of a position [length] and roll, pitch, yaw [angle]."""
-        R = so3.from_rpy(*(angle / self.angle.per_si for angle in angles))
-        T = se3.from_rotation_translation(R, np.array(position) / self.length.per_si)
+        """Return the pose (4, 4) in {S} of a position [mm] and roll, pitch, yaw [deg]."""
+        R = so3.from_rpy(*map(math.radians, angles))
+        T = se3.from_rotation_translation(R, 1e-3 * np.array(position))
         return se3.inverse(self.T_base_shoulder) @ T if self.frame == BASE else T

@@ -21,14 +21,16 @@ SHADE = 0.35
 """Darkness (0 to 1) of shadows on the table."""
 
 
-class Workcell:
-    """The table, drawn from its GLB file."""
+FLOOR_GAP = 5e-4
+"""Depth [m] of the floor below the table of a robot without an arm, which is not drawn."""
 
-    def __init__(self, server: viser.ViserServer, props: Props) -> None:
-        # If the table top cast shadows, it would shade its own face.
-        server.scene.add_glb(
-            "/table", props.table.mesh.read_bytes(), cast_shadow=False, receive_shadow=SHADE
-        )
+
+def add_table(server: viser.ViserServer, props: Props) -> None:
+    """Draw the table from its GLB file."""
+    # If the table top cast shadows, it would shade its own face.
+    server.scene.add_glb(
+        "/table", props.table.mesh.read_bytes(), cast_shadow=False, receive_shadow=SHADE
+    )
 
 
 class Scenery:
@@ -48,7 +50,7 @@ class Scenery:
 
         Args:
             server: viser's server.
-            robot: The robot, which must have an arm.
+            robot: The robot. The table is drawn beside an arm.
             session: The session, which has the environment of objects.
             props: Table, cup and basin.
             gestures: The path of gestures at the nodes of layers.
@@ -59,8 +61,11 @@ class Scenery:
             ConfigurationError: A layer cannot be shown.
         """
         self._robot = robot
-        set_up_room(server)
-        Workcell(server, props)
+        if robot.arm is None:
+            set_up_room(server, session.environment.table_height - FLOOR_GAP)
+        else:
+            set_up_room(server)
+            add_table(server, props)
         self._objects = SceneObjectNodes(server, props, session.environment, meshes)
         self.arm = ArmNodes(server, robot)
         self._layers = layers

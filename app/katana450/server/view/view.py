@@ -1,10 +1,10 @@
-"""The view of an arm: one viser server with one scene for all browsers."""
+"""The view of a robot: one viser server with one scene for all browsers."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import viser
@@ -14,6 +14,7 @@ from katana450.arm.control.modes import JointTarget, PoseTarget
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State, Status
 from katana450.arm.robot.initial_camera import camera
+from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
@@ -22,7 +23,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.display_options import DisplayOptions, add_scene_tab
+from katana450.server.view.display_options import LogProblem, add_views
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes, Tint
@@ -55,17 +56,58 @@ GHOST_FROM = np.deg2rad(0.2)
 """Distance [rad] of a joint from its goal, or its setpoint, above which a ghost is shown."""
 
 
-@dataclass(frozen=True)
-class ViewOptions:
-    """Additions to the view.
+class Additions(NamedTuple):
+    """Parts of a view beside the robot.
 
     Attributes:
-        layers: layers of extensions.
-        meshes: the meshes of scene objects.
+        layers: Layers of extensions, which the robot can have.
+        meshes: The meshes of scene objects.
     """
 
-    layers: tuple[ViewLayer, ...] = ()
-    meshes: Meshes = field(default_factory=Meshes)
+    layers: tuple[ViewLayer, ...]
+    meshes: Meshes
+
+
+class ToolNodes:
+    """The nodes of the tool's goal: the handle, and a line to it from the target."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        arm: MountedArm,
+        gestures: GestureGate,
+        current: Callable[[], State],
+    ) -> None:
+        """Add the nodes to the scene; see ``Gizmo``."""
+        self._arm = arm
+        self._gap = Gap(server)
+        self.gizmo = Gizmo(server, arm, gestures, current)
+        self._goal: FloatArray | None = None
+        self._tool = ""
+        self._T_base_goal = np.eye(4)
+
+    def follow(self, state: State) -> None:
+        """Show the goal and the target of ``state``."""
+        # Goals are immutable: a changed goal is another array.
+        if state.goal is not self._goal or state.tool != self._tool:
+            self._goal, self._tool = state.goal, state.tool
+            chain = self._arm.chain_to(state.tool)
+            self._T_base_goal = self._arm.T_base_shoulder @ forward(chain, state.goal)
+            self.gizmo.aim(state, self._T_base_goal)
+        self.gizmo.follow()
+        self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
+
+    def _desired(self, state: State) -> FloatArray | None:
+        """Return the tool point (3,) [m] of the target in the base frame; None without one."""
+        match state.target:
+            case PoseTarget(T=T):
+                p = T[:3, 3]
+            case JointTarget():
+                return None
+            case target:
+                p = target.position
+        T_base_shoulder = self._arm.T_base_shoulder
+        return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]
 
 
 class View(ViewUpdater):
@@ -80,45 +122,44 @@ class View(ViewUpdater):
         last_ticket: Callable[[], int],
         session: Session,
         frame_rate: float,
-        view_options: ViewOptions | None = None,
+        additions: Additions,
     ) -> None:
         """Build the scene.
 
         Args:
             server: viser's server.
-            robot: The robot, which must have an arm.
+            robot: The robot. Without an arm it has no gizmo.
             state_publisher: The source of snapshots.
             gestures: The path of gestures to the arm.
             last_ticket: Returns the ticket of the newest command.
             session: The session, which has the branch options and the environment of objects.
             frame_rate: Maximum number of updates per second [Hz].
-            view_options: Additions to the view, none if not given.
+            additions: What is shown beside the robot.
 
         Raises:
             KatanaError: A layer cannot be shown.
         """
         super().__init__(server, state_publisher, frame_rate)
-        view_options = ViewOptions() if view_options is None else view_options
         server.gui.set_panel_label(title(robot.name))
-        self._robot, self._arm = robot, robot.require_arm()
+        self._robot, self._layers = robot, additions.layers
         self._gestures, self._choices = gestures, session.choices
         self._last_ticket = last_ticket
         props = load_props()
-        self._scenery = Scenery(
-            server, robot, session, props, gestures, view_options.meshes, view_options.layers
-        )
+        parts = (server, robot, session, props, gestures, additions.meshes)
+        self._scenery = Scenery(*parts, layers=additions.layers)
         self._paint = PaintNodes(server, self._scenery.arm)
-        self._tint = Tint(server, robot, self._scenery.arm.path, props)
+        shown = None if robot.arm is None else props
+        self._tint = Tint(server, robot, self._scenery.arm.path, shown)
         self._ghosts: dict[str, GhostNodes] = {}
-        self._gap = Gap(server)
-        self._gizmo = Gizmo(server, self._arm, gestures, lambda: state_publisher.snapshot.state)
+        self._tool: ToolNodes | None = None
+        if robot.arm is not None:
+            self._tool = ToolNodes(
+                server, robot.arm, gestures, lambda: state_publisher.snapshot.state
+            )
         self._cameras = Cameras(server, robot)
-        if not self._gizmo.is_five_axis:
+        if self._tool is None or not self._tool.gizmo.is_five_axis:
             look = camera(robot)
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
-        self._goal: FloatArray | None = None
-        self._layers, self._tool = view_options.layers, ""
-        self._T_base_goal = np.eye(4)
         self.show(state_publisher.snapshot)
 
     def add_panel(self, folders: AddFolders) -> None:
@@ -132,8 +173,12 @@ class View(ViewUpdater):
                 self._panel = Panel(server, self._robot, gestures, self._choices, snapshot.state)
             self._folders = tuple(folders(tabs))
             with tabs.tab(SCENE):
-                shows = DisplayOptions(self._look_from, self._layers)
-                self._log_problem = add_scene_tab(server.gui, gestures, shows)
+                add_views(server.gui, self._look_from)
+                if self._robot.arm is not None:
+                    with server.gui.add_folder("Show"):
+                        for layer in self._layers:
+                            layer.add_controls(server.gui)
+                self._log_problem = LogProblem(server.gui, gestures)
             # At the end of the panel, because the element takes an empty line.
             server.gui.add_html(style())
         self.show_panel(snapshot)
@@ -170,14 +215,8 @@ class View(ViewUpdater):
         lags = float(np.abs(state.setpoint - state.q).max()) > GHOST_FROM
         values = self._robot.joint_values(state.setpoint, state.gripper_setpoint)
         self._show_ghost(SETPOINT, SETPOINT_COLOUR, values if lags else None)
-        # Goals are immutable: a changed goal is another array.
-        if state.goal is not self._goal or state.tool != self._tool:
-            self._goal, self._tool = state.goal, state.tool
-            chain = self._arm.chain_to(state.tool)
-            self._T_base_goal = self._arm.T_base_shoulder @ forward(chain, state.goal)
-            self._gizmo.aim(state, self._T_base_goal)
-        self._gizmo.follow()
-        self._gap.show(self._desired(state), self._T_base_goal[:3, 3])
+        if self._tool is not None:
+            self._tool.follow(state)
 
     def _show_ghost(self, root: str, colour: Colour, values: Mapping[str, float] | None) -> None:
         """Show the ghost ``root`` at the joint ``values`` [rad or m]; None hides it."""
@@ -191,15 +230,3 @@ class View(ViewUpdater):
         if root not in self._ghosts:
             self._ghosts[root] = GhostNodes(self._server, self._robot, root, colour, OPACITY[root])
         return self._ghosts[root]
-
-    def _desired(self, state: State) -> FloatArray | None:
-        """Return the tool point (3,) [m] of the target in the base frame; None without one."""
-        match state.target:
-            case PoseTarget(T=T):
-                p = T[:3, 3]
-            case JointTarget():
-                return None
-            case target:
-                p = target.position
-        T_base_shoulder = self._arm.T_base_shoulder
-        return T_base_shoulder[:3, :3] @ p + T_base_shoulder[:3, 3]
