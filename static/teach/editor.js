@@ -51,7 +51,7 @@ export class Editor {
     return found;
   }
 
-  // Show `problems`: {line, text, file} each; `file` names a file that the script includes.
+  // Show `problems`: {line, text, file} each; `file` names the scene file of the script.
   explain(problems) {
     const lines = new Set(problems.filter(({ file }) => !file).map(({ line }) => line));
     [...this.#numbers.children].forEach((each, i) => each.classList.toggle("bad", lines.has(i + 1)));

@@ -101,23 +101,6 @@ def test_scene_of_the_script_is_used_unless_another_is_given(
     assert main(["run", str(script), "--dry-run", "--scene", str(aside)]) == 0
 
 
-def test_error_in_an_included_file_is_reported_with_its_path(
-    script: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    parts = script.parent / "parts.yaml"
-    parts.write_text("define:\n  up:\n    steps:\n      - line: {by: {z: 500}}\n", encoding="utf-8")
-    head, tail = SCRIPT.split("steps:\n")
-    included = f"{head}include: {parts.name}\nsteps:\n{tail}  - call: up\n"
-    script.write_text(included, encoding="utf-8")
-    assert main(["run", str(script), "--dry-run"]) == 1
-    assert f"{parts}:4:" in capsys.readouterr().err
-    script.write_text(included.replace(parts.name, "gone.yaml"), encoding="utf-8")
-    assert main(["run", str(script), "--dry-run"]) == 1
-    said = capsys.readouterr().err
-    assert f"{script}:3:10: " in said
-    assert "gone.yaml cannot be read" in said
-
-
 def test_alternatives_are_listed_with_their_beginnings(
     script: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -118,9 +118,9 @@ def test_schema_is_served_to_editors(server: VirtualServer) -> None:
 def test_script_of_the_folder_is_returned_with_its_files(
     server: VirtualServer, folder: Path
 ) -> None:
-    (folder / "parts").mkdir()
-    (folder / "parts" / "waits.yaml").write_text("let: {long: 2}", encoding="utf-8")
-    text = "include: parts/waits.yaml\nsteps:\n  - wait: long\n"
+    (folder / "scenes").mkdir()
+    (folder / "scenes" / "none.yaml").write_text("scene: 1\nobjects: []", encoding="utf-8")
+    text = "scene: scenes/none.yaml\nsteps:\n  - wait: 2\n"
     (folder / "waiting.yaml").write_text(text, encoding="utf-8")
     whole = server.ask("/api/v1/scripts/waiting")[2].decode()
     assert read(server, whole)["problems"] == []
@@ -128,10 +128,8 @@ def test_script_of_the_folder_is_returned_with_its_files(
     problem, *_ = read(server, text)["problems"]
     assert (problem["line"], problem["file"]) == (1, "")
     assert "stands alone" in problem["text"]
-    problem, *_ = read(server, whole.replace("let:", "lett:"))["problems"]
-    assert (problem["line"], problem["file"]) == (3, "")
-    problem = read(server, whole.replace("let:", "lett:"))["problems"][-1]
-    assert (problem["line"], problem["file"]) == (1, "parts/waits.yaml")
+    (problem,) = read(server, whole.replace("objects:", "object:"))["problems"]
+    assert (problem["line"], problem["file"]) == (2, "scenes/none.yaml")
 
 
 @pytest.mark.parametrize(

@@ -130,36 +130,29 @@ def test_saved_script_is_read_again(tmp_path: Path) -> None:
     assert len(parse(text).steps) == len(parse(ALL).steps)
 
 
-def test_alternatives_scenes_and_files_are_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("parts.yaml").write_text("define: {rest: {with: {t: 1}, steps: [{wait: t}]}}", "utf-8")
+def test_alternatives_and_scenes_are_written(tmp_path: Path) -> None:
     with katana450.program() as p:
-        p.include("parts.yaml")
         p.scene([{"name": "a", "shape": "box", "size": [9, 9, 9], "pose": np.zeros(6)}])
         with p.when(time={"at_most": 9}):
             p.home()
             with p.when(held="a"):
                 p.wait(2)
         with p.otherwise():
-            p.call("rest", t=3)
-        p.call("rest")
+            p.wait(3)
     assert loaded(str(p))["steps"] == [
         {
             "if": {
                 "time": {"at_most": 9},
                 "then": ["home", {"if": {"held": "a", "then": [{"wait": 2}]}}],
-                "else": [{"call": {"name": "rest", "with": {"t": 3}}}],
+                "else": [{"wait": 3}],
             }
         },
-        {"call": "rest"},
     ]
     p.save(tmp_path / "script.yaml")
     script = parse(script_text(tmp_path / "script.yaml"))
     assert script.scene is not None
     assert [each.name for each in script.scene.draft.entries] == ["a"]
-    assert count(script.steps) == 6
+    assert count(script.steps) == 5
     with pytest.raises(katana450.InputError, match="must follow a block `when`"), p.otherwise():
         pass
 

@@ -118,7 +118,6 @@ def test_schema_has_every_field_of_a_place() -> None:
         "steps: [{line: {too: [1, 2, 3]}}]",
         "steps: [{line: {to: [1, 2, 3], by: [1, 2, 3]}}]",
         "steps: [{trajectory: {}}]",
-        "steps: [{trajectory: {through: [[0, 1, 2, 3], [1, 1, 2, 3]], file: a.csv}}]",
         "steps: [{place: {}}]",
         "steps: [{wait_for: {volume: {of: cup}}}]",
         "steps: [{repeat: {times: 2, index: i, until: {held: cup}, steps: [home]}}]",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext
-from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline, TrajectoryPath
 from katana450.extensions.programs.run.continuation import continued
@@ -209,33 +207,6 @@ def test_mistakes_are_named(stage: Stage, rows: list[list[float]], why: str) -> 
 def test_what_is_no_list_of_rows_is_refused(through: str) -> None:
     with pytest.raises(ScriptError, match="Expected a"):
         parse(f"steps:\n  - trajectory: {{through: {through}}}\n")
-
-
-def test_file_beside_the_script_gives_the_same_plan(stage: Stage) -> None:
-    rows = swing(2.0)
-    table = "t,theta1,theta2,theta3,theta4,theta5,gripper\n" + "".join(
-        ",".join(map(repr, [t, *np.radians(angles).tolist(), 0.0])) + "\n" for t, *angles in rows
-    )
-    files = {"swing.csv": table, "unknown.csv": "time,q1\n0,1\n", "text.csv": "t,theta1\n0,x\n"}
-    named = "define: {go: {steps: [{trajectory: {file: swing.csv}}]}}\nsteps:\n  - call: go\n"
-    alone = attached(named, files.__getitem__)
-    assert "theta5" in alone
-    given, taken = (
-        plan_of(compiled(parse(text), stage.plan_context, stage.begin()))[0]
-        for text in (script(rows), alone)
-    )
-    np.testing.assert_allclose(taken.postures, given.postures, atol=1e-15)
-    np.testing.assert_array_equal(taken.times, given.times)
-    for name, why in (
-        ("unknown.csv", "line 2, column 25: The first line of unknown.csv must name the columns t"),
-        ("text.csv", "line 2, column 25: Line 2 of text.csv is not a number in each column"),
-        ("../swing.csv", "is not the name of a .csv file in the folder"),
-    ):
-        text = f"steps:\n  - trajectory: {{file: {name}}}\n"
-        with pytest.raises(ScriptError, match=re.escape(why)):
-            parse(attached(text, files.__getitem__))
-    with pytest.raises(ScriptError, match=r"The text of swing\.csv is missing"):
-        parse(named)
 
 
 def test_derivatives_are_those_of_the_path(stage: Stage) -> None:

@@ -43,8 +43,7 @@ from tests.recording.recorded import header, run, swinging
 from tests.recording.test_recorder import RECORDER, _other_child, waited_for
 
 TURN = "name: {name}\nsteps:\n  - joints: [{angle}, -60, 80, 20, 0]\n"
-NOD = "name: Nod\ninclude: [more.yaml]\nsteps:\n  - call: nod\n"
-MORE = "define:\n  nod:\n    steps:\n      - wait: 0.2\n      - joints: [5, -55, 80, 20, 0]\n"
+NOD = "name: Nod\nsteps:\n  - wait: 0.2\n  - joints: [5, -55, 80, 20, 0]\n"
 
 
 def scripts_of(path: Path) -> dict[str, str]:
@@ -82,7 +81,6 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
     """Return a recording of four runs of three scripts, and the file of an episode of one."""
     named = folder / "nod.yaml"
     named.write_text(NOD, encoding="utf-8")
-    (folder / "more.yaml").write_text(MORE, encoding="utf-8")
     with katana450.connect(server.url, name="Ada") as client:
         client.run(LEFT)
         client.episodes.start("nod")
@@ -106,7 +104,6 @@ def test_texts_of_a_server_are_attached_once_with_their_runs(
 ) -> None:
     path, episode = ran
     nod = script_text(folder / "nod.yaml")
-    assert MORE.splitlines()[0] in nod
     found = scripts_of(path)
     assert sorted(found.values()) == sorted((LEFT, nod, RIGHT))
     for name, text in found.items():

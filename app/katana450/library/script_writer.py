@@ -94,10 +94,6 @@ class ScriptWriter:
         """Name the scene that it needs: a file, its objects, or a mapping as in a scene file."""
         self._head["scene"] = plain(scene)
 
-    def include(self, *files: str) -> None:
-        """Take poses, values and definitions from files beside the script."""
-        self._head["include"] = list(files)
-
     def pose(
         self,
         name: str,
@@ -221,18 +217,10 @@ class ScriptWriter:
             "circle", centre=centre, normal=normal, radius=radius, turns=turns, branch=branch, **how
         )
 
-    def trajectory(
-        self, times: Sequence[Number] | str, postures: Sequence[Sequence[Number]] = ()
-    ) -> None:
-        """Move through joint angles [deg] at times [s], slower where limits require.
-
-        ``times`` may be the name of a .csv file beside the script instead, with both.
-        """
-        if isinstance(times, str):
-            self._add("trajectory", file=times)
-        else:
-            rows = zip(times, postures, strict=True)
-            self._add("trajectory", through=[[time, *angles] for time, angles in rows])
+    def trajectory(self, times: Sequence[Number], postures: Sequence[Sequence[Number]]) -> None:
+        """Move through joint angles [deg] at times [s], slower where limits require."""
+        rows = zip(times, postures, strict=True)
+        self._add("trajectory", through=[[time, *angles] for time, angles in rows])
 
     def gripper(self, where: Number, *, holding: str | None = None) -> None:
         """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide.
@@ -307,10 +295,6 @@ class ScriptWriter:
     def set_down(self) -> None:
         """Put the held object back to where it was grasped."""
         self._steps.append("set_down")
-
-    def call(self, name: str, **parameters: Any) -> None:
-        """Do the steps of a definition of an included file, with other values of parameters."""
-        self._add("call", "name", name=name, **({"with": parameters} if parameters else {}))
 
     def _add(self, step: str, short: str = "", /, **fields: Any) -> None:
         """Append a step with those fields that are not None.

@@ -51,32 +51,12 @@ class LocatedStep(NamedTuple):
 
     Attributes:
         step: the step.
-        line, column: its place in its file.
-        file: name of the file that defines it; "" for the script itself.
-        called: line of the script from which a step of another file is called; 0 for its own steps.
+        line, column: its place in the script.
     """
 
     step: Step | Conditional
     line: int
     column: int
-    file: str = ""
-    called: int = 0
-
-    @property
-    def script_line(self) -> int:
-        """The line of the script itself."""
-        return self.called or self.line
-
-    def called_at(self, line: int, file: str) -> LocatedStep:
-        """Return the step as called from ``line`` of ``file``, if another file defines it."""
-        step = self.step
-        if isinstance(step, Conditional):
-            then, otherwise = (
-                tuple(inner.called_at(line, file) for inner in steps)
-                for steps in (step.then, step.otherwise)
-            )
-            step = Conditional(step.condition, then, otherwise)
-        return self._replace(step=step, called=self.called if self.file == file else line)
 
 
 def count(steps: Iterable[LocatedStep]) -> int:

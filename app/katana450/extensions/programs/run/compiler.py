@@ -140,7 +140,7 @@ class _TaskList:
         for step in steps:
             if isinstance(step, PlannedStep):
                 for name, action in self._timed(step):
-                    task = Task(step.number, step.located.script_line, name, action)
+                    task = Task(step.number, step.located.line, name, action)
                     exits = (_Exit(self.add(task, exits), AFTER),)
             else:
                 exits = self._add_choice(step, exits)
@@ -149,7 +149,7 @@ class _TaskList:
     def _add_choice(self, step: PlannedChoice, exits: Sequence[_Exit]) -> Sequence[_Exit]:
         jump = ConditionalJump(step.condition, step.predicted, 0, 0)
         name = f"if {step.condition.awaited}"
-        index = self.add(Task(step.number, step.located.script_line, name, jump), exits)
+        index = self.add(Task(step.number, step.located.line, name, jump), exits)
         then = self.add_steps(step.then, (_Exit(index, THEN),))
         return (*then, *self.add_steps(step.otherwise, (_Exit(index, OTHERWISE),)))
 
@@ -425,7 +425,7 @@ def _refusal(plan: PlanState, refused: Problem, reasons: Set[Problem]) -> Script
 
 
 def _at(located: LocatedStep, error: InputError) -> ScriptError:
-    return ScriptError((Problem(located.line, located.column, str(error), located.file),))
+    return ScriptError((Problem(located.line, located.column, str(error)),))
 
 
 def _situation(plan: PlanState) -> tuple[object, ...]:

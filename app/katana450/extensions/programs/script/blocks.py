@@ -197,7 +197,7 @@ class Call(StepBlock):
     name: Annotated[YamlValue, WORD]
     given: Annotated[Pairs, PARAMETERS.named("with")] = ()
 
-    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:
+    def steps_at(self, name: YamlValue, context: ScriptContext) -> tuple[LocatedStep, ...]:  # noqa: ARG002
         """Return the steps of the definition."""
         definitions = context.definitions
         if self.name.held not in definitions:
@@ -208,8 +208,7 @@ class Call(StepBlock):
                 "called."
             )
         arguments = tuple((word, context.scope.bound(value)) for word, value in self.given)
-        steps = _called(definitions[str(self.name.held)], arguments)
-        return tuple(step.called_at(name.line, name.file) for step in steps)
+        return _called(definitions[str(self.name.held)], arguments)
 
 
 def _called(definition: Definition, values: Pairs) -> tuple[LocatedStep, ...]:
@@ -282,4 +281,4 @@ def with_definitions(value: YamlValue, context: ScriptContext) -> ScriptContext:
 
 def _located(place: YamlValue, *steps: Step | Conditional) -> tuple[LocatedStep, ...]:
     """Return ``steps`` with the place of ``place``."""
-    return tuple(LocatedStep(step, place.line, place.column, place.file) for step in steps)
+    return tuple(LocatedStep(step, place.line, place.column) for step in steps)

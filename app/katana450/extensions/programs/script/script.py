@@ -11,12 +11,6 @@ from typing import Annotated
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.extensions.programs.building.step import LocatedStep
-from katana450.extensions.programs.language.attached_files import (
-    FILE,
-    MAX_FILES,
-    AttachedFile,
-    attached_file,
-)
 from katana450.extensions.programs.language.declaration import (
     Declared,
     Fields,
@@ -30,7 +24,6 @@ from katana450.extensions.programs.language.kinds import (
     TEXT,
     any_of,
     choice,
-    listed,
     mapping,
     number,
 )
@@ -52,18 +45,10 @@ from katana450.extensions.programs.steps.steps import STEPS
 FRAME = choice("shoulder", "base")
 """The frame of points."""
 
-FILES = listed(FILE, 1, MAX_FILES)
-
 
 def context_of(fields: Fields) -> ScriptContext:
     """Return the names of a script with these fields, which collect all problems."""
     context = ScriptContext(fields.take("frame", FRAME, "shoulder") == "base")
-    context = fields.take("include", lambda value: _with_files(value, context), context)
-    return _with_names(fields, context)
-
-
-def _with_names(fields: Fields, context: ScriptContext) -> ScriptContext:
-    """Return ``context`` with `let`, `poses` and `define` of ``fields``."""
     for name, extend in (
         ("let", _with_values),
         ("poses", _with_poses),
@@ -71,63 +56,6 @@ def _with_names(fields: Fields, context: ScriptContext) -> ScriptContext:
     ):
         context = fields.take(name, partial(extend, context=context), context)
     return context
-
-
-def _with_files(value: YamlValue, context: ScriptContext) -> ScriptContext:
-    """Return ``context`` with the names of a file, or of a list of files. Raises ScriptError."""
-    items = value.items if value.kind == "list" else (value,)
-    files = FILES(replace(value, held=items, kind="list"))
-    texts = {name: text for file in files for name, text in file.texts.items()}
-    if len(texts) > MAX_FILES:
-        raise value.wrong(f"A script names at most {MAX_FILES} files.")
-    done: list[str] = []
-    problems: list[Problem] = []
-    for file in files:
-        try:
-            context = _with_file(file._replace(texts=texts), context, done, ())
-        except ScriptError as error:
-            problems += error.problems
-    if problems:
-        raise ScriptError(tuple(problems))
-    return context
-
-
-def _with_file(
-    file: AttachedFile, context: ScriptContext, done: list[str], under: tuple[str, ...]
-) -> ScriptContext:
-    """Return ``context`` with the names of ``file``, and append its name to ``done``.
-
-    ``under``: the files that include it, each included by the one before.
-    """
-    if file.name in under:
-        circle = " includes ".join((*under[under.index(file.name) :], file.name))
-        raise file.at.wrong(f"Files must not include each other in a circle: {circle}.")
-    if file.name in done:
-        return context
-    fields = Fields(read(file.text, "file", file.name), "an included file")
-    for name in ("name", "about"):
-        fields.take(name, TEXT, "")
-
-    def check_frame(value: YamlValue) -> None:
-        frame, own = FRAME(value), "base" if context.in_base else "shoulder"
-        if frame != own:
-            raise value.wrong(
-                f"The points of this file are in the frame {frame}, those of the script in {own}. "
-                "Use one frame for both."
-            )
-
-    def including(value: YamlValue) -> ScriptContext:
-        included = context
-        for item in value.items if value.kind == "list" else (value,):
-            inner = attached_file(item)._replace(texts=file.texts)
-            included = _with_file(inner, included, done, (*under, file.name))
-        return included
-
-    fields.take("frame", check_frame, None)
-    extended = _with_names(fields, fields.take("include", including, context))
-    fields.done()
-    done.append(file.name)
-    return extended
 
 
 def _with_values(value: YamlValue, context: ScriptContext) -> ScriptContext:
@@ -239,12 +167,6 @@ class Script(Declared):
     ] = None
     speed: Annotated[float, number(MIN_SPEED, 1.0, about="Fraction of full speed")] = 1.0
     scene: Annotated[ScriptScene | None, SCENE] = None
-    include: Annotated[
-        YamlValue | None,
-        Kind(RAW.read, any_of("", FILE.schema, FILES.schema)).about(
-            "Files in the folder of the script, from which `let`, `poses` and `define` are taken"
-        ),
-    ] = None
     let: Annotated[YamlValue | None, _names("Named values; later ones may use earlier ones")] = None
     poses: Annotated[
         YamlValue | None,

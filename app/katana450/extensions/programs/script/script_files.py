@@ -72,10 +72,9 @@ class Scripts:
         )
 
     def text(self, name: str) -> str:
-        """Return the text of the script ``name``, with those of all files that it names.
+        """Return the text of the script ``name``, with that of the scene file that it names.
 
-        The files are in the folder of the script or below. Raises InputError if a file cannot be
-        read.
+        That file is in the folder of the script or below. Raises InputError if one cannot be read.
         """
         path = self.paths.get(name)
         if path is None:
@@ -117,7 +116,7 @@ def _text_of(path: Path) -> str:
 
 
 def script_text(path: Path) -> str:
-    """Return the text of a script file, with those of all files that it names.
+    """Return the text of a script file, with that of the scene file that it names.
 
     Lines keep their numbers. Raises InputError if a file cannot be read.
     """

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
-import re
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -15,13 +12,11 @@ from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import CARRY, PlanState, UntimedPath
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.language.attached_files import CSV, attached_file
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.kinds import (
     LEAST_JOINTS,
     MAX_ANGLE,
     MAX_JOINTS,
-    any_of,
     defined,
     degrees,
     list_of,
@@ -50,9 +45,6 @@ MAX_TIME = 24 * 3600.0
 """[s] Maximum time of a posture."""
 
 TRAJECTORY = "trajectory"
-
-JOINT_COLUMN = re.compile(r"theta[1-9][0-9]?")
-"""Pattern of the name of a column with the angles of a joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,31 +103,6 @@ def _rows(value: YamlValue, _context: ScriptContext) -> FloatArray:
     return np.array(rows)
 
 
-def _rows_of_file(value: YamlValue, _context: ScriptContext) -> FloatArray:
-    """Read the times [s] and angles [rad] of a .csv file. Raises ScriptError with its row."""
-    file = attached_file(value, CSV)
-    lines = csv.DictReader(file.text.splitlines())
-    names = [name for name in lines.fieldnames or () if JOINT_COLUMN.fullmatch(name)]
-    joints = [f"theta{number}" for number in range(1, len(names) + 1)]
-    if "t" not in (lines.fieldnames or ()) or sorted(names) != sorted(joints):
-        raise file.at.wrong(
-            f"The first line of {file.name} must name the columns t, in s, and theta1, theta2 and "
-            "so on, in rad, as `katana450 record export` writes them."
-        )
-    rows = []
-    for row_number, line in enumerate(lines, start=2):
-        try:
-            row = tuple(float(line[name]) for name in ("t", *joints))
-        except (TypeError, ValueError):
-            row = (math.nan,)
-        if not all(map(math.isfinite, row)):
-            raise file.at.wrong(f"Line {row_number} of {file.name} is not a number in each column.")
-        rows.append(row)
-    if not 2 <= len(rows) <= MAX_POSTURES:
-        raise file.at.wrong(f"{file.name} has {len(rows)} rows, not 2 to {MAX_POSTURES}.")
-    return np.array(rows)
-
-
 @dataclass(frozen=True, eq=False)
 class FollowTrajectory(Step, word="trajectory"):
     """Move through postures at given times, on a smooth path, slower where limits require it.
@@ -144,23 +111,9 @@ class FollowTrajectory(Step, word="trajectory"):
 
     Attributes:
         through: (m, 1 + n) rows of a time [s], from any zero, and a posture [rad].
-        file: the same of a file.
     """
 
-    needs = excludes = ("through", "file")
-
-    through: Annotated[FloatArray | None, Kind(_rows, POSTURES.schema)] = None
-    file: Annotated[
-        FloatArray | None,
-        Kind(
-            _rows_of_file,
-            any_of(
-                "A .csv file beside the script: t [s], theta1 and so on [rad]",
-                {"type": "string"},
-                {"type": "object"},
-            ),
-        ),
-    ] = None
+    through: Annotated[FloatArray, Kind(_rows, POSTURES.schema)]
 
     def build(self, plan: PlanState) -> PlanState:
         """Plan the way to the start, and the trajectory.
@@ -168,9 +121,7 @@ class FollowTrajectory(Step, word="trajectory"):
         Raises BlockedError with the time at which two parts would meet, and InputError for a
         posture beyond the limits, or of another number of joints.
         """
-        rows = self.file if self.through is None else self.through
-        assert rows is not None
-        times, postures = frozen(rows[:, 0]), frozen(rows[:, 1:])
+        times, postures = frozen(self.through[:, 0]), frozen(self.through[:, 1:])
         joints, columns = plan.chain.n, postures.shape[1]
         if columns != joints:
             raise InputError(f"The arm has {joints} joints; a row of this has {columns} angles.")
