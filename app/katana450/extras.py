@@ -15,7 +15,6 @@ PACKAGES = {
     "films": "imageio-ffmpeg",
     "foxglove": "foxglove-sdk",
     "gallery": "robot-descriptions",
-    "meshes": "dracopy networkx",
     "pictures": "embreex",
     "serial": "pyserial",
 }

@@ -1,9 +1,9 @@
 // Several files of one object: those that were dropped or chosen, as one .zip file without compression.
 
 // Suffixes of shapes, of files that shapes name, and of shapes that need no other file.
-const SHAPES = /\.(stl|obj|ply|off|glb|gltf|dae|3mf|wrl|wrz|zip|zae)$/i;
+const SHAPES = /\.(stl|obj|ply|glb|gltf|wrl|wrz|zip)$/i;
 const OTHERS = /\.(bin|mtl)$/i;
-const ALONE = /\.(stl|ply|off|glb|dae|3mf|zip|zae)$/i;
+const ALONE = /\.(stl|ply|glb|zip)$/i;
 
 const MAX_FILES = 1000;
 const MAX_BYTES = 60e6; // of all files; the server accepts no more

@@ -32,7 +32,7 @@ def add_serve_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE[@x,y,z][@SCALE]",
-        help="additional object from a .wrl, .stl, .obj, .ply, .glb, .gltf or .3mf "
+        help="additional object from a .wrl, .stl, .obj, .ply, .glb or .gltf "
         "file, with the files in its folder that it names, or from a .zip of them; at "
         "x,y,z in mm or else in front of the arm; can be repeated",
     )
