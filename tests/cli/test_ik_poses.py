@@ -1,4 +1,4 @@
-"""``katana450 ik`` takes a pose in every common form, with a priority and the nearest posture."""
+"""``katana450 ik`` takes a pose in every common form, with the nearest posture."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.cli.lines import ask
@@ -100,13 +98,12 @@ def test_wrong_pose_is_refused_with_the_key_at_fault(
     assert expected in answer["error"]
 
 
-@pytest.mark.parametrize("priority", PRIORITIES)
-def test_priority_chooses_what_is_kept(arm: MountedArm, priority: Priority) -> None:
+def test_nearest_is_that_of_the_projection(arm: MountedArm) -> None:
     T = np.eye(4)
     T[:3, 3] = (0.1, 0.3, 0.7)
     request = {"T": T.tolist()}
-    (answer,) = ask("ik", [request], "--priority", priority.name.lower(), "--nearest")
-    expected = project(arm.chain, T, priority=priority)
+    (answer,) = ask("ik", [request], "--nearest")
+    expected = project(arm.chain, T)
     found = answer["nearest"]
     np.testing.assert_allclose(found["q"], expected.q, atol=1e-12)
     assert found["position_mm"] == pytest.approx(1e3 * expected.position_error)

@@ -86,9 +86,3 @@ def test_wrong_line_of_fk_is_refused(urdf: Urdf, line: object, message: str) -> 
 def test_wrong_line_of_ik_is_refused(urdf: Urdf, line: object, message: str) -> None:
     (answer,) = ask("ik", [line], "--urdf", str(urdf("ur5")))
     assert message in answer["error"]
-
-
-def test_priority_of_five_axes_is_refused(urdf: Urdf, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        sys.exit(main(["ik", "--urdf", str(urdf("ur5")), "--priority", "pitch"]))
-    assert "is for five-axis arms" in capsys.readouterr().err

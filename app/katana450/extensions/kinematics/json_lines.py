@@ -25,7 +25,6 @@ from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.pose_units import check_metres, check_radians
-from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
 
@@ -165,7 +164,6 @@ class JsonKinematics:
         tool: str | None,
         *,
         in_base_frame: bool,
-        priority: Priority = Priority.POSE,
         with_nearest: bool = False,
     ) -> None:
         """Load the arm.
@@ -174,24 +172,15 @@ class JsonKinematics:
             urdf: file of the arm.
             tool: link that is its default tool; see ``load``.
             in_base_frame: whether poses are in the base frame on the table, else in {S}.
-            priority: the part of a pose that is kept when five axes cannot satisfy all of it.
             with_nearest: whether answers include the nearest posture inside the limits.
 
         Raises:
             RobotDescriptionError: the file has no arm.
-            InputError: the arm does not have ``priority``.
         """
-        self._priority = priority
         self._with_nearest = with_nearest
         self._arm = read_robot(urdf, tool, solved_arm).require_arm()
         self._T_frame_shoulder = self._arm.T_base_shoulder if in_base_frame else np.eye(4)
         self._is_member = family_arm(self._arm.chain) is not None
-        if priority is not Priority.POSE and not self._is_member:
-            raise InputError(
-                "--priority is for five-axis arms with a pan axis, three parallel axes and a roll "
-                f"axis; the kinematics of this arm are {kinematics_of(self._arm.chain).method}. "
-                "Leave this option out."
-            )
 
     def fk(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Answer ``{"q": [n rad], "tool"}`` with ``{"T": 4x4}`` [m]."""
@@ -221,9 +210,7 @@ class JsonKinematics:
         T, misfit = requested_pose(request, chain, self._T_frame_shoulder)
         solutions = [candidate for candidate in kinematics.inverse(T, hint) if candidate.exact]
         if not solutions:
-            best = nearest_pose(
-                kinematics, T, priority=self._priority, q_hint=hint, within_limits=False
-            )
+            best = nearest_pose(kinematics, T, q_hint=hint, within_limits=False)
             # If the axes do not cross, some branches do not reach every pose.
             solutions = [
                 candidate for candidate in kinematics.inverse(best.T, best.q) if candidate.exact
@@ -248,28 +235,21 @@ class JsonKinematics:
             best = nearest_pose(
                 kinematics,
                 T,
-                priority=self._priority,
                 q_hint=hint,
                 yaw_counts="pitch" not in request,
             )
             answer["nearest"] = self._described(best)
         return answer
 
-    def _described(self, best: NearestPose) -> dict[str, Any]:
+    @staticmethod
+    def _described(best: NearestPose) -> dict[str, Any]:
         """Return the nearest posture and its losses. Axes count from 1."""
-        turns = {
-            "yaw_rad": best.yaw_error,
-            "pitch_rad": best.pitch_error,
-            "roll_rad": best.roll_error,
-        }
         return {
             "q": best.q.tolist(),
             "branch": str(best.branch),
             "position_mm": 1e3 * best.position_error,
             "rotation_rad": best.rotation_error,
-            **(turns if self._is_member else {}),
             "limits": [axis + 1 for axis in best.limits],
-            "held_by": (["axis 1"] if best.axis1 else []) + (["links"] if best.reach else []),
             "reason": best.reason,
         }
 
@@ -296,7 +276,6 @@ def ik(options: Namespace) -> int:
         options.urdf,
         options.tool,
         in_base_frame=options.frame == "base",
-        priority=Priority[options.priority.upper()],
         with_nearest=options.nearest,
     )
     return answer_lines(kinematics.ik)

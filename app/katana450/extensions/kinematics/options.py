@@ -8,9 +8,6 @@ from katana450.cli.arm_options import add_arm_options
 
 FRAMES = ("shoulder", "base")
 
-PRIORITIES = ("pose", "pitch", "position")
-"""Names of the members of ``Priority``, in lower case."""
-
 
 def add_fk_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``fk`` to ``parser``."""
@@ -21,14 +18,6 @@ def add_fk_options(parser: argparse.ArgumentParser) -> None:
 def add_ik_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``ik`` to ``parser``."""
     _add_frame(parser)
-    parser.add_argument(
-        "--priority",
-        choices=PRIORITIES,
-        default=PRIORITIES[0],
-        help="part of a pose that is kept when five axes cannot satisfy all of it: the position, "
-        "then the orientation; the pitch, then the position; or the position, then the pitch "
-        "(default: %(default)s)",
-    )
     parser.add_argument(
         "--nearest",
         action="store_true",
