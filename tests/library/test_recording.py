@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -74,34 +71,6 @@ def test_part_of_a_recording_begins_where_it_was_cut(
     assert recording.t[0] >= records[50].t - 1e-9
     assert recording.commands[0].t >= records[50].t - 1e-9
     assert recording.verify().ticks >= 90 - 1
-
-
-def test_missing_pandas_is_named(
-    path: Path, records: list[TickRecord], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    del records
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(katana450.ConfigurationError, match="needs pandas"):
-        katana450.open(path).to_dataframe()
-
-
-def test_dataframe_has_named_columns(
-    path: Path, records: list[TickRecord], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """pandas itself is no dependency; what is given to it is checked."""
-    del records
-    pandas = ModuleType("pandas")
-    pandas.__spec__ = ModuleSpec("pandas", None)
-    pandas.Index = lambda values, name: (name, values)  # type: ignore[attr-defined]
-    pandas.DataFrame = lambda table, index: (table, index)  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "pandas", pandas)
-    recording = katana450.open(path)
-    table, (name, t) = recording.to_dataframe()
-    assert name == "t"
-    assert t is recording.t
-    assert list(table)[:2] == ["q1", "q2"]
-    assert {"setpoint5", "qd1", "gripper", "x", "y", "z", "qx", "qw"} <= set(table)
-    assert (table["setpoint2"] == recording.setpoint[:, 1]).all()
 
 
 def test_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:

@@ -24,12 +24,14 @@ from katana450.client import Client, RefusedError
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
+from katana450.extensions.recording.run_again.again_command import check_same_arm
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from katana450.server.service.identity import Identity
 from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask, enter
+from tests.recording.recorded import described
 from tests.recording.test_recorder import waited_for
 
 TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
@@ -111,7 +113,7 @@ def test_stop_in_the_middle_ends_it_and_it_can_run_again(
         found = katana450.open(recorded)
         moved = np.flatnonzero(np.abs(found.setpoint - found.setpoint[0]).max(axis=1) > 1e-3)[0]
         end = float(found.t[moved] - found.start) + 1.0
-        posture = found.run_again(client, end=end).q
+        posture = client.run(found.script(end=end)).q
         number = int(np.searchsorted(found.t - found.start, end, side="right")) - 1
         np.testing.assert_allclose(posture, found.setpoint[number], atol=1e-6)
 
@@ -144,7 +146,7 @@ def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -
                 return other
 
         with pytest.raises(katana450.InputError, match="joint limits or tool frames differ"):
-            katana450.open(recorded).run_again(OtherArm())  # type: ignore[arg-type]
+            check_same_arm(OtherArm(), described().session.require_arm(), recorded)  # type: ignore[arg-type]
 
 
 def _task(client: Client) -> str:

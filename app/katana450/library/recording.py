@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy.typing as npt
 
 from katana450.arm.control.commands import Command
 from katana450.caching import cached_property
-from katana450.errors import ConfigurationError, InputError
+from katana450.errors import InputError
 from katana450.extensions.recording.datasets.recorded_robot import orientations
 from katana450.extensions.recording.episodes.episode import Episode
 from katana450.extensions.recording.episodes.episode_folder import episodes_in
@@ -30,7 +29,6 @@ from katana450.extensions.recording.files.simulation import (
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
 from katana450.extensions.recording.run_again.again_command import (
-    check_same_arm,
     part_and_script,
 )
 from katana450.extensions.recording.scoring.score_command import score_file
@@ -39,8 +37,7 @@ from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from katana450.client import Client
-    from katana450.server.api.answers import State
+    pass
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,39 +227,6 @@ class Recording:
             robot = session_for(file, None if urdf is None else Path(urdf))
             return part_and_script(file, robot, start, end)[1]
 
-    def run_again(
-        self,
-        client: Client,
-        start: float | None = None,
-        end: float | None = None,
-        *,
-        speed: float = 1.0,
-        urdf: str | os.PathLike[str] | None = None,
-    ) -> State:
-        """Drive the arm of a server along this motion; return its state at the end.
-
-        It is planned as a program in the present scene: on a clear path to the start, then as
-        recorded, slower where limits require it. STOP ends it.
-
-        Args:
-            client: a connection, from `katana450.connect`.
-            start: start of the part [s] after that of the recording; None for that of the episode
-                if the file is one, which may be trimmed, or else of the recording.
-            end: its end [s]; None as for ``start``.
-            speed: fraction of the recorded speed, up to 1.
-            urdf: file of the recorded robot, if it is not the Katana450 of this package.
-
-        Raises:
-            InputError: as `script`, or the server has another arm.
-            RefusedError: the server refuses the motion, with the moment and the parts of a contact;
-                or it was stopped.
-        """
-        with RecordingFile.open(self.path) as file:
-            robot = session_for(file, None if urdf is None else Path(urdf))
-            text = part_and_script(file, robot, start, end)[1]
-        check_same_arm(client, robot.session.require_arm(), self.path)
-        return client.run(text, speed)
-
     def score(
         self,
         start: float | None = None,
@@ -290,36 +254,6 @@ class Recording:
         wanted = {name: np.asarray(place, dtype=float) for name, place in (targets or {}).items()}
         path = None if urdf is None else Path(urdf)
         return score_file(self.path, start, end, wanted, path)
-
-    def to_dataframe(self) -> Any:
-        """Return the states as a pandas DataFrame with the index ``t`` [s].
-
-        Its columns are ``q1``, ``setpoint1`` and so on, ``gripper``, and ``x``, ``y``, ``z`` [m]
-        and the quaternion ``qx`` to ``qw`` of the tool. Raises ConfigurationError without pandas.
-        """
-        try:
-            pandas = import_module("pandas")
-        except ImportError as error:
-            raise ConfigurationError(
-                "A DataFrame needs pandas, which is not installed: `pip install pandas`. The "
-                "arrays of the recording need nothing else."
-            ) from error
-        table: dict[str, FloatArray] = {}
-        for name in ("q", "qd", "setpoint"):
-            table.update(_split(f"{name}{{}}", self._column(name), range(1, self.q.shape[1] + 1)))
-        table["gripper"] = self.gripper
-        if "position" in self._columns:
-            table.update(_split("{}", self.position, "xyz"))
-            table.update(_split("q{}", self.orientation, "xyzw"))
-        return pandas.DataFrame(table, index=pandas.Index(self.t, name="t"))
-
-
-def _split(name: str, values: FloatArray, columns: Iterable[object]) -> dict[str, FloatArray]:
-    """Return the columns of ``values`` (N, k) by their names."""
-    return {
-        name.format(column_name): np.asarray(column)
-        for column_name, column in zip(columns, values.T, strict=True)
-    }
 
 
 def open(path: str | os.PathLike[str]) -> Recording:
