@@ -110,7 +110,7 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
         seen.add(checked(lines.hear()))
         asked: list[dict[str, Any]] = [
             *({"do": "query", "at": each} for each in ("state", "arm", "objects", "world", "loop")),
-            *({"do": "query", "at": each} for each in ("links", "branches", "event_log")),
+            *({"do": "query", "at": each} for each in ("links", "branches")),
             {"do": "get", "node": "tcp", "field": "translation"},
             {"do": "heartbeat"},
             {"do": "list_people"},

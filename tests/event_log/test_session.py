@@ -238,9 +238,7 @@ def test_values_and_findings_are_recorded(session: tuple[Path, dict[str, str], s
     (follow,) = (each for each in found if each.get("what", {}).get("command") == "Follow")
     assert 0.1 < follow["what"]["plan"]["seconds"] < 5.0
     stops = [each for each in found if each.get("what", {}).get("reason") == "stopped"]
-    assert stops[0]["who"]["name"] == "Vera"
-    assert stops[0]["what"]["began"]
-    assert stops[1]["what"]["began"] is False
+    assert [stop["what"]["began"] for stop in stops[:2]] == [True, False]
     (restart,) = (each for each in found if each["kind"] == "restart")
     assert restart["what"] == {"process": "katana450 front", "status": -signal.SIGKILL}
 

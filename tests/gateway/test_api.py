@@ -50,7 +50,7 @@ def test_every_query_is_answered(program: Client) -> None:
     for request in asked:
         answer = program.ask(request)
         assert not isinstance(answer, answers.Refused), request
-    for kind in (answers.State, answers.Arm, answers.EventLog, answers.Branches, answers.Loop):
+    for kind in (answers.State, answers.Arm, answers.Branches, answers.Loop):
         assert isinstance(program.query(kind), kind)
     refusals = (requests.Acquire(), requests.Take(), requests.Ask(), requests.Withdraw())
     for request in refusals:

@@ -19,7 +19,6 @@ import viser
 import katana450
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import Role
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
@@ -27,7 +26,6 @@ from katana450.arm.control.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
 from katana450.extensions.undo import UndoRequests
 from katana450.server.api import requests
-from katana450.server.service import serialize
 from katana450.server.service.hub import TICK
 from katana450.server.service.participants import Participant
 from katana450.server.view.controls import listener
@@ -63,43 +61,21 @@ def test_actor_travels_with_its_grounds(table: Table) -> None:
     ]
 
 
-def test_event_log_names_the_actor_the_command_and_the_grounds(table: Table) -> None:
-    driver, watcher = table.join(PAGES[0]), table.join(PAGES[1], Role.VIEWER, "Vera")
-    granted = table.touch(driver.person.key)
-    table.stop(watcher.person.name)
-    stopped = table.arm.actors[-1]
-    findings = [
-        Finding(Reason.AXIS_LIMIT, 0.5, axis=1),
-        Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table")),
-        Finding(Reason.STOPPED, 0.02, time=0.3),
-        Finding(Reason.STOPPED, 0.02, time=0.3),
-    ]
-    server = replace(SERVER, grounds=Grounds.SERVER)
-    causes = [(None, ""), (granted, "Position"), (stopped, "Stop"), (server, "Stop")]
-    entries = [
-        LogEntry(table.t, finding, True, *cause)
-        for finding, cause in zip(findings, causes, strict=True)
-    ]
-    for upto in range(len(entries)):
-        table.arm.event_log = tuple(entries[max(upto - 1, 0) : upto + 1])
+def test_findings_that_begin_and_end_are_noted_once(table: Table) -> None:
+    table.hub.recorder.enabled = True
+    limit = Finding(Reason.AXIS_LIMIT, 0.5, axis=1)
+    contact = Finding(Reason.CONTACT, 0.006, parts=("finger_left_link", "table"))
+    rest = table.arm.rest
+    for findings in ((limit,), (limit, contact), (contact,), (contact,), ()):
+        table.arm.rest = replace(rest, findings=findings)
         table.wait(TICK)
-    lines = [serialize.log_line(line) for line in table.hub.event_log.lines]
-    assert [line.who for line in lines] == [None, driver.person.name, "Vera", None]
-    assert [line.command for line in lines] == ["", "Position", "Stop", "Stop"]
-    assert [line.grounds for line in lines] == [
-        None,
-        "took the free lease",
-        "anybody may stop the arm",
-        "protection by the server",
-    ]
-    reported = [line.finding for line in lines]
-    assert [each.reason for each in reported] == ["axis limit", "contact", "stopped", "stopped"]
-    amounts = [(each.amount, each.unit) for each in reported[:3]]
-    assert amounts == [(0.5, "rad"), (0.006, "m"), (0.02, "m")]
-    assert reported[0].axis == 2
-    assert reported[1].parts == ("finger_left_link", "table")
-    assert reported[2].seconds == 0.3
-    assert "press Clear stop" in reported[2].text
+    notes = table.hub.recorder.notes
+    entries = []
+    while not notes.empty():
+        note = notes.get_nowait()
+        if note is not None and note.kind == "finding":
+            entries.append((note.what.finding, note.what.began))
+    assert entries == [(limit, True), (contact, True), (limit, False), (contact, False)]
 
 
 def test_server_may_stop_hold_and_slow_but_not_move(table: Table) -> None:

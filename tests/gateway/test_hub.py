@@ -12,7 +12,6 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.lease import LEASE_TIMEOUT, Lease, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
@@ -65,7 +64,6 @@ class FakeArm:
         self.fraction = 1.0
         self.commands: list[cmd.Command] = []
         self.actors: list[Actor] = []
-        self.event_log: tuple[LogEntry, ...] = ()
 
     @property
     def state(self) -> State:

@@ -305,7 +305,7 @@ def test_program_key_is_secret_and_required(
         return status, json.loads(body)
 
     assert do(do="acquire")[0] == 200
-    pages = [json.loads(local.ask(f"/api/v1/{at}")[2]) for at in ("state", "event_log")]
+    pages = [json.loads(local.ask(f"/api/v1/{at}")[2]) for at in ("state", "arm")]
     assert pages[0]["holder"] == "Sorter"
     assert key not in json.dumps(pages)
     # The name of a program does not serve as its key.

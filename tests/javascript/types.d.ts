@@ -6,8 +6,8 @@ declare namespace Api {
     Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Program | Query | Redo | ReleaseLease | Remove |
     Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | Undo | Watch |
     Withdraw;
-  type Answer = Arm | Branches | Done | Echo | EventLog | Links | Loop | Mesh | Objects | People | Refused | Scene |
-    State | Values | Welcome | World;
+  type Answer = Arm | Branches | Done | Echo | Links | Loop | Mesh | Objects | People | Refused | Scene | State | Values
+    | Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
     upper: number[]; speed: number[]; acceleration: number[]; jerk: number[]; ready: number[];
     tools: Record<string, number[][]>; default_tool: string | null; gripper: [number, number, number] | null;
@@ -42,7 +42,6 @@ declare namespace Api {
   interface Echo { is: "echo"; id?: number | string | null; n: number; }
   interface EndDrag { do: "end_drag"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }
-  interface EventLog { is: "event_log"; id?: number | string | null; lines: LogLine[]; }
   interface Field { field: string; type: string; value: number | number[]; settable: boolean; }
   interface FieldName { node: string; field: string; }
   interface FieldSetting { node: string; field: string; value: number | number[] | null; }
@@ -85,8 +84,6 @@ declare namespace Api {
     made?: number | null; }
   interface Load { do: "load"; id?: number | string | null; revocations?: number | null; made?: number | null;
     scene: string; }
-  interface LogLine { when: string; who: string | null; command: string; grounds: string | null; began: boolean;
-    finding: Finding; }
   interface Loop { is: "loop"; id?: number | string | null; period: number; ticks: number; late_p50: number;
     late_p99: number; late_max: number; lost: number; }
   interface Margins { limit: number; axis: number; limits: number[]; smallest_singular_value: number;
@@ -125,7 +122,7 @@ declare namespace Api {
     task: string; fraction: number; seconds: number; seconds_left: number; why: string; skipped: number[];
     unattended: boolean; began: string | null; breakpoints: number[]; can_continue: boolean; }
   interface Query { do: "query"; id?: number | string | null; revocations?: number | null; made?: number | null;
-    at?: "arm" | "branches" | "event_log" | "links" | "loop" | "objects" | "state" | "world"; }
+    at?: "arm" | "branches" | "links" | "loop" | "objects" | "state" | "world"; }
   interface Redo { do: "redo"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }
   interface Refused { is: "refused"; id?: number | string | null; why: string; code?: string; retry?: number | null;

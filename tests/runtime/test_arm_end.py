@@ -14,9 +14,7 @@ import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control import silence
-from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session import Session
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
@@ -170,28 +168,6 @@ def test_ticket_of_a_dropped_command_still_advances(ends: Ends) -> None:
     until(lambda: ends.front.state_publisher.snapshot.ticket == 3000)
 
 
-def test_event_log_crosses_the_pipe_entry_by_entry(ends: Ends) -> None:
-    ends.front.deliver(cmd.Joint(1, 99.0))
-    until(lambda: bool(ends.front.state_publisher.event_log))
-    ends.front.deliver(cmd.Joint(1, 0.0))
-    until(
-        lambda: (
-            len(ends.front.state_publisher.event_log)
-            == len(ends.loop.state_publisher.event_log)
-            == 2
-        )
-    )
-    entries = [(e.t, e.finding, e.began) for e in ends.front.state_publisher.event_log]
-    assert entries == [(e.t, e.finding, e.began) for e in ends.loop.state_publisher.event_log]
-    # A front end that connects later receives the event log too.
-    ends.arm_end.close()
-    until(lambda: ends.loop.state_publisher.snapshot.state.stopped is not None)
-    ends.arm_end, late = ends.connect()
-    assert [e.t for e in late.state_publisher.event_log] == [
-        e.t for e in ends.loop.state_publisher.event_log
-    ]
-
-
 def test_silent_front_end_stops_a_moving_arm(ends: Ends) -> None:
     time.sleep(2 * SILENCE)
     assert ends.loop.state_publisher.snapshot.state.stopped is None
@@ -262,26 +238,6 @@ def test_broken_pipe_stops_the_arm_and_a_new_front_end_moves_nothing(ends: Ends)
 def test_loop_timing_is_reported_periodically(ends: Ends) -> None:
     until(lambda: ends.front.state_publisher.loop_timing.ticks > 50)
     assert ends.front.state_publisher.loop_timing.period == 0.01
-
-
-def test_actor_crosses_the_pipe_into_the_event_log(ends: Ends) -> None:
-    actor = Actor(
-        Person("a key", "Anna", Role.OPERATOR), CommandChannel.WEBSOCKET, None, Grounds.LEASE
-    )
-    ends.front.deliver(cmd.Joint(1, 99.0), actor)
-    until(lambda: bool(ends.front.state_publisher.event_log))
-    (entry,) = ends.front.state_publisher.event_log
-    assert (entry.actor, entry.command) == (actor, "Joint")
-    # A stop by the arm's own process has no actor.
-    ends.mailbox.put(cmd.Stop())
-    until(lambda: ends.front.state_publisher.event_log[-1].finding.reason is Reason.STOPPED)
-    assert (
-        ends.front.state_publisher.event_log[-1].actor,
-        ends.front.state_publisher.event_log[-1].command,
-    ) == (
-        None,
-        "Stop",
-    )
 
 
 def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:

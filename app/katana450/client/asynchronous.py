@@ -196,7 +196,7 @@ class AsyncClient(
     async def query(self, kind: type[A]) -> A:
         """Return a current value of the server.
 
-        ``kind``: one of answers.State, Arm, EventLog, Branches, Loop, Objects, World, Links.
+        ``kind``: one of answers.State, Arm, Branches, Loop, Objects, World, Links.
         """
         answer = await self.ask(requests.Query(at=kind.__struct_config__.tag))  # type: ignore[arg-type]
         if not isinstance(answer, kind):

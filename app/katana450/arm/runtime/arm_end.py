@@ -18,7 +18,6 @@ from multiprocessing.connection import Connection
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.outcome import refused
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.control.state import Finding, Reason
@@ -74,18 +73,16 @@ class Heartbeat:
 
 @dataclass(frozen=True, eq=False)
 class StateMessage:
-    """A snapshot with the new entries of the event log, the loop timing and new outcomes.
+    """A snapshot with the loop timing and new outcomes.
 
     Attributes:
         snapshot: the state; its ticket is the number that the front end has given the command.
-        event_log: entries since the last message.
         loop_timing: timing of the control loop.
         outcomes: outcomes of commands since the last message, by the numbers of the front end.
         profile: reaction of the moving arm to silence.
     """
 
     snapshot: Snapshot
-    event_log: tuple[LogEntry, ...]
     loop_timing: LoopTiming
     outcomes: tuple[TicketOutcome, ...] = ()
     profile: SilenceProfile = SilenceProfile.REAL_ARM
@@ -184,10 +181,8 @@ class ArmEnd:
     def _show(self) -> None:
         state_publisher = self._loop.state_publisher
         shown, reported, ticks = state_publisher.snapshot, time.monotonic(), self._loop.ticks
-        event_log = state_publisher.event_log
         timing, profile = state_publisher.loop_timing, self._loop.profile
-        self._send(StateMessage(self._named(shown), event_log, timing, profile=profile))
-        last = event_log[-1] if event_log else None
+        self._send(StateMessage(self._named(shown), timing, profile=profile))
         while not self.cut.is_set():
             snapshot = state_publisher.wait_for_change(shown, PULSE_INTERVAL)
             if self.cut.is_set():
@@ -203,12 +198,9 @@ class ArmEnd:
                 continue
             if now - reported >= REPORT_INTERVAL:
                 reported, state_publisher.loop_timing = now, self._loop.loop_timing
-            fresh = _newer(state_publisher.event_log, last)
-            last = fresh[-1] if fresh else last
             self._send(
                 StateMessage(
                     self._named(snapshot),
-                    fresh,
                     state_publisher.loop_timing,
                     self._outcomes(snapshot.ticket),
                     profile,
@@ -254,11 +246,3 @@ class ArmEnd:
             silent = time.monotonic() - self._heard
             if silent > self._silence_timeout:
                 self._loop.brake(Finding(Reason.SERVER_SILENT, silent), silent)
-
-
-def _newer(event_log: tuple[LogEntry, ...], last: LogEntry | None) -> tuple[LogEntry, ...]:
-    """Return the entries of ``event_log`` after ``last``."""
-    for index in range(len(event_log) - 1, -1, -1):
-        if event_log[index] is last:
-            return event_log[index + 1 :]
-    return event_log

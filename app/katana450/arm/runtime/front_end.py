@@ -73,7 +73,6 @@ class FrontEnd:
         self.profile = first.profile
         """Reaction of the moving arm to silence."""
         self.state_publisher = StatePublisher(first.snapshot, first.loop_timing)
-        self.state_publisher.publish(first.snapshot, first.event_log)
         self.cut = threading.Event()
         """Set once this front end is no longer the one of the arm."""
         self.on_stop_change: Callable[[], None] = lambda: None
@@ -206,10 +205,7 @@ class FrontEnd:
                     first = _loaded(pipe.recv_bytes(), plans)
                     if first is None:
                         continue
-                    known = self.state_publisher.event_log
-                    newest = known[-1].t if known else -math.inf
-                    entries = [entry for entry in first.event_log if entry.t > newest]
-                    self.state_publisher.publish(first.snapshot, entries)
+                    self.state_publisher.publish(first.snapshot)
                     with self._sending:
                         self._pipe, self._plans, self._heard = pipe, plans, time.monotonic()
                         self._connected = True
@@ -231,7 +227,7 @@ class FrontEnd:
         self.state_publisher.loop_timing = message.loop_timing
         last = self.state_publisher.snapshot
         if message.snapshot.state.t != last.state.t or message.snapshot.ticket != last.ticket:
-            self.state_publisher.publish(_known(message.snapshot, last), message.event_log)
+            self.state_publisher.publish(_known(message.snapshot, last))
         # The state comes first: a client with an answer must find its command in the state.
         self.state_publisher.outcomes.note(message.outcomes)
         if (message.snapshot.state.stopped is None) != (last.state.stopped is None):

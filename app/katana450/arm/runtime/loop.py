@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.commands import OperateArm, Stop
-from katana450.arm.control.event_log import LogEntry, entries_between
 from katana450.arm.control.messages import finding_text
 from katana450.arm.control.outcome import DROPPED
 from katana450.arm.control.session import Session
@@ -24,7 +23,7 @@ from katana450.arm.runtime.loop_timing import LoopTiming, Punctuality
 from katana450.arm.runtime.mailbox import Drained, Mailbox
 from katana450.arm.runtime.outcomes import TicketOutcome
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
-from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped, waited
+from katana450.arm.runtime.tick import TickRecord, failed, stepped, waited
 from katana450.platform_support import prefer_thread
 
 log = logging.getLogger(__name__)
@@ -80,13 +79,9 @@ class ControlLoop:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._punctuality = Punctuality(self._period)
-        self._newest: Submission | None = None
         self._program_drives = False
         self.state_publisher = StatePublisher(Snapshot(self._state, 0), self.loop_timing)
         """Publisher of the states of the loop."""
-        self.state_publisher.publish(
-            self.state_publisher.snapshot, entries_between(first_state, self._state)
-        )
         self.ticks = 0
         """Number of completed ticks."""
         self.record: Callable[[TickRecord], None] | None = None
@@ -101,8 +96,6 @@ class ControlLoop:
     def tick(self) -> None:
         """Execute one tick: take the commands, step, send the setpoint, publish changes."""
         drained = self._mailbox.drain()
-        if drained.submissions:
-            self._newest = drained.submissions[-1]
         for submission in drained.submissions:
             if any(part.traits.supersedes for part in submission.command.parts):
                 actor = submission.actor
@@ -140,9 +133,7 @@ class ControlLoop:
         self._settled = self._settled and state.poured is before.poured
         if changed:
             self.state_publisher.note(_outcomes(drained, state))
-            self.state_publisher.publish(
-                Snapshot(state, drained.last), self._entries(before, state)
-            )
+            self.state_publisher.publish(Snapshot(state, drained.last))
         self.ticks += 1
 
     def _put_stops_again(self, drained: Drained) -> None:
@@ -152,13 +143,6 @@ class ControlLoop:
                 # Without a name it counts again, although the mailbox knows its presses.
                 cause = replace(command.cause, press="")
                 self._mailbox.put(Stop(cause, command.finding, command.presses), actor)
-
-    def _entries(self, before: State, after: State) -> tuple[LogEntry, ...]:
-        """Return the new entries of the event log, attributed to the newest command."""
-        if self._newest is None:
-            return entries_between(before, after)
-        command, actor = self._newest
-        return entries_between(before, after, actor, type(command).__name__)
 
     @property
     def running(self) -> bool:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.state import State
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes, TicketOutcome
-
-MAX_KEPT_ENTRIES = 500
-"""Maximum number of entries of the event log."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +25,10 @@ class Snapshot:
 
 
 class StatePublisher:
-    """The newest snapshot, the event log and outcomes. One thread publishes, any thread reads."""
+    """The newest snapshot and outcomes. One thread publishes, any thread reads."""
 
     def __init__(self, first: Snapshot, loop_timing: LoopTiming) -> None:
         self._snapshot = first
-        self._event_log: deque[LogEntry] = deque(maxlen=MAX_KEPT_ENTRIES)
         self._published = threading.Condition()
         self._unsent: deque[TicketOutcome] = deque(maxlen=MAX_KEPT_OUTCOMES)
         self.outcomes = Outcomes()
@@ -46,16 +41,9 @@ class StatePublisher:
         """The newest snapshot."""
         return self._snapshot
 
-    @property
-    def event_log(self) -> tuple[LogEntry, ...]:
-        """The last entries of the event log, oldest first."""
+    def publish(self, snapshot: Snapshot) -> None:
+        """Publish ``snapshot``."""
         with self._published:
-            return tuple(self._event_log)
-
-    def publish(self, snapshot: Snapshot, entries: Sequence[LogEntry] = ()) -> None:
-        """Publish ``snapshot``, and add ``entries`` to the event log."""
-        with self._published:
-            self._event_log.extend(entries)
             self._snapshot = snapshot
             self._published.notify_all()
 

@@ -55,7 +55,6 @@ class DiskLog(ServerLog):
         self._lost = self._dropped = 0
         self._problem = ""
         self._retry_at = self._sync_at = 0.0
-        self._finding_t = float("-inf")
         self._pipes: list[Connection] = []
         self._listeners: list[threading.Thread] = []
         self._attaching = threading.Lock()
@@ -109,15 +108,9 @@ class DiskLog(ServerLog):
         self.put(record(kind, what, who={"name": "the server", "channel": "server"}))
 
     def _listen(self, pipe: Connection) -> None:
-        # A new front end reports the findings again that the arm still remembers.
-        known = self._finding_t
         with GuardedPipe(pipe, "The pipe of the event log"):
             while True:
                 for content in pipe.recv():
-                    if content["kind"] == "finding":
-                        if content["t"] <= known:
-                            continue
-                        self._finding_t = max(self._finding_t, content["t"])
                     self.put(content)
         with self._attaching:
             self._pipes.remove(pipe)

@@ -179,9 +179,8 @@ class RecordMaker:
             "reason": finding.reason.value,
             "began": entry.began,
             "amount": content_of(finding.amount),
-            "command": entry.command,
         }
-        self._add(Note(entry.t, "finding", entry.actor), what)
+        self._add(Note(entry.t, "finding"), what)
 
     def _lease(self, note: Note, change: LeaseChange) -> None:
         before, after = change

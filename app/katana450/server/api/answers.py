@@ -333,32 +333,6 @@ class Arm(Answer, frozen=True, kw_only=True):
     freedoms: int = 0
 
 
-class LogLine(msgspec.Struct, frozen=True, kw_only=True):
-    """A finding that began or ended, with the newest command at that time.
-
-    Attributes:
-        when: Time in UTC, in ISO 8601.
-        who: Name of the participant that gave the command; null for the server itself.
-        command: Name of the command.
-        grounds: Grounds on which the participant was allowed to give it.
-        began: Whether the finding began; otherwise it ended.
-        finding: The finding.
-    """
-
-    when: str
-    who: str | None
-    command: str
-    grounds: str | None
-    began: bool
-    finding: Finding
-
-
-class EventLog(Answer, frozen=True, kw_only=True):
-    """Recent findings, the oldest first."""
-
-    lines: list[LogLine]
-
-
 class BranchOption(msgspec.Struct, frozen=True, kw_only=True):
     """A branch that can be chosen, and its cost.
 

@@ -306,15 +306,13 @@ class Query(Request, frozen=True, kw_only=True):
 
     Attributes:
         at: Subject of the answer, which has the same name: the state, the description of the arm,
-            the event log, the branches, the timing of the control loop, the objects, the VRML
+            the branches, the timing of the control loop, the objects, the VRML
             world, or the poses of the links.
     """
 
     traits: ClassVar[Traits] = Traits(question=True, answered=True)
 
-    at: Literal["state", "arm", "event_log", "branches", "loop", "objects", "world", "links"] = (
-        "state"
-    )
+    at: Literal["state", "arm", "branches", "loop", "objects", "world", "links"] = "state"
 
 
 EVERY: tuple[type[Request], ...] = tuple(

@@ -9,7 +9,6 @@ from concurrent.futures import Future
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.environment import Environment
-from katana450.arm.control.event_log import LogEntry
 from katana450.arm.control.margins import Margins, margins
 from katana450.arm.control.pouring import Pouring
 from katana450.arm.control.session import Session
@@ -147,11 +146,6 @@ class ArmHandle:
     def state(self) -> State:
         """The newest state."""
         return self._state_publisher.snapshot.state
-
-    @property
-    def event_log(self) -> tuple[LogEntry, ...]:
-        """Recent entries of the event log, the oldest first."""
-        return self._state_publisher.event_log
 
     @property
     def caught_up(self) -> bool:

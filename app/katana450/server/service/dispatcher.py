@@ -169,8 +169,6 @@ class Dispatcher:
     def query(self, subject: str) -> answers.Answer:
         """Return the answer to a ``query`` of ``subject``. Raises LeaseError without an arm."""
         hub = self._hub
-        if subject == "event_log":
-            return serialize.event_log(hub.event_log.lines)
         if subject == "state":
             return serialize.state(hub)
         arm = hub.present()

@@ -5,6 +5,7 @@ Runs in the gateway's one thread; ``CommandGate`` decides which commands reach t
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,9 +14,11 @@ from typing import Any
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.event_log import entries_between
 from katana450.arm.control.lease import Lease, Person
-from katana450.arm.control.messages import sentence
+from katana450.arm.control.messages import finding_text, sentence
 from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state import State
 from katana450.arm.control.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
@@ -23,7 +26,6 @@ from katana450.server.api.requests import RequestDecoder
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.command_gate import CommandGate, guarded
 from katana450.server.service.driver_watch import DriverWatch
-from katana450.server.service.event_log import EventLog
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 from katana450.server.service.known_pages import KnownPages, renamed
@@ -41,6 +43,8 @@ from katana450.server.service.runner import RequestHandler, Runner
 from katana450.server.service.stop_path import StopPath
 from katana450.server.service.stop_state import StopNews, StopRecord
 from katana450.settings import Settings
+
+log = logging.getLogger(__name__)
 
 TICK = 0.02
 """Interval of the checks for silence [s]."""
@@ -65,7 +69,7 @@ class Hub:
         self.gate = CommandGate(clock)
         self.gate.presser_of = self._presser_of
         self.stop_path, self.stop_news = StopPath(), StopNews()
-        self.event_log = EventLog()
+        self._followed: State | None = None
         self.people = People(clock)
         self.handlers: list[RequestHandler] = []
         self.use_runner(Runner())
@@ -331,10 +335,15 @@ class Hub:
             self.runner.tick()
 
     def follow_stop(self) -> None:
-        """Make gate and arm agree on the stop, and spread the news of it."""
-        entries = () if self.arm is None else self.arm.event_log
-        for entry in self.event_log.follow(entries, self._known.named):
-            self.recorder.finding(entry)
+        """Note the findings, make gate and arm agree on the stop, and spread the news of it."""
+        if self.arm is not None:
+            before, self._followed = self._followed, self.arm.state
+            for entry in (
+                () if before is self._followed else entries_between(before, self._followed)
+            ):
+                self.recorder.note("finding", None, entry)
+                if entry.began:
+                    log.info("%s", finding_text(entry.finding))
         self.gate.reconcile()
         self.stop_news.note(self.stopped)
 

@@ -7,9 +7,7 @@ import unicodedata
 from collections.abc import Container, Iterable
 from dataclasses import replace
 
-from katana450.arm.control.actor import Actor
 from katana450.arm.control.lease import Person
-from katana450.arm.control.stop_cause import UNNAMED
 from katana450.errors import InputError
 from katana450.server.service.identity import Identity
 
@@ -50,11 +48,6 @@ class KnownPages:
     def find(self, key: str) -> Person | None:
         """Return the person at the page of ``key``; None for an unknown page."""
         return self._known.get(key, (None, 0))[0]
-
-    def named(self, actor: Actor) -> Actor:
-        """Return ``actor`` with the name of its page where the process of STOP knew none."""
-        person = self.find(actor.key) if actor.name == UNNAMED else None
-        return actor if person is None else replace(actor, person=person)
 
     def recognise(
         self, key: str, identity: Identity, open_now: Container[str]

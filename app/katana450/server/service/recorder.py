@@ -17,7 +17,6 @@ from katana450.arm.runtime.clock import MonotonicClock
 from katana450.errors import KatanaError
 
 if TYPE_CHECKING:
-    from katana450.arm.control.event_log import LogEntry
     from katana450.arm.runtime.outcomes import TicketOutcome
 
 MAX_WAITING = 4096
@@ -117,10 +116,6 @@ class Recorder:
         for ticket, outcome in outcomes:
             if outcome.verdict.value != ACCEPTED:
                 self.note("outcome", None, outcome, ticket=ticket)
-
-    def finding(self, entry: LogEntry) -> None:
-        """Note that a finding of the arm began or ended."""
-        self.note("finding", entry.actor, entry)
 
 
 def stranger(address: str) -> Actor:

@@ -29,8 +29,26 @@ from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
 from katana450.server.service.arm_handle import ArmHandle
-from katana450.server.service.event_log import UNITS, LogLine
 from katana450.server.service.hub import Hub
+
+UNITS = {
+    control.Reason.STOPPED: "m",
+    control.Reason.CONTACT: "m",
+    control.Reason.ACROSS_GAP: "rad",
+    control.Reason.OUT_OF_REACH: "m",
+    control.Reason.POSITION_CHANGED: "m",
+    control.Reason.AXIS_LIMIT: "rad",
+    control.Reason.SLIDE_LIMIT: "m",
+    control.Reason.GRIPPER_LIMIT: "rad",
+    control.Reason.GRIPPER_SLIDE_LIMIT: "m",
+    control.Reason.YAW_FIXED: "rad",
+    control.Reason.PITCH_CHANGED: "rad",
+    control.Reason.ROLL_CHANGED: "rad",
+    control.Reason.LOPSIDED: "m",
+    control.Reason.SLIPPED: "N",
+    control.Reason.NOT_AT_START: "rad",
+}
+"""Units of the amounts; the other reasons have no amount."""
 
 T = TypeVar("T")
 
@@ -279,25 +297,6 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
         )
         for name, label in zip(names, joint_labels(robot), strict=True)
     ]
-
-
-def event_log(lines: Sequence[LogLine]) -> answers.EventLog:
-    """Return lines of the event log as an answer."""
-    return answers.EventLog(lines=[log_line(line) for line in lines])
-
-
-def log_line(line: LogLine) -> answers.LogLine:
-    """Return one line of the event log as a part of an answer."""
-    actor = line.entry.actor
-    grounds = None if actor is None or actor.grounds is None else actor.grounds.value
-    return answers.LogLine(
-        when=line.when.isoformat(timespec="milliseconds"),
-        who=line.who,
-        command=line.entry.command,
-        grounds=grounds,
-        began=line.entry.began,
-        finding=finding(line.entry.finding),
-    )
 
 
 def branch_option(choice: BranchOption) -> answers.BranchOption:

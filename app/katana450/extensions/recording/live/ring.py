@@ -196,7 +196,7 @@ class Ring:
         before, self._before = self._before, record.state
         events: list[tuple[str, Mapping[str, Any]]] = []
         if before is not None and before.findings != record.state.findings:
-            for entry in entries_between(before, record.state, None, self._newest):
+            for entry in entries_between(before, record.state):
                 finding = entry.finding
                 fields = {
                     "reason": finding.reason.value,
@@ -204,7 +204,7 @@ class Ring:
                     "amount": finding.amount,
                     "axis": None if finding.axis is None else finding.axis + 1,
                     "parts": None if finding.parts is None else list(finding.parts),
-                    "command": entry.command,
+                    "command": self._newest,
                 }
                 events.append(("finding", fields))
         return [*events, *self._run_events.of(record)]
