@@ -21,14 +21,6 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="directory for the files, or the path of the html file",
     )
     parser.add_argument(
-        "--pose",
-        type=joint_values,
-        default=(),
-        metavar="Q",
-        help="comma-separated values of the driven joints in rad or m, gripper last, such as "
-        "--pose=0,-1.2,1.4,0.1,0,0.2 (default: all at zero)",
-    )
-    parser.add_argument(
         "--plain",
         action="store_true",
         help="vrml and x3d: shapes without a Switch, for three.js and other programs that skip it",
@@ -39,20 +31,38 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="vrml and x3d: leave out the cup and the basin of a new server",
     )
-    motion = parser.add_mutually_exclusive_group()
-    motion.add_argument(
+    add_shown_options(parser, "vrml, x3d, glb and html: ", "html: ", "all at zero")
+    add_arm_options(parser, tool=False)
+
+
+def add_shown_options(
+    parser: argparse.ArgumentParser, of_table: str = "", of_run: str = "", pose: str = "Home"
+) -> None:
+    """Add the options of what is shown to ``parser``: a pose, a table of a motion, or a run.
+
+    ``of_table``, ``of_run``: formats that can show these. ``pose``: the default of the pose.
+    """
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument(
+        "--pose",
+        type=joint_values,
+        default=(),
+        metavar="Q",
+        help="comma-separated values of the driven joints in rad or m, gripper last, such as "
+        f"--pose=0,-1.2,1.4,0.1,0,0.2 (default: {pose})",
+    )
+    shown.add_argument(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help="vrml, x3d, glb and html: motion that the file plays; a .csv with the columns "
-        "t,theta1,...,theta5,gripper, or trace.csv of a report",
+        help=f"{of_table}motion, a .csv with the columns t,theta1,...,theta5,gripper, or trace.csv "
+        "of a report",
     )
-    motion.add_argument(
+    shown.add_argument(
         "--run",
         metavar="SCRIPT",
-        help="html: run that the page plays: circle, pour or the file of a script",
+        help=f"{of_run}run that is shown: circle, pour or the file of a script",
     )
-    add_arm_options(parser, tool=False)
 
 
 def export_format(options: argparse.Namespace) -> int:

@@ -6,7 +6,6 @@ import importlib
 import io
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -159,9 +158,6 @@ STYLE = {
 }
 """matplotlib settings of all figures."""
 
-LABEL_ITERATIONS = 30
-"""Number of iterations that separate overlapping labels."""
-
 PARTS = 200
 """Number of parts of a path; the largest error of each is drawn."""
 
@@ -224,27 +220,23 @@ def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (edges[:-1] + edges[1:]), maximum
 
 
-def joints_figure(arm: ArmModel, trace: Trace) -> bytes:
+def joints_figure(trace: Trace) -> bytes:
     """Return a PNG of the joint variables over time (the paper's Fig. 8)."""
     plt = pyplot()
     with plt.rc_context(STYLE):
         figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
         degrees = np.degrees(trace.q)
         for axis in range(degrees.shape[1]):
-            panel.plot(trace.t, degrees[:, axis], color=AXES[axis % len(AXES)], linewidth=1.4)
+            colour, name = AXES[axis % len(AXES)], f"θ{axis + 1}"
+            panel.plot(trace.t, degrees[:, axis], color=colour, linewidth=1.4, label=name)
         if trace.measured is not None:
-            for column in np.degrees(trace.measured).T:
-                panel.plot(trace.t, column, **MEASURED)
-            names = (
-                plt.Line2D([], [], color=AXES[0], linewidth=1.4, label="setpoint"),
-                plt.Line2D([], [], **MEASURED, label="measured"),
-            )
-            panel.legend(handles=names, **ABOVE, ncols=2)
-        _name_lines(panel, trace.t, degrees, [f"θ{n + 1}" for n in range(arm.chain.n)])
+            for axis, column in enumerate(np.degrees(trace.measured).T):
+                panel.plot(trace.t, column, **MEASURED, label=None if axis else "measured")
+        panel.legend(**ABOVE, ncols=degrees.shape[1] + 1, handlelength=1.1, columnspacing=1.0)
         panel.set_title("Joint variables")
         panel.set_xlabel(TIME)
         panel.set_ylabel("angle (deg)")
-        panel.set_xlim(0.0, 1.04 * trace.t[-1])
+        panel.set_xlim(0.0, trace.t[-1])
         return to_png(plt, figure)
 
 
@@ -345,27 +337,6 @@ def equal_axes(space: Any, points: FloatArray) -> None:
     for number, set_limits in enumerate((space.set_xlim, space.set_ylim, space.set_zlim)):
         set_limits(middle[number] - half, middle[number] + half)
     space.set_box_aspect((1.0, 1.0, 1.0), zoom=0.86)
-
-
-def _name_lines(panel: Any, t: FloatArray, values: FloatArray, names: Sequence[str]) -> None:
-    """Write the name of each line at its end, separated if ends are close."""
-    apart = 0.055 * max(float(values.max() - values.min()), 1.0)
-    heights = values[-1].copy()
-    order = np.argsort(heights, kind="stable").tolist()
-    for _ in range(LABEL_ITERATIONS):
-        for low, high in pairwise(order):
-            short = 0.5 * max(apart - float(heights[high] - heights[low]), 0.0)
-            heights[low], heights[high] = heights[low] - short, heights[high] + short
-    for axis, name in enumerate(names):
-        panel.annotate(
-            name,
-            (t[-1], heights[axis]),
-            xytext=(5, 0),
-            textcoords="offset points",
-            va="center",
-            color=AXES[axis % len(AXES)],
-            fontweight="bold",
-        )
 
 
 def pyplot() -> Any:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.arm_options import add_arm_options
-from katana450.extensions.export.options import joint_values
+from katana450.extensions.export.options import add_shown_options
 
 CAMERAS = ("free", "front", "side", "top", "tool")
 """Camera presets, as on the page; the first is its 3D view."""
@@ -21,26 +21,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help=".png for a picture, .mp4 for a film",
     )
-    shown = parser.add_mutually_exclusive_group()
-    shown.add_argument(
-        "--pose",
-        type=joint_values,
-        default=(),
-        metavar="Q",
-        help="comma-separated values of the driven joints in rad, gripper last, such as "
-        "--pose=0,-1.2,1.4,0.1,0,0.2 (default: the home posture)",
-    )
-    shown.add_argument(
-        "--trajectory",
-        type=Path,
-        metavar="FILE",
-        help="motion: .csv with the columns t,theta1,...,theta5,gripper",
-    )
-    shown.add_argument(
-        "--run",
-        metavar="SCRIPT",
-        help="run that is shown: circle, pour or the file of a script",
-    )
+    add_shown_options(parser)
     parser.add_argument(
         "--at",
         type=float,

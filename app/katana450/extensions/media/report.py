@@ -212,7 +212,7 @@ class Report:
             images["path.png"] = figures.path_figure(paths)
         if self.measured is not None:
             images["measured.png"] = measured_figure(self.measured)
-        images["joints.png"] = figures.joints_figure(self.arm, self.trace)
+        images["joints.png"] = figures.joints_figure(self.trace)
         images["speeds.png"] = figures.speeds_figure(self.arm, self.trace)
         if self._pour is not None:
             images["water.png"] = figures.water_figure(self._pour)
