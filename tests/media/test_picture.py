@@ -163,12 +163,16 @@ def test_a_line_is_a_tube_of_its_length() -> None:
     circle = np.stack((np.cos(turn), np.sin(turn), np.zeros(200)), axis=1)
     item = tube("line", circle, 0.01, (10, 160, 80))
     assert item is not None
-    mesh = trimesh.Trimesh(item.shape.vertices, item.shape.faces, process=False)
-    # The outline is an octagon in place of a circle.
-    around = 2.0 * 8 * 0.01 * math.sin(math.pi / 8)
-    assert mesh.area == pytest.approx(math.tau * around, rel=0.01)
-    out = mesh.face_normals * (mesh.triangles_center - _nearest(mesh.triangles_center))
-    assert (out.sum(axis=1) > 0.0).all()
+    corners = item.shape.vertices
+    away = np.linalg.norm(corners - _nearest(corners), axis=1)
+    # Corners of ends are on the axis.
+    assert away.max() == pytest.approx(0.01, rel=0.01)
+    mesh = trimesh.Trimesh(corners, item.shape.faces, process=False)
+    parts = mesh.split(only_watertight=True)
+    assert len(parts) == 199
+    assert sum(part.volume for part in parts) == pytest.approx(
+        math.tau * 4.0 * 0.01**2 * math.sin(math.tau / 8), rel=0.01
+    )
     assert tube("dot", np.zeros((5, 3)), 0.01, (0, 0, 0)) is None
 
 

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
+from trimesh.creation import cylinder
+from trimesh.util import append_faces
 
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
@@ -19,7 +22,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.extensions.media.measures import path_at
 from katana450.extensions.media.picture import picture
-from katana450.extensions.media.scene import Camera, Item, unit
+from katana450.extensions.media.scene import Camera, Item
 from katana450.extensions.media.stage import RenderStage
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Trace
@@ -45,28 +48,17 @@ def tube(name: str, points: FloatArray, radius: float, rgb: tuple[int, int, int]
     points = points[np.concatenate(([True], far))]
     if len(points) < 2:
         return None
-    tangents = unit(np.gradient(points, axis=0)).astype(float)
-    aside = np.empty_like(points)
-    last = np.eye(3)[int(np.abs(tangents[0]).argmin())]
-    for number, direction in enumerate(tangents):
-        # The vector aside is projected from point to point, so that the tube does not twist.
-        last = last - (last @ direction) * direction
-        last /= float(np.linalg.norm(last))
-        aside[number] = last
-    upright = np.cross(tangents, aside)
-    turn = np.arange(SIDES) * (math.tau / SIDES)
-    out = np.cos(turn)[:, None] * aside[:, None] + np.sin(turn)[:, None] * upright[:, None]
-    a = np.arange(SIDES)
-    b = (a + 1) % SIDES
-    quad = np.concatenate(
-        (np.stack((a, b, b + SIDES), axis=1), np.stack((a, b + SIDES, a + SIDES), axis=1))
+    parts = [cylinder(radius, sections=SIDES, segment=pair) for pair in pairwise(points)]
+    vertices, faces = append_faces(
+        [part.vertices for part in parts], [part.faces for part in parts]
     )
-    faces = (quad + SIDES * np.arange(len(points) - 1)[:, None, None]).reshape(-1, 3)
-    corners = (points[:, None] + radius * out).reshape(-1, 3)
+    corners = vertices.astype(float)
     colour = rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0
-    return Item(
-        name, VisualMesh(Material(name, colour), corners, out.reshape(-1, 3), faces), np.eye(4)
+    # Without normals of its own, each face has that of its plane.
+    shape = VisualMesh(
+        Material(name, colour), corners, np.zeros_like(corners), faces.astype(np.int64)
     )
+    return Item(name, shape, np.eye(4))
 
 
 SIZE = 880, 550
