@@ -159,7 +159,7 @@ GOALS: dict[str, tuple[dict[str, Any], int, str]] = {
         -1,
         "from where the arm stands",
     ),
-    "too long": (trajectory((4000.0, HOME)), -1, "at most 3600 s"),
+    "too long": (trajectory((4000.0, HOME)), -1, "at most 600 s"),
 }
 
 

@@ -8,9 +8,9 @@ import pytest
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.messages import (
-    GivenHeader,
-    GivenTime,
+    Header,
     JointJog,
+    Time,
     Twist,
     Vector3,
 )
@@ -74,8 +74,7 @@ def test_joints_that_are_not_named_stand_still() -> None:
 
 
 def test_old_command_is_refused_and_one_without_a_stamp_is_new() -> None:
-    check_fresh(GivenHeader(), 1e9)
-    check_fresh(GivenHeader(stamp=GivenTime(sec=1_000_000_000)), 1e9 + 0.05)
-    # With the names of ROS 1.
+    check_fresh(Header(), 1e9)
+    check_fresh(Header(stamp=Time(sec=1_000_000_000)), 1e9 + 0.05)
     with pytest.raises(InputError, match=r"is 0\.50 s old"):
-        check_fresh(GivenHeader(stamp=GivenTime(secs=1_000_000_000)), 1e9 + 0.5)
+        check_fresh(Header(stamp=Time(sec=1_000_000_000)), 1e9 + 0.5)

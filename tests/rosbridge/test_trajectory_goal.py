@@ -41,7 +41,7 @@ def test_trajectory_begins_where_the_arm_stands() -> None:
 
 
 def test_longest_script_is_short_enough() -> None:
-    points = tuple((4.0 * k + 0.1234, [-2.345678] * 5) for k in range(1, MAX_POINTS + 1))
+    points = tuple((0.85 * k + 0.1234, [-2.345678] * 5) for k in range(1, MAX_POINTS + 1))
     script = parse(checked(points=points).script("ROS trajectory 1"))
     assert script.name == "ROS trajectory 1"
     assert len(script.steps) == 1

@@ -15,7 +15,7 @@ from katana450.arm.control.lease import HEARTBEAT_INTERVAL
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.extensions.rosbridge import names, ops
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
-from katana450.extensions.rosbridge.goals import Goal, GoalHost, GripperGoal
+from katana450.extensions.rosbridge.goals import ERROR_TEXT, Goal, GoalHost, GripperGoal
 from katana450.extensions.rosbridge.messages import (
     JointJog,
     NoArguments,
@@ -40,8 +40,6 @@ TICK = 0.02
 
 MAX_GOALS = 4
 """Maximum number of goals of one client at a time."""
-
-ERROR_TEXT = "The server had an internal error; see its log."
 
 REPEAT_SECONDS = 1.0
 """[s] Time during which an equal refusal of messages of a topic is not repeated."""
@@ -100,6 +98,8 @@ class RosChannel(Channel):
     def greet(self, participant: Participant) -> None:
         """Take ``participant``, which is the client. The protocol has no greeting."""
         self.participant = participant
+        # Clients of rosbridge send no heartbeats; their websockets answer pings.
+        participant.heartbeat.pinged = True
 
     def notify(self, notice: Any) -> None:
         """Queue ``notice``: an operation, or a notice of the server, which becomes a status."""
@@ -232,7 +232,7 @@ class RosChannel(Channel):
 
     def _hold(self, op: ops.CallService) -> None:
         """Bring the arm to rest: end the goals of this client, or give the command `hold`."""
-        running = [goal for goal in self._goals if not goal.ends]
+        running = [goal for goal in self._goals if not (goal.ended or goal.cancelled)]
         for goal in running:
             goal.cancel("The client called /hold.")
         if running:
@@ -287,20 +287,20 @@ class RosChannel(Channel):
             if op.action_type and not names.is_type(op.action_type, known):
                 raise InputError(f"The action {op.action} is {known}, not {op.action_type}.")
             self._check_goals(op)
-            host = GoalHost(self.hub, participant, self._ask, self.notify, self._show_newest)
+            host = GoalHost(self.hub, participant, self._handle, self.notify, self._show_newest)
             follows = action == names.FOLLOW
             goal = FollowGoal(host, op) if follows else GripperGoal(host, op)
         except InputError as error:
             refused = {"op": "action_result", "action": op.action, "id": op.id, "result": False}
             self.notify({**refused, "values": str(error), "status": 6})
             raise
-        goal.begin()
-        if not goal.ended:
-            self._goals.append(goal)
-            self._acting.set()
+        self._goals.append(goal)
+        self._later(goal.run())
+        self._acting.set()
 
     def _check_goals(self, op: ops.SendActionGoal) -> None:
         """Raise InputError if another goal conflicts with ``op``; a finger goal never does."""
+        self._goals = [goal for goal in self._goals if not goal.ended]
         if any(goal.id == op.id for goal in self._goals):
             raise InputError(f"There is a goal with the id {op.id!r} already.")
         if len(self._goals) >= MAX_GOALS:
@@ -343,7 +343,6 @@ class RosChannel(Channel):
     def _continue(self) -> None:
         t = self.hub.clock()
         if t - self._pinged >= HEARTBEAT_INTERVAL:
-            # Clients of rosbridge send no heartbeats; their websockets answer pings.
             self._pinged = t
             self._ping()
         try:
@@ -351,11 +350,7 @@ class RosChannel(Channel):
         except KatanaError as error:
             self.notify(status(str(error)))
         for goal in self._goals:
-            try:
-                goal.tick()
-            except Exception:
-                log.exception("Error in a goal.")
-                goal.cancel(ERROR_TEXT)
+            goal.tick()
         self._goals = [goal for goal in self._goals if not goal.ended]
 
     def _ask(self, request: requests.Request) -> answers.Answer:

@@ -25,37 +25,20 @@ class RosMessage(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 class Time(RosMessage, frozen=True, kw_only=True):
     """builtin_interfaces/Time or Duration."""
 
-    sec: int = 0
-    nanosec: int = 0
-
-
-class GivenTime(RosMessage, frozen=True, kw_only=True):
-    """A time or duration from a client, with the names of ROS 2 or of ROS 1."""
-
     sec: Seconds = 0
     nanosec: Nanoseconds = 0
-    secs: Seconds = 0
-    nsecs: Nanoseconds = 0
 
     @property
     def seconds(self) -> float:
         """The time [s]."""
-        return self.sec + self.secs + (self.nanosec + self.nsecs) / NANOSECONDS
+        return self.sec + self.nanosec / NANOSECONDS
 
 
 class Header(RosMessage, frozen=True, kw_only=True):
     """std_msgs/Header."""
 
-    stamp: Time
-    frame_id: str = ""
-
-
-class GivenHeader(RosMessage, frozen=True, kw_only=True):
-    """A std_msgs/Header from a client; ``seq`` is of ROS 1."""
-
-    stamp: GivenTime = GivenTime()
+    stamp: Time = Time()
     frame_id: Annotated[str, Meta(max_length=200)] = ""
-    seq: int = 0
 
 
 class Vector3(RosMessage, frozen=True, kw_only=True):
@@ -146,14 +129,14 @@ class Twist(RosMessage, frozen=True, kw_only=True):
 class TwistStamped(RosMessage, frozen=True, kw_only=True):
     """geometry_msgs/TwistStamped."""
 
-    header: GivenHeader = GivenHeader()
+    header: Header = Header()
     twist: Twist = Twist()
 
 
 class JointJog(RosMessage, frozen=True, kw_only=True):
     """control_msgs/JointJog."""
 
-    header: GivenHeader = GivenHeader()
+    header: Header = Header()
     joint_names: Names = []
     displacements: Numbers = []
     velocities: Numbers = []
@@ -167,13 +150,13 @@ class JointTrajectoryPoint(RosMessage, frozen=True, kw_only=True):
     velocities: Numbers = []
     accelerations: Numbers = []
     effort: Numbers = []
-    time_from_start: GivenTime = GivenTime()
+    time_from_start: Time = Time()
 
 
 class JointTrajectory(RosMessage, frozen=True, kw_only=True):
     """trajectory_msgs/JointTrajectory."""
 
-    header: GivenHeader = GivenHeader()
+    header: Header = Header()
     joint_names: Names = []
     points: list[JointTrajectoryPoint] = []
 
@@ -181,7 +164,7 @@ class JointTrajectory(RosMessage, frozen=True, kw_only=True):
 class MultiDOFJointTrajectory(RosMessage, frozen=True, kw_only=True):
     """trajectory_msgs/MultiDOFJointTrajectory, which is accepted only if it is empty."""
 
-    header: GivenHeader = GivenHeader()
+    header: Header = Header()
     joint_names: Annotated[list[str], Meta(max_length=0)] = []
     points: Annotated[list[float], Meta(max_length=0)] = []
 
@@ -198,7 +181,7 @@ class FollowJointTrajectory(RosMessage, frozen=True, kw_only=True):
     component_path_tolerance: NoTolerances = []
     goal_tolerance: NoTolerances = []
     component_goal_tolerance: NoTolerances = []
-    goal_time_tolerance: GivenTime = GivenTime()
+    goal_time_tolerance: Time = Time()
 
 
 class FollowJointTrajectoryResult(RosMessage, frozen=True, kw_only=True):
@@ -208,24 +191,14 @@ class FollowJointTrajectoryResult(RosMessage, frozen=True, kw_only=True):
     error_string: str
 
 
-class FollowedPoint(RosMessage, frozen=True, kw_only=True):
-    """trajectory_msgs/JointTrajectoryPoint in a feedback."""
-
-    positions: list[float]
-    velocities: list[float]
-    time_from_start: Time
-    accelerations: list[float] = []
-    effort: list[float] = []
-
-
 class FollowJointTrajectoryFeedback(RosMessage, frozen=True, kw_only=True):
     """The feedback of control_msgs/FollowJointTrajectory."""
 
     header: Header
     joint_names: list[str]
-    desired: FollowedPoint
-    actual: FollowedPoint
-    error: FollowedPoint
+    desired: JointTrajectoryPoint
+    actual: JointTrajectoryPoint
+    error: JointTrajectoryPoint
 
 
 class GripperPosition(RosMessage, frozen=True, kw_only=True):

@@ -68,7 +68,7 @@ class Publications(NamedTuple):
             case names.ROBOT_DESCRIPTION:
                 return String(data=self.description())
             case names.DIAGNOSTICS:
-                return diagnostics(self.hub, arm)
+                return diagnostics(self.hub)
             case names.TF_STATIC:
                 fixed = [link for link in arm.robot.links if link.joint is None]
                 return transforms(fixed, {}, time_of(time.time()))
@@ -136,12 +136,12 @@ def _transform(T: FloatArray) -> RosTransform:
     )
 
 
-def diagnostics(hub: Hub, arm: ArmHandle) -> DiagnosticArray:
-    """Return the condition of the arm, of its control loop and of the right to drive."""
+def diagnostics(hub: Hub) -> DiagnosticArray:
+    """Return the condition of the arm."""
     now = serialize.state(hub)
     return DiagnosticArray(
         header=Header(stamp=time_of(time.time())),
-        status=[_arm_status(now), _loop_status(arm), _driver_status(hub, now)],
+        status=[_arm_status(now)],
     )
 
 
@@ -161,32 +161,9 @@ def _arm_status(now: answers.State) -> DiagnosticStatus:
         values[f"finding {number}"] = finding.text
     if now.arm is not None:
         values |= {"mode": now.arm.mode, "note": now.arm.note}
-    return _status("katana450: arm", level, message, values)
-
-
-def _loop_status(arm: ArmHandle) -> DiagnosticStatus:
-    timing = arm.loop_timing
-    late = timing.late_p99 > timing.period
-    message = "1 % of the ticks are more than a period late." if late else "ok"
-    values = {
-        "period [ms]": f"{1e3 * timing.period:.1f}",
-        "delay, median [ms]": f"{1e3 * timing.late_p50:.2f}",
-        "delay, 99th percentile [ms]": f"{1e3 * timing.late_p99:.2f}",
-        "ticks lost": str(timing.lost),
-    }
-    return _status("katana450: control loop", WARN if late else OK, message, values)
-
-
-def _driver_status(hub: Hub, now: answers.State) -> DiagnosticStatus:
-    message = "nobody drives" if now.holder is None else f"{now.holder} drives"
-    values = {"participants": str(len(hub.participants)), "stop port": hub.stop_path.problem}
-    return _status("katana450: driver", OK, message, values)
-
-
-def _status(name: str, level: int, message: str, values: Mapping[str, str]) -> DiagnosticStatus:
     pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
     return DiagnosticStatus(
-        level=level, name=name, message=message, hardware_id="katana450", values=pairs
+        level=level, name="katana450: arm", message=message, hardware_id="katana450", values=pairs
     )
 
 

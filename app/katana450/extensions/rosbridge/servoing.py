@@ -18,7 +18,7 @@ import numpy as np
 from katana450.arm.control.joint_commands import JOG_TIME
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.rosbridge.messages import (
-    GivenHeader,
+    Header,
     JointJog,
     Twist,
     TwistStamped,
@@ -46,7 +46,7 @@ LINEAR_SCALE, ROTATIONAL_SCALE, JOINT_SCALE = 0.4, 0.8, 0.5
 of pitch and roll [rad/s], of a joint [rad/s or m/s]."""
 
 
-def check_fresh(header: GivenHeader, now: float) -> None:
+def check_fresh(header: Header, now: float) -> None:
     """Raise InputError if ``header`` is older than COMMAND_TIMEOUT at ``now`` [s since the epoch].
 
     A stamp of zero stands for the time of receipt.

@@ -52,6 +52,7 @@ class LastHeartbeat:
     Attributes:
         open: Number of its requests that wait for the end of a motion. While there is one, its open
             connection counts as a heartbeat.
+        pinged: Whether it answers pings, so that an open connection alone is no heartbeat.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -61,6 +62,7 @@ class LastHeartbeat:
         self._least_delay = LeastDelay()
         self._delays: deque[float] = deque(maxlen=RECENT_MESSAGES)
         self.open = 0
+        self.pinged = False
 
     def note(self, sent: float | None = None, limit: float = math.inf) -> float:
         """Note that a message of the participant is being handled; return its delay [s].
@@ -87,7 +89,8 @@ class LastHeartbeat:
     @property
     def newest(self) -> float:
         """Time of the newest heartbeat [s], on the clock."""
-        return self._clock() if self.open and self._is_connected() else self._newest
+        waits = self.open and not self.pinged and self._is_connected()
+        return self._clock() if waits else self._newest
 
     def _age(self) -> float:
         """Return the age of the newest message [s]."""
