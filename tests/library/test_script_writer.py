@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 
 import numpy as np
@@ -77,18 +78,18 @@ def everything() -> katana450.ScriptWriter:
         p.pose("corner", [320, -40, 150], pitch=50, roll=0)
         p.pose("folded", joints=(0, -68, 85, 8, 0))
         p.home()
-        p.joints(0, -68, 85, 8, 0)
+        p.joints([0, -68, 85, 8, 0])
         p.nudge(5, "0.2 rad")
         p.move("corner")
         p.move(np.array([1, 2, 3]), pitch=40, branch="front-up")
         p.move(by={"z": "2 cm"}, roll=3)
-        p.via("corner", "folded", blend=0.4)
+        p.via(["corner", "folded"], blend=0.4)
         p.line("corner", pitch=45)
         p.line(by=(0, 10, 0))
-        p.lines("corner", {"x": 1, "y": 2, "z": 3}, blend=0)
+        p.lines(["corner", {"x": 1, "y": 2, "z": 3}], blend=0)
         p.arc("corner", "z", 20, climb=5)
         p.circle((320, 0, 150), "x", 20, turns=2, pitch="roomiest")
-        p.trajectory([0, 0.5], [[0, -68, 85, 8, 0], [5, -68, 85, 8, 0]])
+        p.trajectory([[0, 0, -68, 85, 8, 0], [0.5, 5, -68, 85, 8, 0]])
         p.gripper("open")
         p.gripper("closed", holding="cup")
         p.grip("3 N", holding="cup")
@@ -116,6 +117,16 @@ def everything() -> katana450.ScriptWriter:
 def test_every_step_is_written_as_in_yaml() -> None:
     parse(ALL)
     assert loaded(str(everything())) == loaded(ALL)
+
+
+def test_signature_and_documentation_are_those_of_the_step() -> None:
+    signature = inspect.signature(katana450.ScriptWriter.pour)
+    assert str(signature) == "(self, into, *, from_=None, ml=None, shake=None)"
+    text = inspect.getdoc(katana450.ScriptWriter.nudge) or ""
+    assert text.startswith("Turn one joint by an angle.")
+    assert "Args:\n    axis: Number of the joint, from 1." in text
+    with pytest.raises(TypeError, match="by"):
+        katana450.ScriptWriter({}).nudge(1)  # type: ignore[call-arg]
 
 
 def test_there_is_a_method_for_every_step() -> None:

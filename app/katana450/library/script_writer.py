@@ -15,6 +15,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import files_in
+from katana450.library.step_methods import StepMethods
 from katana450.maths.geometry.arrays import FloatArray
 
 Number = float | str
@@ -23,40 +24,18 @@ Number = float | str
 Point = Sequence[Number] | FloatArray | Mapping[str, Number] | str
 """A point: three numbers, {x, y, z}, or the name of a pose."""
 
-Place = Mapping[str, Any] | str
-"""A place: the name of a pose, {"joints": [...]}, or {x, y, z, pitch, roll, yaw, branch}."""
 
-
-class OrientationOptions(TypedDict, total=False):
-    """The orientation of the tool [deg]; what is absent stays."""
+class PlaceOptions(TypedDict, total=False):
+    """The orientation of the tool [deg], and the branch of the arm, such as "front-up"."""
 
     pitch: Number | None
     roll: Number | None
     yaw: Number | None
-
-
-class PlaceOptions(OrientationOptions, total=False):
-    """The orientation of the tool, and the branch of the arm, such as "front-up"."""
-
     branch: str | None
 
 
-class PathOptions(OrientationOptions, total=False):
-    """The orientation of the tool at the end of a path, and its speed along it [mm/s]."""
-
-    feed: Number | None
-
-
-class GraspOptions(TypedDict, total=False):
-    """Side of a grasp, "front" or "above", its pitch [deg] and its height [mm]."""
-
-    side: str | None
-    pitch: Number | None
-    height: Number | None
-
-
-class ScriptWriter:
-    """A script under construction; see `program`."""
+class ScriptWriter(StepMethods):
+    """A script under construction, with a method for each step; see `program`."""
 
     def __init__(self, head: Mapping[str, Any]) -> None:
         """Begin a script with the fields ``head``; None leaves a field out."""
@@ -120,14 +99,14 @@ class ScriptWriter:
         """
         with self._block() as inside:
             yield
-        self._add("repeat", times=times, until=until, steps=inside)
+        self.write("repeat", given(times=times, until=until, steps=inside))
 
     @contextmanager
     def when(self, **condition: Any) -> Iterator[None]:
         """Do the steps of the block if a condition holds when it is reached: ``held="cup"``."""
         with self._block() as inside:
             yield
-        self._add("if", **condition, then=inside)
+        self.write("if", {**condition, "then": inside})
 
     @contextmanager
     def otherwise(self) -> Iterator[None]:
@@ -152,18 +131,6 @@ class ScriptWriter:
         finally:
             self._steps = outside
 
-    def home(self) -> None:
-        """Move to the ready posture."""
-        self._steps.append("home")
-
-    def joints(self, *angles: Number) -> None:
-        """Move to five joint angles [deg], round obstacles."""
-        self._add("joints", "q", q=angles)
-
-    def nudge(self, axis: int, by: Number) -> None:
-        """Turn the joint ``axis``, 1 to 5, by an angle [deg]."""
-        self._add("nudge", axis=axis, by=by)
-
     def move(
         self, to: Point | None = None, *, by: Point | None = None, **how: Unpack[PlaceOptions]
     ) -> None:
@@ -171,138 +138,14 @@ class ScriptWriter:
         if to is not None and by is not None:
             raise InputError("A move takes `to` or `by`, not both.")
         if by is not None:
-            self._add("move", by=by, **how)
+            self.write("move", {"by": by, **given(**how)})
         else:
             is_name = isinstance(to, str) and not how
-            self._add("move", "to", to=to if is_name else place_value(to, how))
+            self.write("move", to if is_name else place_value(to, how))
 
-    def via(self, *places: Place, blend: float | None = None) -> None:
-        """Move the joints through places with rounded corners."""
-        self._add("via", through=places, blend=blend)
-
-    def line(
-        self, to: Point | None = None, *, by: Point | None = None, **how: Unpack[PathOptions]
-    ) -> None:
-        """Move the tool point on a straight line, to a point or by an offset [mm]."""
-        self._add("line", to=to, by=by, **how)
-
-    def lines(self, *places: Place, blend: float | None = None, feed: Number | None = None) -> None:
-        """Move the tool point on straight lines through places with rounded corners."""
-        self._add("lines", through=places, blend=blend, feed=feed)
-
-    def arc(
-        self,
-        centre: Point,
-        axis: str | Sequence[float],
-        angle: Number,
-        *,
-        climb: Number | None = None,
-        **how: Unpack[PathOptions],
-    ) -> None:
-        """Move the tool point round an axis through ``centre`` [mm] by an angle [deg]."""
-        self._add("arc", centre=centre, axis=axis, angle=angle, climb=climb, **how)
-
-    def circle(
-        self,
-        centre: Point,
-        normal: str | Sequence[float],
-        radius: Number,
-        *,
-        turns: Number | None = None,
-        branch: str | None = None,
-        **how: Unpack[PathOptions],
-    ) -> None:
-        """Move to the highest point of a circle [mm], then round it."""
-        self._add(
-            "circle", centre=centre, normal=normal, radius=radius, turns=turns, branch=branch, **how
-        )
-
-    def trajectory(self, times: Sequence[Number], postures: Sequence[Sequence[Number]]) -> None:
-        """Move through joint angles [deg] at times [s], slower where limits require."""
-        rows = zip(times, postures, strict=True)
-        self._add("trajectory", through=[[time, *angles] for time, angles in rows])
-
-    def gripper(self, where: Number, *, holding: str | None = None) -> None:
-        """Open or close the fingers: "open", "closed", or an angle [deg], [mm] if they slide.
-
-        With ``holding`` they must hold this object then.
-        """
-        self._add("gripper", "to", to=where, holding=holding)
-
-    def grip(self, until: Number, *, holding: str | None = None) -> None:
-        """Close the fingers until they press with a force [N].
-
-        With ``holding`` they must hold this object then.
-        """
-        self._add("grip", until=until, holding=holding)
-
-    def wait(self, seconds: Number) -> None:
-        """Wait [s]."""
-        self._add("wait", "seconds", seconds=seconds)
-
-    def wait_for(self, *, timeout: Number | None = None, **condition: Any) -> None:
-        """Wait until a condition holds, such as ``held="cup"``; see docs/programs.md."""
-        self._add("wait_for", **condition, timeout=timeout)
-
-    def tool(self, name: str) -> None:
-        """Use another tool frame for all later points."""
-        self._add("tool", "name", name=name)
-
-    def speed(self, fraction: Number) -> None:
-        """Limit all later motions to a fraction of full speed."""
-        self._add("speed", "value", value=fraction)
-
-    def put(self, name: str, x: Number, y: Number) -> None:
-        """Set an object to another place on the table [mm], without the arm."""
-        self._add("put", object=name, x=x, y=y)
-
-    def fill(self, ml: Number) -> None:
-        """Fill the cup with water [ml]."""
-        self._add("fill", "ml", ml=ml)
-
-    def grasp(self, name: str, **how: Unpack[GraspOptions]) -> None:
-        """Grasp an object where it stands, from the "front" or from "above".
-
-        Side, pitch [deg] and height [mm] are found unless given.
-        """
-        self._add("grasp", "object", object=name, **how)
-
-    def pick(self, name: str, **how: Unpack[GraspOptions]) -> None:
-        """Grasp an object as ``grasp`` does, and lift it."""
-        self._add("pick", "object", object=name, **how)
-
-    def place(self, at: Point | None = None, *, on: str | None = None) -> None:
-        """Put the held object down, upright, at a place, or on another object.
-
-        The place is x, y and, if wanted, z [mm] of its underside and its yaw [deg].
-        """
-        self._add("place", at=at, on=on)
-
-    def release(self) -> None:
-        """Open the fingers on the held object where it is."""
-        self._steps.append("release")
-
-    def pour(
-        self,
-        into: str,
-        *,
-        ml: Number | None = None,
-        shake: int | None = None,
-    ) -> None:
-        """Pour the cup in the hand into an object: all of it or some [ml]."""
-        self._add("pour", "into", into=into, ml=ml, shake=shake)
-
-    def set_down(self) -> None:
-        """Put the held object back to where it was grasped."""
-        self._steps.append("set_down")
-
-    def _add(self, step: str, short: str = "", /, **fields: Any) -> None:
-        """Append a step with those fields that are not None.
-
-        ``short``: the field that is the value of the step if no other one is given.
-        """
-        value = given(**fields)
-        self._steps.append({step: plain(value[short] if [*value] == [short] else value)})
+    def write(self, step: str, content: Any) -> None:
+        """Append a step with its content as in a script, {} for none."""
+        self._steps.append({step: plain(content)} if content != {} else step)
 
 
 @contextmanager

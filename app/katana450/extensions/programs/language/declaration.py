@@ -175,7 +175,7 @@ class Declared:
     @classmethod
     def read(cls, value: YamlValue, context: ScriptContext) -> Self:
         """Read the value. Raises ScriptError with all mistakes."""
-        parts, others = _declaration(cls)
+        parts, others = declaration_of(cls)
         if not parts:
             if value.kind != "nothing":
                 raise value.wrong(f"{cls.noun.capitalize()} takes no value. Remove it.")
@@ -217,7 +217,7 @@ class Declared:
     def schema(cls) -> Schema:
         """Return the JSON Schema of the value."""
         about = " ".join((cls.__doc__ or "").partition("\n\n")[0].split()).rstrip(".")
-        parts = _declaration(cls).parts
+        parts = declaration_of(cls).parts
         if not parts:
             return {"type": "null", "description": about}
         short = parts[cls.short].kind if cls.short else None
@@ -263,7 +263,7 @@ class _Declaration(NamedTuple):
 _DECLARATIONS: dict[type[Declared], _Declaration] = {}
 
 
-def _declaration(declared: type[Declared]) -> _Declaration:
+def declaration_of(declared: type[Declared]) -> _Declaration:
     """Return the attributes of a class, each in their order."""
     if declared not in _DECLARATIONS:
         hints: dict[str, Any] = {}

@@ -1,30 +1,22 @@
-"""All program steps by name: the modules of the steps enter their classes.
+"""All program steps by name: the modules of this folder enter their classes.
 
-To add a kind, write a class as ``Step`` describes it. List a new module here. Extensions of other
-distributions add steps by their part ``step``.
+To add a kind, write a class as ``Step`` describes it. Extensions of other distributions add steps
+by their part ``step``.
 """
 
 from __future__ import annotations
 
-from katana450.extension import provided
-from katana450.extensions.programs.building.step import STEPS
-from katana450.extensions.programs.steps import (
-    grasp,
-    moves,
-    place,
-    pouring,
-    settings_steps,
-    tool_moves,
-    trajectory,
-)
+from importlib import import_module
+from pkgutil import iter_modules
 
-MODULES = (
-    moves, tool_moves, settings_steps, grasp, pouring, place,
-    trajectory,
-)  # fmt: skip
-"""The modules with steps."""
+from katana450.extension import provided
+from katana450.extensions.programs import steps
+from katana450.extensions.programs.building.step import STEPS
+
+for module in iter_modules(steps.__path__):
+    import_module(f"{steps.__name__}.{module.name}")
 
 ADDED = tuple(provided("step"))
 """The steps of other distributions."""
 
-__all__ = ["MODULES", "STEPS"]
+__all__ = ["STEPS"]

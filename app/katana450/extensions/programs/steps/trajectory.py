@@ -113,7 +113,9 @@ class FollowTrajectory(Step, word="trajectory"):
         through: (m, 1 + n) rows of a time [s], from any zero, and a posture [rad].
     """
 
-    through: Annotated[FloatArray, Kind(_rows, POSTURES.schema)]
+    through: Annotated[
+        FloatArray, Kind(_rows, POSTURES.schema).about("Rows of a time, s, and all angles, deg")
+    ]
 
     def build(self, plan: PlanState) -> PlanState:
         """Plan the way to the start, and the trajectory.
