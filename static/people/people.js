@@ -1,6 +1,5 @@
 // Who is connected, for admins: a list with buttons that disconnect.
 const EVERY = 1000; // ms between two queries while the list is open
-const KINDS = { page: "page", scene: "scene", program: "program", lines: "TCP", posts: "HTTP" };
 const CONTENT = `
   <form method="dialog"><h1 id="people-title">Who is connected</h1><button class="main" autofocus>Close</button></form>
   <p id="people-for"><label>Disconnect for <select id="kick-for">
@@ -15,23 +14,15 @@ const byId = (id) => document.getElementById(id);
 
 const time = (since) => new Date(since).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
 
-// "2 pages, scene, TCP": the kinds of connections with their numbers.
-function connections(all) {
-  const kinds = Object.keys(KINDS).map((kind) => [kind, all.filter((each) => each.kind === kind).length]);
-  const words = kinds.filter(([, count]) => count);
-  return words.map(([kind, count]) => (count > 1 ? `${count} × ${KINDS[kind]}` : KINDS[kind])).join(", ");
-}
-
 function about(person) {
-  const { role, drives, asks, program, connections: all, refused, kept_out: out, link } = person;
-  const addresses = [...new Set(all.map(({ address }) => address))].join(", ");
+  const { role, drives, asks, program, connections, kept_out: out, link } = person;
+  const addresses = [...new Set(connections.map(({ address }) => address))].join(", ");
   return [
     role,
     drives && (program ? `runs ${program}` : "drives"),
     asks && "asks for the arm",
-    all.length > 0 && `${connections(all)} from ${addresses} since ${time(all[0].since)}`,
+    connections.length > 0 && `connected from ${addresses} since ${time(connections[0].since)}`,
     link && `link ${link.slice(0, 6)}`,
-    refused > 0 && `${refused} refused`,
     out !== null && `disconnected for ${Math.ceil(out / 60)} min`,
   ].filter(Boolean).join(" · ");
 }

@@ -72,8 +72,7 @@ def test_admin_sees_everybody_with_all_connections(
         assert [each["you"] for each in people.values()] == [True, False, False]
         assert [each["drives"] for each in people.values()] == [False, False, True]
         assert [each["role"] for each in people.values()] == ["admin", "viewer", "operator"]
-        kinds = [[one["kind"] for one in each["connections"]] for each in people.values()]
-        assert kinds == [["page"], ["page"], ["page", "program", "program"]]
+        assert [len(each["connections"]) for each in people.values()] == [1, 1, 3]
         oda = people["Oda"]["connections"]
         assert [each["name"] for each in oda[1:]] == ["Oda, Sorter", "Oda, Lathe"]
         assert {each["address"] for each in oda} == {"127.0.0.1"}
@@ -83,7 +82,6 @@ def test_admin_sees_everybody_with_all_connections(
         for nobody in (watcher, driver):
             assert (await asked(nobody, "list_people"))["is"] == "refused"
             assert (await asked(nobody, "kick", person=1))["why"] == "Only an admin may do this."
-        assert (await listed(admin))["Vera"]["refused"] == 2
         await other.close()
         assert len((await listed(admin))["Oda"]["connections"]) == 2
         for each in (admin, watcher, driver):

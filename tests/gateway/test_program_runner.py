@@ -29,7 +29,7 @@ from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from tests.gateway.test_hub import PAGES, Table
 
 NOBODY = Person("nobody", "Nobody", Role.ADMIN)
@@ -361,7 +361,7 @@ def test_unattended_program_of_a_disconnected_person_ends(
     people = table.hub.people
     people.links = Mock()
     oda = Identity("oda", "Oda", Role.OPERATOR, "oda", "Oda")
-    connection = Connection(oda, ConnectionKind.PAGE, "127.0.0.1")
+    connection = Connection(oda, "127.0.0.1")
     people.add(connection)
     owner = table.hub.join(oda, "page", lambda _: None)
     admin = table.hub.join(Identity("ada", "Ada", Role.ADMIN), "page", lambda _: None)

@@ -28,7 +28,7 @@ from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import driver_key
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.channel import Channel, GoneError, JsonChannel, WebSocketJsonChannel
 from katana450.server.web.limits import TokenBucket
@@ -109,8 +109,6 @@ class RosChannel(Channel):
 
     def refuse(self, why: str, request_id: Any, **_more: float) -> None:
         """Send a status with the reason ``why``."""
-        if self.participant is not None:
-            self.hub.people.refused(session_of(self.participant.person.key))
         self.notify(status(why, request_id))
 
     def unasked(self, *, urgent: bool) -> tuple[Any, float | None]:

@@ -13,7 +13,7 @@ from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, session_of
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from katana450.server.service.runner import RequestHandler
 
 log = logging.getLogger(__name__)
@@ -113,7 +113,6 @@ class PeopleRequests(RequestHandler):
             drives=session in hub.drivers,
             asks=any(session_of(other.key) == session for other in hub.lease.waiting),
             program=program.person.name if program is not None and owns else None,
-            refused=people.refusals(session),
             kept_out=round(kept_out, 1) if kept_out else None,
             connections=tuple(map(self._connection, connections.get(session, ()))),
         )
@@ -130,16 +129,9 @@ class PeopleRequests(RequestHandler):
 
     def _connection(self, connection: Connection) -> answers.PersonConnection:
         participant = self.hub.participant(connection.key)
-        scene = connection.kind is ConnectionKind.SCENE
-        return answers.PersonConnection(
-            kind=connection.kind.value,
-            name=(connection.identity.name or "")
-            if participant is None
-            else participant.person.name,
-            number=None if participant is None or scene else participant.number,
-            address=connection.address,
-            since=datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds"),
-        )
+        name = connection.identity.name if participant is None else participant.person.name
+        since = datetime.fromtimestamp(connection.since, UTC).isoformat(timespec="seconds")
+        return answers.PersonConnection(name=name or "", address=connection.address, since=since)
 
 
 def _report(participant: Participant, why: str) -> None:

@@ -10,11 +10,9 @@ import asyncio
 import logging
 import math
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from enum import Enum
 from typing import Protocol
 
 from katana450.errors import KatanaError
@@ -23,23 +21,7 @@ from katana450.server.service.identity import Identity
 log = logging.getLogger(__name__)
 
 MAX_REMEMBERED = 1024
-"""Number of identities whose numbers and refusals are remembered, beside those that are connected
-or kept out."""
-
-
-class ConnectionKind(Enum):
-    """Kind of a connection."""
-
-    PAGE = "page"
-    """The control socket of a page."""
-    SCENE = "scene"
-    """The 3D scene of a page."""
-    PROGRAM = "program"
-    """A program on a websocket."""
-    LINES = "lines"
-    """A program on the TCP port."""
-    POSTS = "posts"
-    """A program that sends single requests over HTTP."""
+"""Number of identities that are remembered, beside those that are connected or kept out."""
 
 
 class LinkStore(Protocol):
@@ -55,7 +37,6 @@ class Connection:
 
     Attributes:
         identity: Identity of the client.
-        kind: Kind of the connection.
         address: Host address of the client, as the server sees it.
         key: Key of its participant; empty without one.
         since: Time at which it was opened [s since the epoch].
@@ -63,7 +44,6 @@ class Connection:
     """
 
     identity: Identity
-    kind: ConnectionKind
     address: str
     key: str = ""
     since: float = field(default_factory=time.time)
@@ -71,7 +51,7 @@ class Connection:
 
 
 class People:
-    """The connections of all identities, their refused requests, and who is kept out.
+    """The connections of all identities, and who is kept out.
 
     Used in the server's thread alone.
     """
@@ -83,7 +63,6 @@ class People:
         self._connections: dict[Connection, None] = {}
         self._known: dict[str, tuple[int, Identity]] = {}
         self._counted = 0
-        self._refusals: Counter[str] = Counter()
         self._kept_out: dict[str, float] = {}
         self._writing = asyncio.Lock()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -129,7 +108,6 @@ class People:
             )
             if oldest != identity.session:
                 del self._known[oldest]
-                self._refusals.pop(oldest, None)
 
     def identity(self, number: int) -> Identity | None:
         """Return the identity with ``number``; None if it is not remembered."""
@@ -151,17 +129,6 @@ class People:
         present = {connection.identity.session for connection in self._connections}
         absent = {key for key in tuple(self._kept_out) if 0.0 < self.kept_out(key) < math.inf}
         return present | absent
-
-    # Refusals
-
-    def refused(self, session: str) -> None:
-        """Count a refused request of ``session``, if it is remembered."""
-        if session in self._known:
-            self._refusals[session] += 1
-
-    def refusals(self, session: str) -> int:
-        """Return the number of refused requests of ``session``."""
-        return self._refusals[session]
 
     # Kick
 

@@ -20,7 +20,7 @@ from katana450.server.service.heartbeats import LeastDelay
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE, Identity
 from katana450.server.service.participants import actor_of, key_of
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from katana450.server.viser_bridge.flow import FlowControl
 from katana450.server.viser_bridge.frames import FRAME_SLOT_HEADER, FrameSlot, Stamp
 from katana450.server.viser_bridge.guard import Guard
@@ -101,7 +101,7 @@ class Proxy:
                 why = await self._authenticator.run_while_authorised(
                     lambda: self._authenticator.identity(browser.cookies),
                     line.run(upstream),
-                    Connection(identity, ConnectionKind.SCENE, address_of(browser), key=key),
+                    Connection(identity, address_of(browser), key=key),
                 )
                 if why is not None:
                     await browser.close(SIGN_IN_CLOSE_CODE, why)

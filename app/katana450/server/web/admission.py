@@ -136,7 +136,6 @@ class Admission:
                 with self._acceptor.kept(client):
                     await self._app(scope, receive, send)
                 return
-            self._hub.people.refused(who.session)
             error = TOO_MANY_SOCKETS if socket else TOO_MANY_REQUESTS
             what = "connection" if socket else "request"
             actor = actor_of(who, channel_of(scope), address_of(connection))

@@ -23,7 +23,7 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival
 from katana450.server.service.hub import Hub
-from katana450.server.service.participants import Participant, session_of
+from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
 from katana450.server.web.limits import TokenBucket
@@ -207,8 +207,6 @@ class Channel(ABC):
 
     def refuse(self, why: str, request_id: Id, **more: float) -> None:
         """Send a refusal of the request of ``request_id``. ``more``: fields of ``Refused``."""
-        if self.participant is not None:
-            self.hub.people.refused(session_of(self.participant.person.key))
         self.notify({"is": "refused", "why": why, "id": request_id, **more})
 
     def wake(self) -> None:

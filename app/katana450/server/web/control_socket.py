@@ -16,7 +16,7 @@ from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import Participant
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
@@ -82,9 +82,7 @@ async def serve(
     control = ControlSocket(hub, line, budgets.of(identity.session))
     identity = replace(identity, address=address_of(socket))
     control.participant = participant = hub.join(identity, page, control.notify, line.arrival)
-    connection = Connection(
-        identity, ConnectionKind.PAGE, address_of(socket), key=participant.person.key
-    )
+    connection = Connection(identity, address_of(socket), key=participant.person.key)
     try:
         why = await authenticator.run_while_authorised(
             lambda: authenticator.identity(socket.cookies), control.run(participant), connection

@@ -29,7 +29,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import SHARED_SESSION, Participant, actor_of, session_of
 from katana450.server.service.pending_answer import ARRIVED, PendingAnswer
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web import program_socket
 from katana450.server.web.admission import address_of, identity
@@ -132,7 +132,6 @@ class Api:
                 with self._budget(request).charged(driver, fixed=HTTP_REQUEST_COST):
                     return as_json(self._dispatcher.query(subject))
             except BusyError as error:
-                self._refused(request)
                 self._note_flood(identity, error)
                 return await _too_much(error)
             except LeaseError as error:
@@ -177,17 +176,14 @@ class Api:
             failed = isinstance(answer, answers.Refused) or (end and end.how not in ARRIVED)
             return as_json(answer, NOT_NOW if failed else 200)
         except BusyError as error:
-            self._refused(request)
             self._note_flood(identity, error)
             return await _too_much(error, requests.id_of(body))
         except InputError as error:
-            self._refused(request)
             actor = actor_of(identity, CommandChannel.HTTP)
             self._hub.recorder.refuse("invalid", actor, error)
             refused = answers.Refused(why=str(error), id=requests.id_of(body))
             return as_json(refused, NOT_UNDERSTOOD)
         except LeaseError as error:
-            self._refused(request)
             return as_json(answers.Refused(why=str(error), id=requests.id_of(body)), NOT_NOW)
 
     async def _watched(
@@ -223,15 +219,11 @@ class Api:
             token = request.headers.get("authorization", "")
             return self._authenticator.program("", token, request.cookies)
 
-        key, kind = participant.person.key, ConnectionKind.POSTS
+        key = participant.person.key
         identity = replace(identity, session=session_of(key))
-        connection = Connection(identity, kind, address_of(request), key=key)
+        connection = Connection(identity, address_of(request), key=key)
         why = await self._authenticator.run_while_authorised(current, work(), connection)
         return results[0] if results else answers.Refused(why=why or "The connection was closed.")
-
-    def _refused(self, request: Request) -> None:
-        """Add one to the refused requests of the sender of ``request``."""
-        self._hub.people.refused(identity(self._authenticator, request) or address_of(request))
 
     def _note_flood(self, identity: Identity, error: BusyError) -> None:
         self._hub.recorder.refuse("any", actor_of(identity, CommandChannel.HTTP), error)
@@ -277,8 +269,7 @@ class Api:
                 identity, page, lambda _notice: None, channel=CommandChannel.HTTP
             )
             assert participant.person.key == key
-            kind, address = ConnectionKind.POSTS, address_of(request)
-            connection = Connection(identity, kind, address, key=key)
+            connection = Connection(identity, address_of(request), key=key)
             self._hub.people.add(connection)
         else:
             participant, connection, timer = known

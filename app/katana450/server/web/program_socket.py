@@ -27,7 +27,7 @@ from katana450.server.service.heartbeats import Arrival
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of
-from katana450.server.service.people import Connection, ConnectionKind
+from katana450.server.service.people import Connection
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import (
@@ -78,12 +78,6 @@ class ProgramClient(NamedTuple):
     channel: CommandChannel
     address: str
     why: str
-
-    @property
-    def kind(self) -> ConnectionKind:
-        """Kind of the connection in the list of people."""
-        tcp = self.channel is CommandChannel.TCP
-        return ConnectionKind.LINES if tcp else ConnectionKind.PROGRAM
 
 
 class ProgramChannel(Channel):
@@ -313,7 +307,7 @@ async def _serve(
     sender = replace(sender, address=client.address)
     participant = hub.join(sender, page, program.notify, line.arrival, client.channel)
     program.greet(participant)
-    connection = Connection(sender, client.kind, client.address, key=participant.person.key)
+    connection = Connection(sender, client.address, key=participant.person.key)
     try:
         why = await authenticator.run_while_authorised(
             client.identity, program.run(participant), connection
