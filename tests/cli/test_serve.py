@@ -115,15 +115,6 @@ def test_viewer_stops_on_request(number: signal.Signals) -> None:
     assert output == ""
 
 
-def test_late_start_failure_reports_only_its_reason(tmp_path: Path) -> None:
-    (tmp_path / "map.npz").write_text("no map")
-    done = serve("--port", str(free_port()), "--workspace", str(tmp_path / "map.npz"))
-    assert done.returncode == 1
-    (message,) = done.stderr.strip().splitlines()
-    assert "map.npz is corrupt or not a reachability map" in message
-    assert "viser" not in done.stdout
-
-
 def test_the_command_prints_its_version_and_its_commands(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

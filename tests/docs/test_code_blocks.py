@@ -70,7 +70,6 @@ RUN = ("katana450 access give", "katana450 run square.yaml --dry-run")
 RUN_LONG = (
     "katana450 demo circle --headless",
     "katana450 run square.yaml --headless",
-    "katana450 workspace",
 )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from katana450.extension import Extension, extensions, load
 from katana450.server.api.fields import ROOT as ROOT_PATH
-from tests.browser.server import AppServer, free_port
+from tests.browser.server import AppServer
 from tests.commands import completed
 from tests.extensions.environments import distribution
 
@@ -78,15 +78,6 @@ def test_every_part_of_the_built_in_extensions_is_found() -> None:
             targets += [command.add_options, command.run]
         for target in targets:
             assert target is None or callable(load(target)), (extension.name, target)
-
-
-@pytest.mark.long
-def test_map_is_refused_for_a_mechanism_that_is_not_an_arm(tmp_path: Path) -> None:
-    gantry = str(ROOT / "tests" / "exchange" / "gantry.urdf")
-    options = ("--urdf", gantry, "--workspace", str(tmp_path / "map.npz"))
-    output = katana450("serve", "--port", str(free_port()), *options)
-    assert output.startswith("1 ")
-    assert "map.npz is a map of the points that a tool reaches. " in output
 
 
 @pytest.mark.long

@@ -43,14 +43,6 @@ def test_corners_are_multiples_of_the_edge_for_any_place_of_the_arm(grid: VoxelG
     assert np.allclose(corners, np.rint(corners), atol=1e-9)
 
 
-def test_chunks_are_all_voxels_once_in_order(grid: VoxelGrid) -> None:
-    chunks = grid.chunks(100)
-    assert [index for chunk in chunks for index in chunk] == list(range(len(grid)))
-    assert {len(chunk) for chunk in chunks[:-1]} == {100}
-    whole = grid.centers(range(len(grid)))
-    assert np.array_equal(np.concatenate([grid.centers(chunk) for chunk in chunks]), whole)
-
-
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-4, 1.0, math.nan, math.inf])
 def test_an_invalid_voxel_is_refused(size: float) -> None:
     with pytest.raises(InputError, match="it must be from 1 to 250 mm"):

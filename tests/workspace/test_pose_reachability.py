@@ -10,7 +10,7 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.reachability.map import survey_of
+from katana450.extensions.reachability.map import reachability_map
 from katana450.extensions.reachability.reachability import PoseSolver, Reachability, rotations
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -121,8 +121,7 @@ def test_other_arms_reach_points_in_some_orientation(chain: Chain) -> None:
 
 @pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, UR5E])
 def test_map_has_fractions(chain: Chain) -> None:
-    survey = survey_of(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
-    found = survey.map(survey.count(chunk) for chunk in survey.chunks())
+    found = reachability_map(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
     assert len(found.points) > 10
     assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
     assert (found.points[:, 2] >= 0.0).all()
@@ -130,4 +129,4 @@ def test_map_has_fractions(chain: Chain) -> None:
 
 def test_map_that_would_take_too_long_is_refused_with_what_to_do() -> None:
     with pytest.raises(InputError, match=r"would take .*axis 7 as the swivel.*larger voxels"):
-        survey_of(PANDA, STAND, voxel=0.01)
+        reachability_map(PANDA, STAND, voxel=0.01)

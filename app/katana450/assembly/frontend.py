@@ -15,7 +15,6 @@ from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.assembly.gateway import Gateway
 from katana450.assembly.robot_session import find_robot
-from katana450.errors import ConfigurationError
 from katana450.extension import ServerFacts, results
 from katana450.server.service.arm_handle import ArmHandle, Nodes
 from katana450.server.service.command_gate import guarded
@@ -42,7 +41,6 @@ class Frontend:
             ended: set when the server ends.
 
         Raises:
-            ConfigurationError: an option needs an arm, but the robot has none.
             EOFError: the server ends, or the arm's process has closed the pipe.
         """
         self._gateway, self._config = gateway, config
@@ -57,9 +55,6 @@ class Frontend:
         self.pipe.on_stop_change = partial(gateway.soon, gateway.hub.follow_stop)
         self.pipe.on_command_at_rest = partial(gateway.soon, gateway.watch_closely)
         if robot.arm is None:
-            for layer in added:
-                if layer.what:
-                    raise ConfigurationError(f"{layer.what} {robot.why}")
             added = tuple(layer for layer in added if not layer.needs_arm)
         self.view = View(
             gateway.viser,

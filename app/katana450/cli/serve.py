@@ -103,7 +103,7 @@ def serve(options: Namespace) -> int:
                 return 0
             again, before = True, options
             # What belongs to the robot before is left out.
-            others = dict.fromkeys(("tool", "scene", "workspace", "xacro_arg", "robot_problem"))
+            others = dict.fromkeys(("tool", "scene", "xacro_arg", "robot_problem"))
             first = {"first_urdf": options.urdf, **vars(options)}
             options = Namespace(**{**first, **others, "urdf": chosen, "objects": []})
     finally:

@@ -54,19 +54,6 @@ EXTENSIONS = (
         routes=f"{HERE}.importers.serve_parts:upload_routes",
     ),
     Extension(
-        "reachability",
-        (
-            CliCommand(
-                "workspace",
-                "map where the tool can be, and how freely it can be turned there",
-                f"{HERE}.reachability.options:add_workspace_options",
-                f"{HERE}.reachability.workspace:workspace",
-            ),
-        ),
-        serve_options=f"{HERE}.reachability.options:add_serve_options",
-        view_layer=f"{HERE}.reachability.options:chosen_map",
-    ),
-    Extension(
         "export",
         (
             CliCommand(

@@ -18,7 +18,7 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
 from katana450.extensions.programs.language.places import ROOMIEST
-from katana450.extensions.reachability.map import ReachabilityMap, survey_of
+from katana450.extensions.reachability.map import ReachabilityMap, reachability_map
 from katana450.library.motion_plan import MotionPlan
 from katana450.library.planner import Planner
 from katana450.library.pose_frame import PoseFrame, dimensions
@@ -418,8 +418,7 @@ class Arm:
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
-        survey = survey_of(self.chain, self._planned.T_base_shoulder, table, voxel)
-        return survey.map(survey.count(chunk) for chunk in survey.chunks())
+        return reachability_map(self.chain, self._planned.T_base_shoulder, table, voxel)
 
     def show(
         self,

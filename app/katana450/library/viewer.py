@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +28,6 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
-
-if TYPE_CHECKING:
-    pass
 
 FRAME_TIME = 1.0 / 60.0
 """[s] Time from one frame to the next."""

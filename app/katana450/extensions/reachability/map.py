@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.swivel import SevenAxes
-from katana450.extensions.reachability.reachability import FREE_AXES, IntArray, Reachability
+from katana450.extensions.reachability.reachability import FREE_AXES, Reachability
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 
-POSES = 65536
-"""Poses per chunk: 50 MB each, and enough chunks for a progress bar and all cores."""
+POSES: Final = 65536
+"""Number of poses that are solved at once; they take 50 MB."""
 
 
 MIN_VOXEL = 1e-3
@@ -74,10 +72,6 @@ class VoxelGrid:
     def __len__(self) -> int:
         return math.prod(self.shape)
 
-    def chunks(self, length: int) -> list[range]:
-        """Return all flat indices in their order, in ranges of ``length``."""
-        return [range(len(self))[start : start + length] for start in range(0, len(self), length)]
-
     def centers(self, indices: npt.ArrayLike) -> FloatArray:
         """Return the centres (N, 3) of the voxels ``indices`` (N,), in the base frame [m]."""
         cells = np.stack(np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape), axis=-1)
@@ -87,7 +81,7 @@ class VoxelGrid:
 
 @dataclass(frozen=True, eq=False)
 class ReachabilityMap:
-    """The result of a survey, in the base frame [m].
+    """The points that a tool reaches, in the base frame [m].
 
     Attributes:
         points: (N, 3) centres of the voxels with at least one orientation, in the order of the
@@ -97,48 +91,6 @@ class ReachabilityMap:
 
     points: FloatArray
     fraction: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """The computation of one map, in chunks that are independent and can run in any order.
-
-    Attributes:
-        reachability: the arm and the tested orientations.
-        voxel: edge of a voxel [m].
-
-    Raises InputError for an invalid voxel or table.
-    """
-
-    reachability: Reachability
-    voxel: float
-
-    def __post_init__(self) -> None:
-        # Computed now, because it may raise InputError.
-        _ = self.grid
-
-    @cached_property
-    def grid(self) -> VoxelGrid:
-        """The voxels of the survey."""
-        arm = self.reachability
-        return VoxelGrid.around(arm.middle, arm.reach, self.voxel, arm.table)
-
-    def chunks(self) -> list[range]:
-        """Return the chunks, the arguments of ``count``."""
-        return self.grid.chunks(max(1, POSES // self.reachability.poses_at_once))
-
-    def count(self, chunk: range) -> IntArray:
-        """Return the number of orientations that are possible in each voxel of ``chunk``."""
-        return self.reachability.count(self.grid.centers(chunk))
-
-    def map(self, counts: Iterable[IntArray]) -> ReachabilityMap:
-        """Return the map from the counts of all chunks in their order."""
-        totals = np.concatenate(list(counts))
-        reached = np.flatnonzero(totals)
-        return ReachabilityMap(
-            points=self.grid.centers(reached),
-            fraction=totals[reached] / self.reachability.orientations,
-        )
 
 
 ROUND: Final = 0.005
@@ -166,10 +118,10 @@ SWIVEL: Final = Fineness(10, 12, 4, 10_000_000)
 POINTS: Final = Fineness(10, 1, 1, 200_000)
 
 
-def survey_of(
+def reachability_map(
     chain: Chain, T_base_shoulder: FloatArray, table: float = 0.0, voxel: float | None = None
-) -> Survey:
-    """Return the survey of the arm ``chain``.
+) -> ReachabilityMap:
+    """Return the map of the arm ``chain``.
 
     Args:
         chain: the arm with its tool, in {S}.
@@ -181,17 +133,25 @@ def survey_of(
     """
     kinematics = kinematics_of(chain)
     fineness = _fineness(kinematics)
-    reachability = Reachability(chain, T_base_shoulder, table, fineness.pitches, fineness.rolls)
+    arm = Reachability(chain, T_base_shoulder, table, fineness.pitches, fineness.rolls)
     if voxel is None:
-        voxel = ROUND * math.ceil(reachability.reach / fineness.voxels / ROUND)
-    survey = Survey(reachability, voxel)
-    poses = len(survey.grid) * reachability.orientations
+        voxel = ROUND * math.ceil(arm.reach / fineness.voxels / ROUND)
+    grid = VoxelGrid.around(arm.middle, arm.reach, voxel, table)
+    poses = len(grid) * arm.orientations
     if poses > fineness.poses:
         raise InputError(
             f"The map would take {poses:.2g} poses, and at most {fineness.poses:.0e} are tried for "
             f"this arm ({kinematics.method}). Choose larger voxels than {1e3 * voxel:g} mm."
         )
-    return survey
+    step = max(1, POSES // arm.poses_at_once)
+    counts = np.concatenate(
+        [
+            arm.count(grid.centers(range(len(grid))[start : start + step]))
+            for start in range(0, len(grid), step)
+        ]
+    )
+    reached = np.flatnonzero(counts)
+    return ReachabilityMap(grid.centers(reached), counts[reached] / arm.orientations)
 
 
 def _fineness(kinematics: Kinematics) -> Fineness:

@@ -44,14 +44,6 @@ class ViewLayer:
     def __init__(self, options: Namespace | None = None) -> None:
         """Take the options of ``katana450 serve``; None outside a server."""
 
-    @property
-    def what(self) -> str:
-        """Sentence that names the requested feature, which a robot without an arm cannot have.
-
-        If it is empty, the layer is left out there without a word.
-        """
-        return ""
-
     def attach(self, context: LayerContext) -> None:
         """Prepare for the arm of ``context``. Raises ConfigurationError."""
 
