@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.robot.visual import GEOMETRY_FILES, PrimitiveShape, Visual
-from katana450.extensions.convex_body import convex_body
-from katana450.maths.collision.engine import hull_triangles
+from katana450.extensions.convex_body import convex_body, hull_faces
 from katana450.maths.geometry.arrays import FloatArray
 
 MAX_PIECES = 8
@@ -119,5 +118,5 @@ def _volume(corners: FloatArray) -> float:
     spread = np.sqrt(max(float(np.linalg.eigvalsh(centred.T @ centred)[0]), 0.0))
     if len(corners) < 4 or spread < FLAT * np.sqrt(len(corners)):
         return 0.0
-    a, b, c = centred[hull_triangles(centred)].transpose(1, 0, 2)
-    return float(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum()) / 6.0
+    _, heights, areas = hull_faces(centred)
+    return float(heights @ areas) / 3.0

@@ -12,13 +12,10 @@ from katana450.arm.control.pouring import is_vessel
 from katana450.arm.control.scene_objects import MAX_OBJECTS, SceneObject, Shape
 from katana450.arm.control.state import State
 from katana450.arm.control.support import surface_below
-from katana450.maths.collision.engine import hull_triangles
+from katana450.extensions.convex_body import hull_faces
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.units import DENSITY as WATER_DENSITY
 from katana450.maths.water.units import FEMTOLITRE
-
-FLAT = 1e-12
-"""[m^2] Area of a triangle below which it has no direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +80,8 @@ def body_of(scene_object: SceneObject) -> SolidBody:
 def _hull(corners: bytes, scale: float, middle: float) -> SolidBody:
     """Return the body of a mesh about its middle, from the triangles of its convex hull."""
     points = scale * np.frombuffer(corners).reshape(-1, 3) - (0.0, 0.0, middle)
-    a, b, c = points[hull_triangles(points)].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    sizes = np.linalg.norm(normals, axis=1)
-    real = sizes > FLAT
-    normals, sizes = normals[real] / sizes[real, None], sizes[real]
-    heights = np.einsum("ij,ij->i", normals, a[real])
-    inside = points.mean(axis=0)
-    inwards = heights < normals @ inside
-    normals[inwards] *= -1.0
-    heights[inwards] *= -1.0
-    volume = float((heights - normals @ inside) @ sizes) / 6.0
+    normals, heights, areas = hull_faces(points)
+    volume = float(heights @ areas) / 3.0
     planes = np.round(np.column_stack((normals, heights)), 9) + 0.0
     _, first = np.unique(planes, axis=0, return_index=True)
     return SolidBody(frozen(normals[first]), frozen(heights[first]), volume)

@@ -138,10 +138,11 @@ def load(geometries: tuple[Geometry, ...]) -> None:
     _BENCHES.bench.choose(geometries)
 
 
-def hull_triangles(points: FloatArray) -> Any:
+def hull_triangles(points: FloatArray, corners: int = -1) -> Any:
     """Return the indices (m, 3) of ``points`` (n, 3) that are the triangles of their hull.
 
-    The points span a volume. A triangle has its corners in any order.
+    The points span a volume. A triangle has its corners in any order. After so many ``corners``,
+    if they are given, the search ends with the hull of those that were found, farthest ones first.
     """
     import mujoco
 
@@ -150,7 +151,7 @@ def hull_triangles(points: FloatArray) -> Any:
     spec = mujoco.MjSpec()
     # The inertia of a surface, because that of a solid is refused for flat ones.
     shell = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-    spec.add_mesh(name="hull", uservert=scaled.ravel(), inertia=shell)
+    spec.add_mesh(name="hull", uservert=scaled.ravel(), inertia=shell, maxhullvert=corners)
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="hull")
     graph = spec.compile().mesh_graph
     return graph[-3 * graph[1] :].reshape(-1, 3).copy()
