@@ -43,7 +43,6 @@ STRAIGHT = item("part", "box", (25.0, 20.0, 50.0), (200.0, 0.0))
             marks=pytest.mark.long,
         ),
         (["set_down:"], PART, "holds no object that this program grasped"),
-        (["grip: {until: 5}"], PART, "pads of this gripper are not known"),
     ],
 )
 def test_six_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_path: Path) -> None:

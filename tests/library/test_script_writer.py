@@ -44,7 +44,6 @@ steps:
     - [0.5, 5, -68, 85, 8, 0]
 - gripper: open
 - gripper: {to: closed, holding: cup}
-- grip: {until: 3 N, holding: cup}
 - wait: 0.5
 - wait_for: {placed: {object: cup, at: corner}, timeout: 3}
 - tool: grasp
@@ -92,7 +91,6 @@ def everything() -> katana450.ScriptWriter:
         p.trajectory([[0, 0, -68, 85, 8, 0], [0.5, 5, -68, 85, 8, 0]])
         p.gripper("open")
         p.gripper("closed", holding="cup")
-        p.grip("3 N", holding="cup")
         p.wait(np.float64(0.5))
         p.wait_for(placed={"object": "cup", "at": "corner"}, timeout=3)
         p.tool("grasp")

@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 from katana450.cli.main import main
-from tests.browser.server import RECORDING_APP, AppServer
 from tests.commands import completed
 
 SCRIPT = """
@@ -79,22 +78,3 @@ def test_circle_of_a_plant_has_commanded_and_measured_apart(tmp_path: Path) -> N
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/png;base64,") == 5
-
-
-@pytest.mark.long
-def test_run_on_a_server_reports_what_it_has_measured(script: Path, tmp_path: Path) -> None:
-    out = tmp_path / "report"
-    record = ("--record", str(tmp_path / "recordings"))
-    with AppServer((*RECORDING_APP, *record, "--plant", "katana450")) as app:
-        done = command_done("run", str(script), "--url", app.url, "--report", str(out))
-        assert done.returncode == 0, done.stderr
-        refused = command_done("run", str(script), "--url", app.url, "--plant", "stiff")
-        assert refused.returncode == 1
-        assert "has an arm already" in refused.stderr
-    found = report_in(out)
-    assert found["measured"] == f"at {app.url}"
-    assert found["bounds_held"]
-    # The delay of the plant, 20 ms, and what the machine adds.
-    assert 15.0 <= found["tracking_lag_ms"] < 80.0
-    assert 0.01 < found["measured_position_error_mm"] < 5.0
-    assert (out / "measured.png").exists()

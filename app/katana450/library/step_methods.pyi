@@ -169,14 +169,6 @@ class StepMethods:
             timeout: s; 60 unless given.
         """
 
-    def grip(self, until: float | str, *, holding: str | None = ...) -> None:
-        """Close the fingers until they press with a force.
-
-        Args:
-            until: Force of a finger, N, such as 3 N.
-            holding: Name of an object.
-        """
-
     def fill(self, water: float | str) -> None:
         """Fill the cup with water, ml.
 

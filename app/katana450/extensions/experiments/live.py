@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
@@ -20,26 +20,19 @@ from katana450.platform_support import without_interrupts
 from katana450.server.api import answers
 from katana450.server.api.program_requests import ProgramOrder, Steer
 
-ReportRun = Callable[[Client, answers.State], int]
-"""Reports the run that has just ended and returns the exit status, by the state before it."""
-
 NAME = "Terminal"
 """Name of this client, which others see as the owner of the program."""
 
 
-def run_live(text: str, script: Script, options: Namespace, report: ReportRun | None = None) -> int:
-    """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError.
-
-    ``report``: reports the run at its end; None for no report.
-    """
+def run_live(text: str, script: Script, options: Namespace) -> int:
+    """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
     with _server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
             _send_script(arm, text, options)
             _planned_program(arm)
-            began = arm.query(answers.State)
             arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
             _follow(arm)
-            return 0 if report is None else report(arm, began)
+            return 0
         except KeyboardInterrupt:
             if options.unattended and _runs(arm):
                 print(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from functools import partial
 from pathlib import Path
 
 from katana450.extensions.programs.language.source import ScriptError
@@ -24,19 +23,15 @@ def run(options: Namespace) -> int:
     try:
         text = script_text(options.file)
         script = parse(text)
-        report = None
         if options.headless or options.dry_run or options.report is not None:
             from katana450.extensions.experiments.simulate import simulate
 
-            simulated = simulate(script, options)
-            if simulated.status or options.headless or options.dry_run:
-                return simulated.status
-            from katana450.extensions.experiments.simulate import report_measured
-
-            report = partial(report_measured, simulated, options)
+            status = simulate(script, options)
+            if status or options.headless or options.dry_run:
+                return status
         from katana450.extensions.experiments.live import run_live
 
-        return run_live(text, script, options, report)
+        return run_live(text, script, options)
     except ScriptError as error:
         print_problems(error, str(options.file))
         return 1

@@ -1,24 +1,20 @@
-"""Simulation of a script without server and browser, its report, and that of a measured arm."""
+"""Simulation of a script without server and browser, and its report."""
 
 from __future__ import annotations
 
 import sys
-import tempfile
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from katana450.arm.control.messages import part
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
-from katana450.client import Client, RefusedError
-from katana450.client.files import LostError
 from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
 from katana450.extensions.programs.building.actions import FollowPlan, Task
@@ -31,46 +27,21 @@ from katana450.extensions.programs.run.simulation import (
     ready,
     run_by_clock,
 )
-from katana450.extensions.programs.script.measures import OF_A_MEASURED_ARM
 from katana450.extensions.programs.script.script import Script
 from katana450.extensions.programs.script.script_scene import begun
 from katana450.extensions.real_arm.plant.axis import profile_named
 from katana450.extensions.real_arm.plant.driver import PlantDriver
-from katana450.extensions.recording.files.recording_file import RecordingFile
-from katana450.extensions.recording.files.simulation import recorded_states, session_for
-from katana450.extensions.recording.live.run_fetcher import fetch_run
 from katana450.extras import MissingExtraError
-from katana450.server.api import answers
 from katana450.settings import Settings
 
 BARE = "The arm is without its gripper: its fingers would reach into the table."
 """Note on a simulation without gripper."""
 
 
-class Simulated(NamedTuple):
-    """The result of a simulation.
-
-    Attributes:
-        status: the exit status.
-        report: the report; None if the script was only planned.
-        pictures: the pictures of the report; none if it is not written.
-    """
-
-    status: int
-    report: Report | None = None
-    pictures: Mapping[str, bytes] = NONE
-
-    def write(self, folder: Path) -> None:
-        """Write the report into ``folder`` and print where it is. Raises InputError."""
-        assert self.report is not None
-        self.report.write(folder, datetime.now().astimezone(), self.pictures)
-        print(f"Report: {folder / 'report.html'}")
-
-
-def simulate(script: Script, options: Namespace) -> Simulated:
+def simulate(script: Script, options: Namespace) -> int:
     """Plan ``script``, run it unless only planning is requested, and report.
 
-    Raises ScriptError and KatanaError.
+    Returns the exit status. Raises ScriptError and KatanaError.
     """
     scene = options.scene
     if scene is None and script.scene is not None:
@@ -87,7 +58,7 @@ def simulate(script: Script, options: Namespace) -> Simulated:
         print(note)
     if options.dry_run:
         _print_tasks(program)
-        return Simulated(0)
+        return 0
     plant = None
     if options.plant is not None:
         profile, start = profile_named(options.plant), plan.start
@@ -110,36 +81,27 @@ def simulate(script: Script, options: Namespace) -> Simulated:
     report = report.with_measured(measured, f"a simulated plant, {options.plant}")
     print(f"{script.name}: {len(report.trace.t)} ticks, {report.trace.t[-1]:.2f} s.")
     print("\n".join(f"  {line}" for line in report.lines))
-    pictures = NONE
     if options.report is not None:
         # Imported here, because only the pictures of a report need the renderer.
         from katana450.extensions.media.report_pictures import stage_pictures
 
+        pictures = NONE
         try:
             pictures = stage_pictures(
                 program, robot, plan.session, load_props(), simulation.states, report.trace
             )
         except MissingExtraError as error:
             print(f"The report has figures, but no pictures of the arm. {error}")
-    simulated = Simulated(exit_status(report, later=not options.headless), report, pictures)
-    if options.report is not None:
-        simulated.write(options.report)
-    return simulated
+        report.write(options.report, datetime.now().astimezone(), pictures)
+        print(f"Report: {options.report / 'report.html'}")
+    return exit_status(report)
 
 
-def exit_status(report: Report, *, later: bool = False) -> int:
-    """Return 1 if a bound of ``report`` is not met, else 0; print these bounds.
-
-    ``later``: whether the arm is measured only later, so that bounds on that do not count yet.
-    """
-    missed = [
-        bound
-        for bound in report.missed
-        if not (later and bound.value is None and bound.name in OF_A_MEASURED_ARM)
-    ]
-    for bound in missed:
+def exit_status(report: Report) -> int:
+    """Return 1 if a bound of ``report`` is not met, else 0; print these bounds."""
+    for bound in report.missed:
         print(f"katana450: a bound is not met: {bound}", file=sys.stderr)
-    return 1 if missed else 0
+    return 1 if report.missed else 0
 
 
 def _begin(session: Session, scene: Path) -> State:
@@ -199,37 +161,3 @@ def _labels(program: Program) -> dict[int, list[str]]:
                     labels.setdefault(number, []).append(f"{alternative} of line {task.line}")
     joined = {number: ["after the alternatives"] for number, count in before.items() if count > 1}
     return labels | joined
-
-
-def report_measured(
-    simulated: Simulated, options: Namespace, arm: Client, before: answers.State
-) -> int:
-    """Write the report of ``simulated`` again, with the arm as the server has measured it.
-
-    ``before``: the state before the run. Returns the exit status: 1 if a bound is not met. Raises
-    KatanaError.
-    """
-    report = simulated.report
-    assert report is not None
-    if before.arm is not None:
-        try:
-            report = report.with_measured(
-                _measured_run(arm, before.sent, options.urdf), f"at {options.url}"
-            )
-        except (LostError, RefusedError) as error:
-            print(f"katana450: the report lacks the measured arm: {error}", file=sys.stderr)
-        else:
-            print("\n".join(f"  {line}" for line in report.lines))
-            simulated._replace(report=report).write(options.report)
-    return exit_status(report)
-
-
-def _measured_run(arm: Client, began: float, urdf: Path) -> MeasuredRun | None:
-    with tempfile.TemporaryDirectory(prefix="katana450-") as folder:
-        path = Path(folder) / "run.mcap"
-        fetch_run(arm, began, path)
-        with RecordingFile.open(path) as file:
-            session = session_for(file, urdf).session
-            return MeasuredRun.of(
-                session.require_arm(), list(recorded_states(file, session, began))
-            )

@@ -150,13 +150,6 @@ class SqueezedBody:
         )
         return Squeeze((first, second), self.axis)
 
-    def squeeze_for(self, force: float) -> float:
-        """Return the squeeze [rad] at which the fingers press with ``force`` [N].
-
-        It is the greatest one if the fingers never press as much.
-        """
-        return self._squeeze_at(force)[0]
-
     def _reachable(self, pad: Pad, T_palm_finger: FloatArray) -> _Points:
         T = self._T_body_palm @ T_palm_finger
         numbers = np.flatnonzero(self._body.depth(pad.points @ T[:3, :3].T + T[:3, 3]) > -REACH)

@@ -13,7 +13,6 @@ from katana450.arm.control.scene_objects import SceneObject, same
 from katana450.arm.control.state import State
 from katana450.arm.control.support import SUPPORT_GAP
 from katana450.arm.robot.props import load_props
-from katana450.errors import InputError
 from katana450.extensions.touch.pad import Pad, PadPressure, pads_of
 from katana450.extensions.touch.solid_body import (
     FRICTION,
@@ -150,33 +149,6 @@ class TouchModel:
             last = (body, state.squeeze, body.squeezed(state.squeeze))
             self._last_squeeze = last
         return last[2]
-
-    def squeeze_for(self, state: State, force: float) -> float:
-        """Return the squeeze [rad] at which the fingers of ``state`` press with ``force`` [N].
-
-        Raises InputError with an empty hand, and for a force that the fingers cannot have.
-        """
-        body = self._held(state)
-        if body is None or state.held is None:
-            raise InputError("The fingers hold nothing.")
-        if not body.on_pads:
-            raise InputError(
-                f"The fingers hold {state.held.name} beside their pads, which measure the force. "
-                "Grasp it at another height or pitch."
-            )
-        if force > self.force_limit:
-            raise InputError(
-                f"The motor of the gripper presses with at most {self.force_limit:g} N, "
-                f"not {force:g} N."
-            )
-        wanted = body.squeeze_for(force)
-        squeezed = body.squeezed(wanted).force
-        if squeezed < 0.99 * force:
-            raise InputError(
-                f"The pads press on {state.held.name} with at most {squeezed:.1f} N, not "
-                f"{force:g} N: they touch too little of it."
-            )
-        return wanted
 
     def report(self, state: State) -> TouchReport:
         """Return the touch in ``state`` for the answer to a query."""

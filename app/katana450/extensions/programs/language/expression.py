@@ -12,7 +12,7 @@ from dataclasses import dataclass
 MAX_LENGTH = 200
 """Maximum number of characters of an expression."""
 
-PLAIN, LENGTH, ANGLE, TIME, FORCE = "number", "length", "angle", "time", "force"
+PLAIN, LENGTH, ANGLE, TIME = "number", "length", "angle", "time"
 """The kinds of quantities."""
 
 UNITS = {
@@ -25,7 +25,6 @@ UNITS = {
     "ms": (1e-3, TIME),
     "s": (1.0, TIME),
     "min": (60.0, TIME),
-    "N": (1.0, FORCE),
 }
 """The units by name, in mm, deg, s and N, with their kinds."""
 
@@ -49,7 +48,7 @@ class Quantity:
 
     Attributes:
         value: in mm, deg, s or N, or without a unit.
-        kind: PLAIN, LENGTH, ANGLE, TIME or FORCE. PLAIN takes the kind of what it is added to.
+        kind: PLAIN, LENGTH, ANGLE or TIME. PLAIN takes the kind of what it is added to.
     """
 
     value: float

@@ -36,7 +36,6 @@ QUANTITIES = {
     "mm": (expression.LENGTH,),
     "deg": (expression.ANGLE,),
     "s": (expression.TIME,),
-    "N": (expression.FORCE,),
     "deg or mm": (expression.ANGLE, expression.LENGTH),
 }
 """The kinds of quantities that can be given where a number in a unit is expected."""

@@ -17,7 +17,6 @@ from katana450.extensions.programs.building.actions import (
 )
 from katana450.extensions.programs.run.compiler import ConditionalJump
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.steps.settings_steps import CloseUntil
 from katana450.server.api.answers import Progress
 
 FULL_SPEED = SetSpeed(1.0)
@@ -101,15 +100,12 @@ def step(program: Program, run: Run, state: State, t: float) -> tuple[Run, tuple
         if run.held:
             _check_slip(state)
         done = task.action.done(state, run.waited)
-        more: tuple[cmd.Command, ...] = ()
-        if not done and isinstance(task.action, CloseUntil):
-            more = task.action.correction(state)
     except InputError as error:
         why = f"Line {task.line}, {task.name}: {error}"
         return replace(run, phase=Phase.FAILED, why=why), (cmd.Hold(),)
     run = replace(run, held=state.held is not None)
     if not done:
-        return run, more
+        return run, ()
     number = program.next_in(run.number, state, run.elapsed)
     if isinstance(task.action, ConditionalJump):
         run = replace(run, choices=(*run.choices, (task.number, number == task.action.then)))

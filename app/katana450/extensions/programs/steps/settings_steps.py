@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import takewhile
 from typing import Annotated
 
 import numpy as np
@@ -11,7 +10,6 @@ import numpy as np
 from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import MIN_SPEED
-from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried
@@ -45,7 +43,6 @@ from katana450.extensions.programs.language.kinds import (
 from katana450.extensions.programs.language.scope import ScriptContext
 from katana450.extensions.programs.language.source import YamlValue
 from katana450.extensions.programs.steps.place import check_fall
-from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3
 from katana450.maths.water.units import ML
 
@@ -201,112 +198,6 @@ class WaitFor(Step, word="wait_for"):
         return plan.with_action(f"wait for {self.condition.awaited}", action)
 
 
-MIN_FORCE, MAX_FORCE = 0.1, 100.0
-"""[N] Bounds of a force in a script. The gripper may allow less."""
-
-FORCE_TOLERANCE = 0.02
-"""[1] Relative difference from the force that counts as reached."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CloseUntil(MoveFingers):
-    """Close the fingers until they press with ``force`` [N].
-
-    The angle is that which the plan predicts. An object that is thicker or thinner than predicted
-    changes it.
-
-    Attributes:
-        force: [N].
-        model: the forces of the fingers.
-        gripper: the finger joint.
-    """
-
-    force: float
-    model: TouchModel
-    gripper: GripperModel
-
-    def done(self, state: State, waited: float) -> bool:
-        """Return whether the fingers press with the force.
-
-        Raises InputError after the timeout of a motion of the fingers, and if they hold nothing or
-        something else than they must.
-        """
-        squeeze = self.model.squeeze(state) if super().done(state, waited) else None
-        return (
-            squeeze is not None and abs(squeeze.force - self.force) <= FORCE_TOLERANCE * self.force
-        )
-
-    def correction(self, state: State) -> tuple[cmd.Command, ...]:
-        """Return the command that gives the force on what the fingers hold; none before they do.
-
-        Raises InputError for a force that they cannot have there.
-        """
-        if state.held is None or state.grip is None:
-            return ()
-        return (cmd.Gripper(_angle_for(self.force, self.model, state, self.gripper)),)
-
-
-def _angle_for(force: float, model: TouchModel, state: State, gripper: GripperModel) -> float:
-    """Return the finger joint [rad] at which ``force`` [N] acts on what the fingers hold.
-
-    Raises InputError for a force that they cannot have there, also beyond their range.
-    """
-    squeeze = model.squeeze_for(state, force)
-    assert state.grip is not None
-    assert state.held is not None
-    angle = gripper.wider(state.grip, -squeeze)
-    if gripper.is_wider(gripper.closed, angle):
-        raise InputError(
-            f"{state.held.name} is too thin: the fingers reach the end of their range before they "
-            f"press with {force:g} N."
-        )
-    return angle
-
-
-@dataclass(frozen=True)
-class GripUntil(Step, word="grip"):
-    """Close the fingers until they press with a force.
-
-    Attributes:
-        force: [N].
-        holding: name of the object that they must hold then; "" for any.
-    """
-
-    force: Annotated[
-        float,
-        number(MIN_FORCE, MAX_FORCE, "N", "Force of a finger, N, such as 3 N").named("until"),
-    ]
-    holding: ObjectName = ""
-
-    def build(self, plan: PlanState) -> PlanState:
-        """Append the motion of the fingers.
-
-        Raises InputError without an object between the fingers, and for a force that they cannot
-        have on it.
-        """
-        fingers = plan.plan_context.arm.gripper
-        hand = plan.plan_context.session.environment.hand
-        model = None if hand is None else hand.grip_model
-        if not isinstance(model, TouchModel):
-            raise InputError("The pads of this gripper are not known, so its force is not either.")
-        before = plan.state
-        closed = before if before.grip is not None else with_fingers(plan, fingers.closed)
-        if closed.held is None or closed.grip is None:
-            raise InputError(
-                "The fingers would close without an object between them. Move the open gripper "
-                "over an object that can be held, or use `grasp`."
-            )
-        if self.holding and closed.held.name != self.holding:
-            raise InputError(
-                f"The fingers would hold {closed.held.name} instead of {self.holding}, which has "
-                "to stand where they close."
-            )
-        angle = _angle_for(self.force, model, closed, fingers)
-        action = CloseUntil(angle, closed.held.name, force=self.force, model=model, gripper=fingers)
-        plan = replace(plan, state=closed)
-        return plan.with_action(f"grip until {self.force:g} N", action, with_fingers(plan, angle))
-
-
 @dataclass(frozen=True)
 class Fill(Step, word="fill"):
     """Fill the cup with water, ml."""
@@ -328,9 +219,6 @@ class Fill(Step, word="fill"):
 class Put(Step, word="put"):
     """Set an object to another place on the table, without the arm.
 
-    Consecutive steps of this kind form one arrangement: an object may overlap the old place of
-    another that is placed elsewhere by a later one of them.
-
     Attributes:
         name: name of the object.
         x, y: its place [m] in the base frame.
@@ -348,18 +236,12 @@ class Put(Step, word="put"):
         T = se3.from_rotation_translation(scene_object.T[:3, :3], (self.x, self.y, 0.0))
         put = replace(scene_object, T=T)
         check_carried(plan.plan_context.session.environment.table, plan.state.objects, put)
-        # An object that a later `put` moves is checked at its final place.
-        moved = {put.name for put in takewhile(_is_put, plan.ahead) if isinstance(put, Put)}
         for other in plan.state.objects:
-            if other.name not in {scene_object.name, *moved} and _overlap(put, other):
+            if other.name != scene_object.name and _overlap(put, other):
                 raise InputError(f"{self.name} would stand in {other.name}.")
         return plan.with_action(
             f"put {self.name}", PutObject(put), plan.after(cmd.PlaceObject(put), ticks=1)
         )
-
-
-def _is_put(step: object) -> bool:
-    return isinstance(step, Put)
 
 
 def _overlap(one: SceneObject, other: SceneObject) -> bool:
