@@ -225,27 +225,25 @@ def claim_file(descriptor: int) -> None:
 
 def state_folder() -> Path:
     """Return the folder in which programs of this user keep their logs; it need not exist."""
-    if sys.platform == "win32":
-        default = Path.home() / "AppData" / "Local"
-        return Path(os.environ.get("LOCALAPPDATA") or default)
-    elif sys.platform == "darwin":  # noqa: RET505 - so that mypy follows either system
-        return Path.home() / "Library" / "Application Support"
-    else:
-        named = os.environ.get("XDG_STATE_HOME", "")
-        # The standard of these folders demands that a relative path is ignored.
-        return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
+    return _user_folder("XDG_STATE_HOME", ".local/state", "Application Support", "")
 
 
 def cache_folder() -> Path:
     """Return the folder for what programs of this user can compute again; it need not exist."""
+    return _user_folder("XDG_CACHE_HOME", ".cache", "Caches", "Cache")
+
+
+def _user_folder(variable: str, default: str, darwin: str, windows: str) -> Path:
+    """Return the folder named by ``variable``, or else the one of this system."""
     if sys.platform == "win32":
-        default = Path.home() / "AppData" / "Local"
-        return Path(os.environ.get("LOCALAPPDATA") or default) / "Cache"
+        local = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
+        return Path(local, windows)
     elif sys.platform == "darwin":  # noqa: RET505 - so that mypy follows either system
-        return Path.home() / "Library" / "Caches"
+        return Path.home() / "Library" / darwin
     else:
-        named = os.environ.get("XDG_CACHE_HOME", "")
-        return Path(named) if Path(named).is_absolute() else Path.home() / ".cache"
+        named = Path(os.environ.get(variable, ""))
+        # The standard of these folders demands that a relative path is ignored.
+        return named if named.is_absolute() else Path.home() / default
 
 
 def only_this_user_writes(folder: Path) -> bool:

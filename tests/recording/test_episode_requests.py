@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from katana450.client.files import EpisodeClient, LostError, RefusedError, Site
+from katana450.client.files import EpisodeClient, LostError, Site
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of
@@ -186,15 +186,9 @@ def answering(content: bytes) -> Iterator[str]:
 def test_answer_that_is_not_understood_is_an_error_of_this_project(content: bytes) -> None:
     with answering(content) as url:
         client = EpisodeClient(Site(url))
-        for act in (client.start, client.list, client.folder):
+        for act in (client.start, client.list):
             with pytest.raises(LostError, match="is not understood"):
                 act()
-
-
-def test_folder_is_refused_to_those_who_watch() -> None:
-    content = json.dumps({"episodes": [], "discarded": [], "folder": ""}).encode()
-    with answering(content) as url, pytest.raises(RefusedError, match="may watch"):
-        EpisodeClient(Site(url)).folder()
 
 
 def test_folder_of_markers_of_earlier_versions_is_read(tmp_path: Path, bench: Bench) -> None:

@@ -133,8 +133,6 @@ class ListedEpisode(msgspec.Struct, frozen=True, kw_only=True):
 
 class _List(msgspec.Struct):
     episodes: list[ListedEpisode]
-    discarded: list[ListedEpisode]
-    folder: str
 
 
 class _Done(msgspec.Struct):
@@ -154,25 +152,19 @@ class EpisodeClient:
 
     def list(self) -> tuple[ListedEpisode, ...]:
         """Return the kept episodes, by number."""
-        return tuple(self._listed().episodes)
+        return tuple(_understood(self._site.fetched(PATH), _List).episodes)
 
-    def discarded(self) -> tuple[ListedEpisode, ...]:
-        """Return the discarded episodes, by number."""
-        return tuple(self._listed().discarded)
+    def ask(self, do: str, **fields: Any) -> int:
+        """Send any request about episodes, such as ``trim``; return the number of its episode.
 
-    def folder(self) -> Path:
-        """Return the folder of the episodes, on the machine of the server.
-
-        Raises RefusedError for a client that may only watch.
+        ``fields``: those of the request, see docs/recording.md.
         """
-        folder = self._listed().folder
-        if not folder:
-            raise RefusedError("Your role may watch, but not see where the files are.")
-        return Path(folder)
+        content = self._site.fetched(PATH, msgspec.json.encode({"do": do, **fields}))
+        return _understood(content, _Done).number
 
     def start(self, task: str | None = None) -> int:
         """Begin an episode and return its number. ``task``: None for that of the last one."""
-        return self._number({"do": "start", "task": task})
+        return self.ask("start", task=task)
 
     def stop(self, outcome: str = "unjudged", number: int | None = None) -> int:
         """End the episode that runs and return its number.
@@ -181,7 +173,7 @@ class EpisodeClient:
             outcome: unjudged, success or failure.
             number: the episode, so that no other one is ended; None for any.
         """
-        return self._number({"do": "stop", "outcome": outcome, "number": number})
+        return self.ask("stop", outcome=outcome, number=number)
 
     def judge(self, outcome: str, number: int | None = None) -> int:
         """Judge an episode and return its number.
@@ -190,51 +182,16 @@ class EpisodeClient:
             outcome: unjudged, success or failure.
             number: the episode; None for the one that runs, which then ends, or else the last one.
         """
-        return self._number({"do": "judge", "outcome": outcome, "number": number})
+        return self.ask("judge", outcome=outcome, number=number)
 
     def discard(self, number: int | None = None) -> int:
         """Discard an episode and return its number; see ``judge``."""
-        return self._number({"do": "discard", "number": number})
-
-    def restore(self, number: int) -> int:
-        """Bring the discarded episode ``number`` back; return ``number``."""
-        return self._number({"do": "restore", "number": number})
-
-    def undo(self, number: int | None = None) -> int:
-        """Undo the last judgement, discard or re-record, up to 10 s after it; return its number.
-
-        ``number``: the episode, so that nothing else is undone; None for any.
-        """
-        return self._number({"do": "undo", "number": number})
-
-    def rerecord(self, number: int | None = None) -> int:
-        """Begin an episode again and return the new number; see ``judge``.
-
-        The old one is discarded when the new one is kept.
-        """
-        return self._number({"do": "rerecord", "number": number})
-
-    def describe(self, number: int, *, task: str | None = None, note: str | None = None) -> int:
-        """Change the texts of the episode ``number``; None keeps one. Return ``number``."""
-        return self._number({"do": "describe", "number": number, "task": task, "note": note})
-
-    def trim(self, number: int, start: float, end: float) -> int:
-        """Give the episode ``number`` another start and end [s after the start of its file].
-
-        Nothing is deleted. Returns ``number``.
-        """
-        return self._number({"do": "trim", "number": number, "start": start, "end": end})
+        return self.ask("discard", number=number)
 
     def download(self, number: int, out: Path) -> None:
         """Write the file of the kept episode ``number`` to ``out``."""
         content = self._site.fetched(f"{PATH}/{number}")
         write_files({out: writer_of(content)})
-
-    def _listed(self) -> _List:
-        return _understood(self._site.fetched(PATH), _List)
-
-    def _number(self, request: dict[str, Any]) -> int:
-        return _understood(self._site.fetched(PATH, msgspec.json.encode(request)), _Done).number
 
 
 def _understood(content: bytes, kind: type[Answer]) -> Answer:

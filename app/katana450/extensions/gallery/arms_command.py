@@ -34,7 +34,6 @@ ENDING = "_description"
 ALIASES: Mapping[str, str] = {
     "allegro": "allegro_hand",
     "koch": "koch_arm",
-    "openmanipulatorx": "open_manipulator_x",
     "so100": "so_arm100",
     "so101": "so_arm101",
 }
@@ -95,15 +94,13 @@ def robot_named(name: str) -> ListedRobot:
     by_plain = {_plain(listed): listed for listed in robots}
     if wanted in by_plain:
         return robots[by_plain[wanted]]
-    known = {_plain(robot.robot): robot for robot in reversed(robots.values())}
-    if wanted in known:
-        return known[wanted]
     if wanted in map(_plain, others):
         problem = f"The gallery has {name!r} as MJCF only, which cannot be read."
     else:
         problem = f"The gallery has no robot {name!r}."
-    near = get_close_matches(wanted, (*by_plain, *known), MAX_SUGGESTIONS, SIMILAR)
-    names = dict.fromkeys(by_plain.get(plain) or known[plain].name for plain in near)
+    names = [
+        by_plain[plain] for plain in get_close_matches(wanted, by_plain, MAX_SUGGESTIONS, SIMILAR)
+    ]
     hint = f" Nearest names: {', '.join(names)}." if names else ""
     raise ConfigurationError(f"{problem}{hint} `katana450 arms` lists all.")
 
