@@ -88,9 +88,13 @@ def _wrapped(text: str) -> list[str]:
 
     A line may end after a field, or within a union of classes.
     """
-    indent = {"initial_indent": "  ", "subsequent_indent": "    "}
     lines = textwrap.wrap(
-        text, LINE_LENGTH, break_long_words=False, break_on_hyphens=False, **indent
+        text,
+        LINE_LENGTH,
+        initial_indent="  ",
+        subsequent_indent="    ",
+        break_long_words=False,
+        break_on_hyphens=False,
     )
     return ["\n".join(lines).replace(NO_BREAK, " ") + "\n"]
 
