@@ -67,8 +67,8 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         start(context.hub, context.options.foxglove)
 
     def make() -> list[BaseRoute]:
-        from katana450.extensions.rosbridge.routes import RosRoutes
+        from katana450.extensions.rosbridge.routes import ros_routes
 
-        return RosRoutes(context, urdf).routes()
+        return ros_routes(context, urdf)
 
     return LateRoutes(["/rosbridge"], make).routes()
