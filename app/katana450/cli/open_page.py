@@ -13,9 +13,6 @@ from katana450.assembly.log_output import say
 SCREENS = {"DISPLAY", "WAYLAND_DISPLAY", "WSL_DISTRO_NAME"}
 """Variables of which a Linux that can show a browser has one."""
 
-WINDOWS = (["wslview", "%s"], ["powershell.exe", "-NoProfile", "-Command", "Start-Process '%s'"])
-"""Commands of WSL that open an address in the browser of Windows."""
-
 
 def show_page(url: str, *ports: int) -> None:
     """Open ``url`` in a thread, or say how to open it from elsewhere through a tunnel of ``ports``.
@@ -36,7 +33,5 @@ def show_page(url: str, *ports: int) -> None:
 
 
 def _open(url: str) -> None:
-    of_windows = "WSL_DISTRO_NAME" in os.environ and not os.environ.get("BROWSER")
-    commands = map(webbrowser.GenericBrowser, WINDOWS) if of_windows else (webbrowser,)
-    if not any(command.open(url) for command in commands):
+    if not webbrowser.open(url):
         say(f"No browser could be started. Open {url} in one yourself.")
