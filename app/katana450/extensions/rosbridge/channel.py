@@ -31,8 +31,7 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
 from katana450.server.web.channel import Channel, GoneError, JsonChannel, WebSocketJsonChannel
-from katana450.server.web.limits import TokenBucket
-from katana450.server.web.program_socket import BURST, FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, RATE
+from katana450.server.web.program_socket import BAD_REQUESTS, REQUESTS
 
 log = logging.getLogger(__name__)
 TICK = 0.02
@@ -64,17 +63,12 @@ class RosLine(WebSocketJsonChannel):
 class RosChannel(Channel):
     """Channel of one client. Messages of topics that a slow client cannot take are dropped."""
 
+    often, bad = REQUESTS, BAD_REQUESTS
+
     def __init__(
         self, hub: Hub, line: JsonChannel, budget: Budget, publications: Publications
     ) -> None:
-        t = hub.clock()
-        super().__init__(
-            hub,
-            line,
-            budget,
-            often=TokenBucket(RATE, BURST, t),
-            bad=TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
-        )
+        super().__init__(hub, line, budget)
         self._publications = publications
         self._subscriptions = Subscriptions(hub.clock)
         self._stream = ServoStream(hub, self._ask)

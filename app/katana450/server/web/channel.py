@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -92,23 +92,28 @@ class WebSocketJsonChannel:
 
 
 class Channel(ABC):
-    """Channel of one participant. A subclass decides which messages are sent without a request."""
+    """Channel of one participant. A subclass decides which messages are sent without a request.
 
-    def __init__(
-        self, hub: Hub, line: JsonChannel, budget: Budget, *, often: TokenBucket, bad: TokenBucket
-    ) -> None:
+    Attributes:
+        often: Maximum rate [1/s] and burst of all requests.
+        bad: The same of invalid requests.
+    """
+
+    often: ClassVar[tuple[float, float]]
+    bad: ClassVar[tuple[float, float]]
+
+    def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
         """Create a channel on ``line``.
 
-        ``budget``: that of the identity, which all its participants share. ``often``: rate limit of
-        all requests. ``bad``: rate limit of invalid requests.
+        ``budget``: that of the identity, which all its participants share.
         """
         self.hub = hub
         self.budget = budget
         self.participant: Participant | None = None
         self._dispatcher = Dispatcher(hub)
         self._line = line
-        self._often = often
-        self._bad = bad
+        t = hub.clock()
+        self._often, self._bad = TokenBucket(*self.often, t), TokenBucket(*self.bad, t)
         self._notices: deque[Any] = deque(maxlen=MAX_WAITING_ANSWERS)
         self._news = asyncio.Event()
         self._urgent = False

@@ -20,31 +20,25 @@ from katana450.server.service.people import Connection
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
-from katana450.server.web.limits import TokenBucket
 
-RATE, BURST = 160.0, 320.0
+REQUESTS = 160.0, 320.0
 """Maximum rate [1/s] and burst of requests: per second ten heartbeats, 25 jogs, 30 queries, and the
 use of knobs and buttons."""
 
 PUSH_EVERY = 0.1
 """Interval [s] of status updates; twice as long while nobody drives."""
 
-MAX_BAD_REQUESTS = 4
-"""Maximum number of invalid requests; one more closes the socket."""
+BAD_REQUESTS = 0.0, 4.0
+"""The same of invalid requests: the fifth closes the socket."""
 
 
 class ControlSocket(Channel):
     """Control socket of one page; it sends changes of the status, less often if it is slow."""
 
+    often, bad = REQUESTS, BAD_REQUESTS
+
     def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
-        t = hub.clock()
-        super().__init__(
-            hub,
-            line,
-            budget,
-            often=TokenBucket(RATE, BURST, t),
-            bad=TokenBucket(0.0, MAX_BAD_REQUESTS, t),
-        )
+        super().__init__(hub, line, budget)
         self._sent: dict[str, Any] = {}
         self._checked_at = float("-inf")
 

@@ -45,15 +45,15 @@ from katana450.server.web.channel import (
     JsonChannel,
     WebSocketJsonChannel,
 )
-from katana450.server.web.limits import ConnectionLimit, TokenBucket
+from katana450.server.web.limits import ConnectionLimit
 
 log = logging.getLogger(__name__)
 
-RATE, BURST = 400.0, 800.0
+REQUESTS = 400.0, 800.0
 """Maximum rate [1/s] and burst of requests: a stream may be faster than the ticks of the arm."""
 
-MAX_BAD_REQUESTS, FORGIVEN_PER_SECOND = 20, 1.0
-"""Maximum burst and rate [1/s] of invalid requests."""
+BAD_REQUESTS = 1.0, 20.0
+"""The same of invalid requests."""
 
 COMPLAINT_INTERVAL = 5.0
 """Minimum interval [s] of the messages to a program that watches more than its budget allows."""
@@ -83,13 +83,10 @@ class ProgramClient(NamedTuple):
 class ProgramChannel(Channel):
     """Channel of one program, which sends states at the requested rate."""
 
+    often, bad = REQUESTS, BAD_REQUESTS
+
     def __init__(self, hub: Hub, line: JsonChannel, budget: Budget) -> None:
-        t = hub.clock()
-        often, bad = (
-            TokenBucket(RATE, BURST, t),
-            TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_REQUESTS, t),
-        )
-        super().__init__(hub, line, budget, often=often, bad=bad)
+        super().__init__(hub, line, budget)
         self._complained = -math.inf
         self._period: float | None = None
         self._due = 0.0
