@@ -1,9 +1,9 @@
 // The branches in the picture: the arm on the branch whose row in the panel is under the pointer, for this
-// window alone, and a name with the time of the change on each ghost.
+// window alone, with a name and the time of the change.
 import { html, write } from "../instruments/shape.js";
 
 const ROW = "tr[data-branch]";
-const EVERY = 250; // ms between two looks for ghosts that the server shows
+const EVERY = 250; // ms between two places of the name
 const OPACITY = 0.4;
 const PARTS = ["shoulder", "elbow", "wrist"]; // words of the name of a branch
 const ELBOW = 2; // number of the joint whose link carries the name
@@ -15,7 +15,7 @@ export class Branches {
   #options = new Map(); // name of a branch to its words and joint angles
   #row = null; // name of the branch under the pointer
   #ghost = null; // {object, elbow, material} of that branch
-  #labels = html("div", { id: "branch-labels" });
+  #label = html("p", { id: "branch-label", class: "scene-label", hidden: "" });
   #asked = 0; // number of the last question
 
   // status: returns the state of the page, which has the speed.
@@ -23,7 +23,7 @@ export class Branches {
     this.#scene = scene;
     this.#arm = arm;
     this.#status = status;
-    stage.append(this.#labels);
+    stage.append(this.#label);
     this.#read();
     setInterval(() => document.hidden || this.#name(), EVERY);
   }
@@ -115,30 +115,18 @@ export class Branches {
     return state;
   }
 
-  // Write the names of all ghosts that are shown.
-  async #name() {
+  // Write the name of the ghost at its elbow.
+  #name() {
     const { node, pixelOf } = this.#inner ?? {};
-    if (!node?.("")) return;
-    const shown = new Map(); // name of a branch to the pixel of its elbow
-    const path = this.#arm.links[ELBOW]?.path.join("/");
-    for (const name of this.#options.keys())
-      if (node(`/branch/${name}`)?.visible) shown.set(name, pixelOf(`/branch/${name}/${path}`));
-    if (this.#ghost?.elbow) {
-      const { elbow } = this.#ghost;
-      const place = elbow.getWorldPosition(elbow.position.clone());
-      shown.set(this.#row, pixelOf(place.applyMatrix4(node("").matrixWorld.clone().invert()).toArray()));
-    }
-    if (shown.size && !this.#ghost) await this.#read();
-    const names = [...shown].filter(([name, pixel]) => pixel && this.#options.has(name));
-    while (this.#labels.childElementCount < names.length) this.#labels.append(html("p", { class: "scene-label" }));
-    while (this.#labels.childElementCount > names.length) this.#labels.lastElementChild.remove();
-    names.forEach(([name, [x, y]], index) => {
-      /** @type {any} */
-      const label = this.#labels.children[index];
-      write(label, this.#options.get(name).words);
-      label.style.left = `${this.#scene.offsetLeft + x}px`;
-      label.style.top = `${this.#scene.offsetTop + y}px`;
-    });
+    const elbow = this.#ghost?.elbow;
+    const place = elbow?.getWorldPosition(elbow.position.clone());
+    const pixel = place && pixelOf(place.applyMatrix4(node("").matrixWorld.clone().invert()).toArray());
+    this.#label.hidden = !pixel;
+    if (!pixel) return;
+    const [x, y] = pixel;
+    write(this.#label, this.#options.get(this.#row).words);
+    this.#label.style.left = `${this.#scene.offsetLeft + x}px`;
+    this.#label.style.top = `${this.#scene.offsetTop + y}px`;
   }
 
   get #inner() {

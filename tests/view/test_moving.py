@@ -30,7 +30,8 @@ def test_branches_are_computed_once_a_second_while_the_arm_moves(
         return
 
     rest = session.begin(session.ready, 0.0, 0.0)
-    branches = BranchList(server, robot, find, listen, rest)
+    names = robot.require_arm().kinematics.branches
+    branches = BranchList(server.gui, names, find, listen, rest)
     state = session.step(rest, [Joints(session.ready + 0.3)], 0.01)
     times = np.arange(0.0, 3.0 * INTERVAL, 0.1)
     for t in times:

@@ -85,7 +85,9 @@ class Panel:
             with self._gui.add_folder("Pose by numbers"):
                 form = PoseForm(self._gui, robot.arm, listen, state)
             with self._gui.add_folder("Branches", expand_by_default=False):
-                self._tool = ToolControls(form, BranchList(server, robot, find, listen, state))
+                names = robot.arm.kinematics.branches
+                branches = BranchList(self._gui, names, find, listen, state)
+            self._tool = ToolControls(form, branches)
 
     def follow(self, state: State, now: float, *, caught_up: bool) -> None:
         """Show ``state`` at time ``now`` [s].
