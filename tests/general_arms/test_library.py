@@ -74,11 +74,24 @@ def test_one_of_several_fingers_is_chosen_by_its_tip(tmp_path: Path) -> None:
 def test_posture_of_an_arm_among_other_joints_has_its_axes_alone(tmp_path: Path) -> None:
     path = tmp_path / "hand.urdf"
     path.write_text(hand(), encoding="utf-8")
-    arm = load(path, tool="finger1_link1")
-    assert (arm.n, len(arm.session.ready)) == (2, 16)
-    assert arm.ready.shape == (2,)
+    arm = load(path, tool="finger1_link2")
+    assert (arm.n, len(arm.session.ready)) == (3, 3)
     assert ((arm.lower <= arm.ready) & (arm.ready <= arm.upper)).all()
     assert arm.fk(arm.ready).shape == (4, 4)
+
+
+def test_arm_beside_another_joint_is_planned_without_a_named_tool(urdf: Urdf) -> None:
+    path = urdf("ur5")
+    camera = '<link name="camera"/><joint name="pan" type="revolute"><parent link="PARENT"/>'
+    camera += '<child link="camera"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+    parent = load(path).robot.links[0].name
+    other = path.with_name("camera.urdf")
+    text = path.read_text(encoding="utf-8").replace("</robot>", f"{camera}</robot>")
+    other.write_text(text.replace("PARENT", parent), encoding="utf-8")
+    arm = load(other)
+    assert arm.n == 6
+    assert "Joint 'pan' is revolute and stays at zero." in arm.notes
+    np.testing.assert_allclose(arm.plan(arm.ready + 0.1).end, arm.ready + 0.1, atol=1e-12)
 
 
 def test_notes_say_how_poses_are_solved(urdf: Urdf) -> None:
@@ -100,22 +113,9 @@ def test_map_of_reachability_is_that_of_six_axes(urdf: Urdf) -> None:
     assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
 
 
-PLANS: dict[str, Callable[[katana450.Arm], Any]] = {
-    "plan": lambda arm: arm.plan(arm.ready),
-    "map": lambda arm: arm.reachability(),
-    "line": lambda arm: arm.line(by=(0.0, 0.0, 0.1)),
-    "circle": lambda arm: arm.circle((0.3, 0.0, 0.0), 0.1),
-    "show": lambda arm: arm.show(),
-    "ready": lambda arm: arm.plan(arm.fk(np.zeros(2))),
-}
-
-
-@pytest.mark.parametrize("case", PLANS)
-def test_two_axes_have_no_plans(tmp_path: Path, case: str) -> None:
-    arm = load(written(tmp_path, "two", PX100[:2]))
-    assert arm.n == 2
-    with pytest.raises(katana450.RobotDescriptionError, match=r"three or more turning axes|2 axes"):
-        PLANS[case](arm)
+def test_two_axes_are_no_arm(tmp_path: Path) -> None:
+    with pytest.raises(katana450.RobotDescriptionError, match="has 2 axes"):
+        load(written(tmp_path, "two", PX100[:2]))
 
 
 @pytest.mark.cases(4)
@@ -200,8 +200,6 @@ def test_wrong_arguments_of_load_are_refused(urdf: Urdf, tmp_path: Path) -> None
     scene = tmp_path / "scene.yaml"
     scene.write_text("scene: 1\nobjects: []\n", encoding="utf-8")
     assert load(path, scene=scene).objects == ()
-    with pytest.raises(katana450.InputError, match="A scene is for plans"):
-        katana450.load(written(tmp_path, "two", PX100[:2]), scene=scene)
     with pytest.raises(katana450.RobotDescriptionError, match="'base' is carried by 0"):
         katana450.load(path, tool="base")
     assert "ur5" in repr(load(path))

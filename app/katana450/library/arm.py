@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
-import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.scene_objects import SceneObject
@@ -14,7 +13,7 @@ from katana450.arm.control.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.caching import cached_property
-from katana450.errors import InputError, RobotDescriptionError
+from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
 from katana450.extensions.programs.language.places import ROOMIEST
@@ -47,12 +46,6 @@ PRIORITIES = {
 FIVE_FREEDOMS: Final = 5
 """Number of freedoms of a tool that has the pitch of the plane of its arm."""
 
-NEEDED: Final = (
-    "it needs three or more turning axes, whose tool is named if the file has other joints than "
-    "those of fingers"
-)
-"""End of the sentence that refuses a plan: the condition that the arm does not meet."""
-
 
 @dataclass(frozen=True, eq=False)
 class Arm:
@@ -65,9 +58,7 @@ class Arm:
     wrong shape, is not finite or is no rotation raises InputError. Every error of the library is a
     `katana450.KatanaError`.
 
-    Arms of two or more turning axes have kinematics. Plans, views and maps of reachability need
-    three or more axes, and no other joints than those of fingers unless `load` names the tool; else
-    they raise RobotDescriptionError.
+    Every arm has three or more turning axes. Other joints than those of its fingers stay at zero.
 
     Attributes:
         robot: contents of the URDF, as the app uses it.
@@ -75,7 +66,6 @@ class Arm:
         notes: sentences on assumptions about the file.
         pose_frame: the frame of poses and points.
         objects: objects that plans keep clear of.
-        mounted: the part of the robot that carries the tool.
     """
 
     robot: Robot
@@ -83,7 +73,11 @@ class Arm:
     notes: tuple[str, ...]
     pose_frame: PoseFrame
     objects: tuple[SceneObject, ...]
-    mounted: MountedArm
+
+    @property
+    def mounted(self) -> MountedArm:
+        """The part of the robot that carries the tool."""
+        return self.robot.require_arm()
 
     @property
     def name(self) -> str:
@@ -128,24 +122,12 @@ class Arm:
     @property
     def ready(self) -> FloatArray:
         """(n,) posture with room to move [rad]; plans begin there by default."""
-        can_plan = self.robot.arm is self.mounted
-        return self.session.ready if can_plan else self.chain.clamp(np.zeros(self.n))
+        return self.session.ready
 
     @property
     def method(self) -> str:
         """The method by which poses are solved, in words: a closed form, or numerical and why."""
         return self._kinematics.method
-
-    @property
-    def _planned(self) -> MountedArm:
-        """The arm, for what needs a session. Raises RobotDescriptionError if there is none."""
-        if self.robot.arm is not self.mounted:
-            raise RobotDescriptionError(
-                f"For {self.name}, a plan or a map is not possible: {NEEDED}. This arm has "
-                f"{self.n} axes ({self.method}). `fk`, `ik`, `nearest` and `jacobian` work; "
-                "`katana450 serve` drives it."
-            )
-        return self.mounted
 
     @cached_property
     def chain(self) -> Chain:
@@ -386,7 +368,7 @@ class Arm:
         >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
         True
         """
-        if pitch == ROOMIEST and self._planned.kinematics.freedoms != FIVE_FREEDOMS:
+        if pitch == ROOMIEST and self.mounted.kinematics.freedoms != FIVE_FREEDOMS:
             pitch = None
         angles = pitch, roll, yaw
         planner = self._planner
@@ -418,7 +400,7 @@ class Arm:
         >>> bool((map.fraction > 0.0).all() and (map.fraction <= 1.0).all())
         True
         """
-        return reachability_map(self.chain, self._planned.T_base_shoulder, table, voxel)
+        return reachability_map(self.chain, self.mounted.T_base_shoulder, table, voxel)
 
     def show(
         self,
@@ -458,7 +440,7 @@ class Arm:
 
     @cached_property
     def _planner(self) -> Planner:
-        T = self._planned.T_base_shoulder
+        T = self.mounted.T_base_shoulder
         return Planner(self._kinematics, self.session, T, self.pose_frame, self.objects)
 
     def _plan(self, core: Plan) -> MotionPlan:

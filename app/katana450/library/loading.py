@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from katana450.arm.control.scene_objects import SceneObject
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_robot
-from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.general_arms.driven_tool import solved_arm
 from katana450.extensions.importers.scene_file import load_initial_scene
-from katana450.library.arm import NEEDED, Arm
+from katana450.library.arm import Arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -41,7 +38,7 @@ def load(
             (docs/scenes.md); None for those of the app, a cup and a basin.
 
     Raises:
-        RobotDescriptionError: the file cannot be read or has no arm of two or more turning axes.
+        RobotDescriptionError: the file cannot be read or has no arm of three or more turning axes.
         InputError: the frame is unknown or the scene is invalid; the message says what to do.
 
     >>> arm = katana450.load()
@@ -54,28 +51,15 @@ def load(
     """
     path = URDF_PATH if urdf is None else Path(urdf)
     scene_path = None if scene is None else Path(scene)
-    try:
+    robot, session, notes = find_robot(Settings(), path, tool)
+    if robot.arm is None:
+        # Beside the arm are joints that a server would drive one by one.
+        tool = read_robot(path, None, solved_arm).require_arm().default_tool
         robot, session, notes = find_robot(Settings(), path, tool)
-    except RobotDescriptionError:
-        if tool is None:
-            raise
-        # The tool cannot be driven, but its poses can perhaps be solved.
-        robot, session, notes = find_robot(Settings(), path, None)
-        robot = replace(robot, arm=None)
-    mounted = robot.arm or read_robot(path, tool, solved_arm).require_arm()
-    objects: tuple[SceneObject, ...] = ()
-    if robot.arm is not None:
-        objects = load_initial_scene(session, scene_path, ())[0].scene.objects
-    elif scene is not None:
-        raise InputError(
-            f"A scene is for plans, and for {robot.name} there are none: {NEEDED}. Load this arm "
-            "without it."
-        )
     return Arm(
         robot=robot,
-        mounted=mounted,
         session=session,
-        notes=notes if robot.arm is not None else (*mounted.notes, *robot.notes),
-        pose_frame=PoseFrame.of(mounted.T_base_shoulder, frame),
-        objects=objects,
+        notes=notes,
+        pose_frame=PoseFrame.of(robot.require_arm().T_base_shoulder, frame),
+        objects=load_initial_scene(session, scene_path, ())[0].scene.objects,
     )

@@ -395,11 +395,8 @@ def _misses(projection: Projection, priority: Priority) -> tuple[float, ...]:
     return (rotation, position) if priority is Priority.ORIENTATION else (position, rotation)
 
 
-SOLVED_AXES: Final = 2
-"""Minimum number of axes: {S} lies where axis 1 passes axis 2."""
-
-DRIVEN_AXES: Final = 3
-"""Minimum number of axes of an arm that is driven by its tool: fewer reach no volume."""
+LEAST_AXES: Final = 3
+"""Minimum number of axes of an arm: fewer reach no volume."""
 
 
 def solved_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
@@ -408,27 +405,24 @@ def solved_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     None if there is none. Raises RobotDescriptionError if there is one, and its axes or limits are
     described wrongly.
     """
-    structure = _structure(urdf, path, tool, SOLVED_AXES)
+    structure = _structure(urdf, path, tool)
     return None if structure is None else _arm(urdf, structure)
 
 
 def driven_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
-    """Return `solved_arm` if a server can drive its tool.
-
-    None also if joints beside the arm could then no longer be driven.
-    """
-    structure = _structure(urdf, path, tool, DRIVEN_AXES)
+    """Return `solved_arm`; None if joints beside an arm without ``tool`` could not be driven."""
+    structure = _structure(urdf, path, tool)
     if structure is None or (tool is None and any(j.mimic is None for j in structure.others)):
         return None
     return _arm(urdf, structure)
 
 
-def _structure(urdf: Urdf, path: Path, tool: str | None, axes: int) -> Structure | None:
+def _structure(urdf: Urdf, path: Path, tool: str | None) -> Structure | None:
     try:
         structure = structure_of(urdf, path, tool, count=None)
     except RobotDescriptionError:
         return None
-    return structure if len(structure.axes) >= axes else None
+    return structure if len(structure.axes) >= LEAST_AXES else None
 
 
 def _arm(urdf: Urdf, structure: Structure) -> OtherArm:
