@@ -48,9 +48,8 @@ def test_any_mechanism_in_a_pose(tmp_path: Path) -> None:
     [
         (("c", "--trajectory", "m.csv"), "c has no motion"),
         (("urdf", "--pose", "0,0"), "urdf has no pose"),
-        (("mjcf", "--trajectory", "m.csv"), "Use --trajectory with vrml, x3d, glb, html"),
+        (("glb", "--trajectory", "m.csv"), "Use --trajectory or --run with html"),
         (("glb", "--pose", "0,0,9"), "axis_3 cannot be at 9 rad"),
-        (("glb", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("glb", "--urdf", "nowhere.urdf"), "no robot description at nowhere.urdf"),
     ],
 )

@@ -1,29 +1,13 @@
-"""A reader of VRML97 that refuses whatever an export of this project lacks, and keeps routes."""
+"""A reader of VRML97 that refuses whatever an export of this project lacks."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER, KEYWORDS, Node, Route, Use, Value, World
+from katana450.extensions.export.vrml_world import HEADER, KEYWORDS, Node, Use, Value, World
 from katana450.extensions.importers.vrml_reader import Reader
 from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
-
-EVENTS: Mapping[tuple[str, str], Type] = {
-    ("TimeSensor", "fraction_changed"): Type.FLOAT,
-    ("OrientationInterpolator", "value_changed"): Type.ROTATION,
-    ("PositionInterpolator", "value_changed"): Type.VECTOR,
-}
-"""Types of the events that nodes send (eventOut), by kind of node and name of the event."""
-
-SETTERS: Mapping[tuple[str, str], Type] = {
-    ("OrientationInterpolator", "set_fraction"): Type.FLOAT,
-    ("PositionInterpolator", "set_fraction"): Type.FLOAT,
-    ("Transform", "set_rotation"): Type.ROTATION,
-    ("Transform", "set_translation"): Type.VECTOR,
-}
-"""Types of the events that nodes receive (eventIn), by kind of node and name of the event."""
 
 
 def read_world(text: str) -> World:
@@ -34,11 +18,7 @@ def read_world(text: str) -> World:
 
 
 class StrictReader(Reader):
-    """A reader of the nodes of exports, with routes and references as they are written."""
-
-    def __init__(self, text: str, name: str) -> None:
-        super().__init__(text, name)
-        self._routes: list[Route] = []
+    """A reader of the nodes of exports, with references as they are written."""
 
     def world(self) -> World:
         """Return the content of the file. Raises InputError with the line of an error."""
@@ -46,7 +26,7 @@ class StrictReader(Reader):
         nodes = tuple(node for node in found if isinstance(node, Node))
         if len(nodes) < len(found):
             raise self._error("USE is not allowed at the top level")
-        return World(nodes, tuple(self._routes))
+        return World(nodes)
 
     def _body(self, kind: str, name: str | None, depth: int) -> Node:
         if kind not in FIELDS:
@@ -82,17 +62,3 @@ class StrictReader(Reader):
     def _used(self, name: str) -> Use:
         super()._used(name)
         return Use(name)
-
-    def _route(self) -> None:
-        source, _, out = self._take().partition(".")
-        self._expect("TO")
-        target, _, into = self._take().partition(".")
-        kinds = {name: node.kind for name, node in self._named.items()}
-        event, setter = (kinds.get(source, ""), out), (kinds.get(target, ""), into)
-        if event not in EVENTS:
-            raise self._error(f"a route cannot go out of {source}.{out}")
-        if setter not in SETTERS:
-            raise self._error(f"a route cannot go into {target}.{into}")
-        if EVENTS[event] is not SETTERS[setter]:
-            raise self._error(f"{source}.{out} and {target}.{into} have different types")
-        self._routes.append(Route(source, out, target, into))

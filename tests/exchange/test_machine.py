@@ -90,7 +90,7 @@ def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
     made = (
         vrml_files(robot, world_of(robot, values)),
         c_files(robot, values),
-        glb_files(robot, values, None),
+        glb_files(robot, values),
         package_files(path),
     )
     for files in made:

@@ -12,12 +12,9 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.playback import RecordedMotion, load_motion
 from katana450.extensions.export.vrml import vrml_files, world_of
-from katana450.extensions.export.vrml_names import VrmlNames
 from katana450.resources import URDF_PATH
-from tests.exchange.conftest import GANTRY_POSE, POSES
+from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import placed
 from tests.exchange.tools import PIVY, needs, run
 
@@ -70,19 +67,6 @@ PYTHON = "/usr/bin/python3"
 """The Python of the system, which has the packages of the system."""
 
 
-@pytest.fixture
-def motion(tmp_path: Path, gantry: Robot) -> RecordedMotion:
-    names = gantry.driven
-    lines = (
-        ",".join(("t", *names)),
-        ",".join(map(str, (0.0, *GANTRY_POSE))),
-        ",".join(["1.0"] + ["0.0"] * len(names)),
-    )
-    text = "\n".join(lines)
-    (tmp_path / "m.csv").write_text(text)
-    return load_motion(tmp_path / "m.csv", gantry)
-
-
 def test_every_number_has_a_digit_before_its_point(katana: Robot) -> None:
     """VTK (ParaView, PyVista) reads .0122 as 0."""
     numbers = 0
@@ -94,30 +78,6 @@ def test_every_number_has_a_digit_before_its_point(katana: Robot) -> None:
                 assert NUMBER.fullmatch(word), word
                 numbers += 1
     assert numbers > 100_000
-
-
-def test_static_pose_is_the_first_sample_of_the_motion(
-    gantry: Robot, motion: RecordedMotion
-) -> None:
-    start = gantry.values(GANTRY_POSE)
-    assert motion.start == pytest.approx(start)
-    rest = gantry.values(())
-    moving = world_of(gantry, rest, motion).named()
-    standing = world_of(gantry, start).named()
-    for name in VrmlNames(gantry).joints.values():
-        assert moving[name] == standing[name]
-    (with_motion,), (without,) = (
-        glb_files(gantry, rest, motion).values(),
-        glb_files(gantry, start).values(),
-    )
-    assert nodes(with_motion) == nodes(without)
-
-
-def nodes(glb: bytes) -> list[object]:
-    """Return the nodes of a binary glTF file."""
-    length = int.from_bytes(glb[12:16], "little")
-    found: list[object] = json.loads(glb[20 : 20 + length])["nodes"]
-    return found
 
 
 def exported(folder: Path, pose: tuple[float, ...]) -> Path:

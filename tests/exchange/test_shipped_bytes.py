@@ -11,7 +11,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.playback import load_motion
 from katana450.extensions.export.vrml import vrml_files, world_of, x3d_files
 from tests.exchange.conftest import GANTRY, GANTRY_POSE
 
@@ -35,18 +34,3 @@ def test_command_writes_the_files_of_a_pose(tmp_path: Path, gantry: Robot, kind:
     options = ["--no-objects"] if kind in ("vrml", "x3d") else []
     pose = f"--pose={','.join(map(str, GANTRY_POSE))}"
     assert exported(tmp_path / "out", kind, pose, *options) == expected
-
-
-@pytest.mark.parametrize("kind", ["vrml", "glb"])
-def test_command_writes_the_files_of_a_motion(tmp_path: Path, gantry: Robot, kind: str) -> None:
-    table = tmp_path / "m.csv"
-    table.write_text(f"t,rail,turn,grip\n0,0,0,0\n3,{','.join(map(str, GANTRY_POSE))}\n")
-    motion, rest = load_motion(table, gantry), gantry.values(())
-    expected = (
-        vrml_files(gantry, world_of(gantry, rest, motion))
-        if kind == "vrml"
-        else glb_files(gantry, rest, motion)
-    )
-    options = ["--no-objects"] if kind == "vrml" else []
-    words = [kind, "--trajectory", str(table), *options]
-    assert exported(tmp_path / "out", *words) == expected

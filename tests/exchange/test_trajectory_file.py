@@ -9,7 +9,7 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
-from katana450.extensions.export.playback import WIDEST_TURN, load_motion
+from katana450.extensions.export.playback import load_motion
 
 TABLE = {
     "t": [1.0, 2.0, 2.5],
@@ -41,16 +41,6 @@ def test_joints_can_have_their_own_names(tmp_path: Path, gantry: Robot) -> None:
     np.testing.assert_array_equal(motion.values["turn"], [0.0, 9.0])
     np.testing.assert_array_equal(motion.values["rail"], [0.0, 0.4])
     np.testing.assert_allclose(motion.values["out"], -0.1 * motion.values["grip"] - 0.04)
-
-
-def test_keys_lie_on_the_motion_and_near_each_other(tmp_path: Path, gantry: Robot) -> None:
-    (tmp_path / "a.csv").write_text("t,turn\n0,0\n1,9\n3,8.5\n4,-9\n")
-    motion = load_motion(tmp_path / "a.csv", gantry)
-    t, values = motion.keys("turn")
-    assert (np.diff(t) > 0.0).all()
-    assert np.abs(np.diff(values)).max() <= WIDEST_TURN
-    assert set(motion.t) <= set(t)
-    np.testing.assert_allclose(values, np.interp(t, motion.t, motion.values["turn"]), atol=1e-12)
 
 
 @pytest.mark.parametrize(

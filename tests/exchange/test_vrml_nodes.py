@@ -92,7 +92,7 @@ def test_export_has_the_objects_of_a_new_server_by_the_same_names(robot: Robot) 
     session = describe_robot(Settings(), URDF_PATH, None).session
     state = session.begin(session.ready, 0.0, 0.0)
     angles = robot.joint_values(state.q, state.gripper)
-    file = world_of(robot, angles, None, initial_objects(robot))
+    file = world_of(robot, angles, initial_objects(robot))
     kinds = ("Transform", "Switch", "Material")
     named = {name: node for name, node in file.named().items() if node.kind in kinds}
     world = {

@@ -12,9 +12,8 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.playback import load_motion
 from katana450.extensions.export.vrml import views, world_of
-from katana450.extensions.export.vrml_world import Node, Route, Use, Value, World, x3d_text
+from katana450.extensions.export.vrml_world import Node, Use, Value, World, x3d_text
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
@@ -34,12 +33,7 @@ INSIDE = {
 def world_in(text: str) -> World:
     """Return the world of an X3D file."""
     (scene,) = ElementTree.fromstring(text.partition("?>")[2])
-    routes = tuple(
-        Route(*(each.attrib[name] for name in ("fromNode", "fromField", "toNode", "toField")))
-        for each in scene
-        if each.tag == "ROUTE"
-    )
-    return World(tuple(node(each) for each in scene if each.tag != "ROUTE"), routes)  # type: ignore[misc]
+    return World(tuple(node(each) for each in scene))  # type: ignore[misc]
 
 
 def node(element: ElementTree.Element) -> Node | Use:
@@ -86,15 +80,12 @@ def in_order(world: World) -> World:
         fields = ((name, ordered(own[name])) for name in FIELDS[part.kind] if name in own)
         return Node(part.kind, tuple(fields), part.name)
 
-    return World(tuple(ordered([*world.nodes])), world.routes)
+    return World(tuple(ordered([*world.nodes])))
 
 
 @pytest.mark.parametrize("plain", [False, True])
-def test_world_is_read_back(tmp_path: Path, gantry: Robot, plain: bool) -> None:
-    end = ",".join(map(str, GANTRY_POSE))
-    (tmp_path / "m.csv").write_text(f"t,rail,turn,grip\n0,0,0,0\n3,{end}\n")
-    motion = load_motion(tmp_path / "m.csv", gantry)
-    world = world_of(gantry, gantry.values(()), motion, plain=plain)
+def test_world_is_read_back(gantry: Robot, plain: bool) -> None:
+    world = world_of(gantry, gantry.values(GANTRY_POSE), plain=plain)
     text = x3d_text(world)
     assert ("Switch" in text) is not plain
     assert world_in(text) == in_order(world)

@@ -99,13 +99,6 @@ FIELDS: Mapping[str, Mapping[str, Type]] = MappingProxyType(
         },
         "Coordinate": {"point": Type.VECTOR_LIST},
         "Normal": {"vector": Type.VECTOR_LIST},
-        "TimeSensor": {
-            "cycleInterval": Type.TIME,
-            "loop": Type.BOOL,
-            "startTime": Type.TIME,
-        },
-        "OrientationInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.ROTATION_LIST},
-        "PositionInterpolator": {"key": Type.FLOAT_LIST, "keyValue": Type.VECTOR_LIST},
     }
 )
 """Fields of each kind of node that the export writes, with their types."""

@@ -6,19 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State
-from katana450.assembly.robot_session import DescribedRobot
-from katana450.errors import InputError
-from katana450.extensions.export.vrml_nodes import VrmlNodes
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import verify_recording
-from katana450.extensions.touch.squeeze import FORCE_LIMIT
-from katana450.server.api import requests
 from tests.control.test_grip import OPEN
 from tests.recording.recorded import fresh
 from tests.recording.sessions import record_session
@@ -59,26 +52,3 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
         result = verify_recording(file, fresh().session)
     assert result.identical, result
     assert result.ticks > 150
-
-
-def test_touch_is_read_by_name(
-    described: DescribedRobot, session: Session, around: State, holding: State
-) -> None:
-    nodes = VrmlNodes(described.robot, session.environment)
-
-    def get(state: State, node: str, field: str) -> float | list[float]:
-        (value,) = nodes.read(state, [requests.FieldName(node=node, field=field)])
-        return value.value
-
-    assert get(holding, "touch_right", "force") == pytest.approx(FORCE_LIMIT, rel=1e-3)
-    assert get(around, "touch_right", "force") == 0.0
-    pressure = np.array(get(holding, "touch_left", "pressure"))
-    assert pressure.shape == (128,)
-    assert pressure.max() > 1e4
-    assert np.array(get(around, "touch_left", "pressure")).sum() == 0.0
-    along, across = np.array(get(holding, "touch_left", "centre")).tolist()
-    assert (along, across) == pytest.approx((0.055, 0.0), abs=2e-3)
-    world = {node.node: node for node in nodes.world(holding).nodes}
-    assert {"touch_left", "touch_right"} <= world.keys()
-    with pytest.raises(InputError, match=r"touch_left.force can be read but not set"):
-        nodes.command(holding, [requests.FieldSetting(node="touch_left", field="force", value=1.0)])

@@ -11,7 +11,6 @@ from katana450.assembly.robot_files import read_robot
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.export.formats import FORMATS, ExportJob, named
-from katana450.extensions.export.playback import load_motion
 
 LARGE_BYTES = 20_000_000
 """Size [bytes] of all files together above which the command says why."""
@@ -31,8 +30,7 @@ def export(
     for note in robot.notes:
         print(f"katana450: {note}", file=sys.stderr)
     values = robot.values(options.pose)
-    motion = None if options.trajectory is None else load_motion(options.trajectory, robot)
-    files = files_of(ExportJob(options, robot, values, motion))
+    files = files_of(ExportJob(options, robot, values))
     folder: Path = options.out
     try:
         for path in {(folder / name).parent for name in files}:
@@ -57,11 +55,8 @@ def _check(options: argparse.Namespace) -> None:
     """Raise InputError for an option that the format cannot follow."""
     kind: str = options.format
     row = FORMATS[kind]
-    if options.trajectory is not None and not row.animated:
-        names = ", ".join(named(lambda listed: listed.animated))
-        raise InputError(f"{kind} has no motion. Use --trajectory with {names}.")
-    if options.run is not None:
-        raise InputError(f"{kind} has no run. Use --run with html.")
+    if options.trajectory is not None or options.run is not None:
+        raise InputError(f"{kind} has no motion. Use --trajectory or --run with html.")
     if options.pose and not row.posed:
         names = ", ".join(named(lambda listed: listed.posed))
         raise InputError(f"{kind} has no pose. Use --pose with {names}.")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from katana450.arm.robot.robot import Robot
-    from katana450.extensions.export.playback import RecordedMotion
     from katana450.extensions.export.vrml_world import World
 
 
@@ -19,13 +18,11 @@ class ExportJob(NamedTuple):
         options: the options of the command.
         robot: the robot of its URDF.
         values: value of every joint [rad or m].
-        motion: the motion that the files play, if any.
     """
 
     options: Namespace
     robot: Robot
     values: Mapping[str, float]
-    motion: RecordedMotion | None
 
 
 class ExportFormat(NamedTuple):
@@ -34,16 +31,14 @@ class ExportFormat(NamedTuple):
     Attributes:
         help: description for the help of the command.
         files: function that returns names and contents of the files; None for a page, which is
-            a single file.
+            a single file and plays a motion.
         posed: whether it is written at a pose.
-        animated: whether it can contain a motion.
         scene: whether it has the objects of a new server, and a Switch for each shape.
     """
 
     help: str
     files: Callable[[ExportJob], Mapping[str, bytes]] | None
     posed: bool = False
-    animated: bool = False
     scene: bool = False
 
 
@@ -63,7 +58,7 @@ def _world(job: ExportJob) -> World:
     from katana450.extensions.export.vrml import initial_objects, world_of
 
     objects = initial_objects(job.robot) if job.options.objects else ()
-    return world_of(job.robot, job.values, job.motion, objects, plain=job.options.plain)
+    return world_of(job.robot, job.values, objects, plain=job.options.plain)
 
 
 def _c(job: ExportJob) -> Mapping[str, bytes]:
@@ -75,7 +70,7 @@ def _c(job: ExportJob) -> Mapping[str, bytes]:
 def _glb(job: ExportJob) -> Mapping[str, bytes]:
     from katana450.extensions.export.glb import glb_files
 
-    return glb_files(job.robot, job.values, job.motion)
+    return glb_files(job.robot, job.values)
 
 
 def _urdf(job: ExportJob) -> Mapping[str, bytes]:
@@ -97,19 +92,16 @@ FORMATS: Mapping[str, ExportFormat] = {
         "a VRML97 world and one file per part, for LabVIEW, Simulink and X3D browsers",
         _vrml,
         posed=True,
-        animated=True,
         scene=True,
     ),
-    "x3d": ExportFormat(
-        "the same world as X3D in XML", _x3d, posed=True, animated=True, scene=True
-    ),
+    "x3d": ExportFormat("the same world as X3D in XML", _x3d, posed=True, scene=True),
     "c": ExportFormat(
         "C arrays and a draw function per link, kinematics, and an OpenGL viewer",
         _c,
         posed=True,
     ),
     "glb": ExportFormat(
-        "binary glTF 2.0, for browsers, Blender and game engines", _glb, posed=True, animated=True
+        "binary glTF 2.0, for browsers, Blender and game engines", _glb, posed=True
     ),
     "urdf": ExportFormat(
         "a zip of a ROS 2 package of URDF and meshes",
@@ -122,7 +114,6 @@ FORMATS: Mapping[str, ExportFormat] = {
         "a page that plays a run, with a time slider; it needs no server",
         None,
         posed=True,
-        animated=True,
     ),
 }
 """The formats by their names."""

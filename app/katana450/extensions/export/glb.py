@@ -1,4 +1,4 @@
-"""A robot as binary glTF 2.0: one node per link, its joint in `extras`, and its motion."""
+"""A robot as binary glTF 2.0: one node per link, its joint in `extras`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
 from katana450.errors import InputError
 from katana450.extensions.export.files import distinct
-from katana450.extensions.export.playback import RecordedMotion
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.srgb import to_light
@@ -30,21 +29,16 @@ Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """Rotation (x, y, z, w) from the root's z up to glTF's y up."""
 
 
-def glb_files(
-    robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None = None
-) -> dict[str, bytes]:
-    """Return name and content of the file, at ``values`` [rad, m] or at the start of ``motion``."""
+def glb_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
+    """Return name and content of the file, at ``values`` [rad, m]."""
     (name,) = distinct([robot.name])
-    return {f"{name}.glb": _Document(robot, values, motion).content()}
+    return {f"{name}.glb": _Document(robot, values).content()}
 
 
 class _Document:
     """The JSON chunk and the binary chunk under construction."""
 
-    def __init__(
-        self, robot: Robot, values: Mapping[str, float], motion: RecordedMotion | None
-    ) -> None:
-        values = values if motion is None else motion.start
+    def __init__(self, robot: Robot, values: Mapping[str, float]) -> None:
         self._data = bytearray()
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
@@ -60,8 +54,6 @@ class _Document:
             "scenes": [{"name": robot.name, "nodes": [0]}],
             "nodes": nodes,
         }
-        if motion is not None and robot.joints:
-            self._json["animations"] = [self._animation(robot, motion, number)]
 
     def content(self) -> bytes:
         """Return the content of the file."""
@@ -119,40 +111,6 @@ class _Document:
             ),
             "material": self._materials.setdefault(shape.material, len(self._materials)),
         }
-
-    def _animation(
-        self, robot: Robot, motion: RecordedMotion, number: Mapping[str, int]
-    ) -> dict[str, Any]:
-        samplers: list[dict[str, Any]] = []
-        channels: list[dict[str, Any]] = []
-        for link in robot.links:
-            joint = link.joint
-            if joint is None:
-                continue
-            t, values = motion.keys(joint.name)
-            poses = np.array([link.T_parent_link @ joint.motion(value) for value in values])
-            rows = (
-                poses[:, :3, 3]
-                if joint.slides
-                else np.array([_xyzw(pose[:3, :3]) for pose in poses])
-            )
-            channels.append(
-                {
-                    "sampler": len(samplers),
-                    "target": {
-                        "node": number[link.name],
-                        "path": "translation" if joint.slides else "rotation",
-                    },
-                }
-            )
-            samplers.append(
-                {
-                    "input": self._vectors(t.reshape(-1, 1)),
-                    "output": self._vectors(rows),
-                    "interpolation": "LINEAR",
-                }
-            )
-        return {"name": "motion", "samplers": samplers, "channels": channels}
 
     def _vectors(self, rows: FloatArray, target: int | None = None) -> int:
         if not np.isfinite(rows).all():

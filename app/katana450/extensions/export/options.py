@@ -31,16 +31,16 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         action="store_false",
         help="vrml and x3d: leave out the cup and the basin of a new server",
     )
-    add_shown_options(parser, "vrml, x3d, glb and html: ", "html: ", "all at zero")
+    add_shown_options(parser, "html: ", "all at zero")
     add_arm_options(parser, tool=False)
 
 
 def add_shown_options(
-    parser: argparse.ArgumentParser, of_table: str = "", of_run: str = "", pose: str = "Home"
+    parser: argparse.ArgumentParser, formats: str = "", pose: str = "Home"
 ) -> None:
     """Add the options of what is shown to ``parser``: a pose, a table of a motion, or a run.
 
-    ``of_table``, ``of_run``: formats that can show these. ``pose``: the default of the pose.
+    ``formats``: those that show a motion. ``pose``: the default of the pose.
     """
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument(
@@ -55,13 +55,13 @@ def add_shown_options(
         "--trajectory",
         type=Path,
         metavar="FILE",
-        help=f"{of_table}motion, a .csv with the columns t,theta1,...,theta5,gripper, or trace.csv "
+        help=f"{formats}motion, a .csv with the columns t,theta1,...,theta5,gripper, or trace.csv "
         "of a report",
     )
     shown.add_argument(
         "--run",
         metavar="SCRIPT",
-        help=f"{of_run}run that is shown: circle, pour or the file of a script",
+        help=f"{formats}run that is shown: circle, pour or the file of a script",
     )
 
 

@@ -49,12 +49,6 @@ MAX_ROWS = 100_000
 """Maximum number of rows of a file."""
 
 
-WIDEST_TURN = 1.0
-"""[rad] Maximum rotation between two keys. Programs interpolate on the shorter arc, so it must be
-unambiguous.
-"""
-
-
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
     """The motion of all joints of a robot.
@@ -66,20 +60,6 @@ class RecordedMotion:
 
     t: FloatArray
     values: Mapping[str, FloatArray]
-
-    @property
-    def start(self) -> dict[str, float]:
-        """The value [rad, m] of every joint at the first sample."""
-        return {name: float(values[0]) for name, values in self.values.items()}
-
-    def keys(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Return times (k,) [s] and values (k,) of one joint, with more keys in large rotations."""
-        values = self.values[name]
-        counts = np.maximum(np.ceil(np.abs(np.diff(values)) / WIDEST_TURN), 1.0).astype(int)
-        places = [row + np.arange(count) / count for row, count in enumerate(counts.tolist())]
-        place = np.concatenate((*places, [len(counts)]))
-        rows = np.arange(len(values))
-        return np.interp(place, rows, self.t), np.interp(place, rows, values)
 
 
 def load_motion(path: Path, robot: Robot) -> RecordedMotion:

@@ -24,7 +24,7 @@ from katana450.arm.robot.initial_camera import (
     fitted,
     looking,
 )
-from katana450.arm.robot.link import Joint, Link
+from katana450.arm.robot.link import Link
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, main_colour, shapes_of
@@ -33,11 +33,9 @@ from katana450.assembly.robot_session import arm_session
 from katana450.errors import InputError
 from katana450.extensions.export.files import distinct
 from katana450.extensions.export.obj_text import DIGITS, NORMAL_DIGITS
-from katana450.extensions.export.playback import RecordedMotion
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_world import (
     Node,
-    Route,
     Use,
     Value,
     World,
@@ -161,19 +159,15 @@ class _Writing:
 def world_of(
     robot: Robot,
     values: Mapping[str, float],
-    motion: RecordedMotion | None = None,
     objects: Sequence[PlacedObject] = (),
     *,
     plain: bool = False,
 ) -> World:
-    """Return the whole robot at the joint ``values`` [rad, m], or playing ``motion``.
+    """Return the whole robot at the joint ``values`` [rad, m].
 
-    A motion also sets the static pose to its first sample, for programs that do not play it.
     ``objects`` stand around the robot. A ``plain`` world has no Switch.
     """
-    values = values if motion is None else motion.start
     writing = _Writing(robot, objects, plain=plain)
-    names = writing.names
     contents = [_link(writing, robot.links[0], values)]
     for placed in objects:
         name, dressed = writing.objects[placed.name]
@@ -183,17 +177,7 @@ def world_of(
         *_surroundings(robot, values),
         Node("Transform", (("rotation", Z_UP), ("children", contents))),
     ]
-    routes: list[Route] = []
-    if motion is not None:
-        clock: list[tuple[str, Value]] = [("cycleInterval", float(motion.t[-1])), ("loop", True)]
-        nodes.append(Node("TimeSensor", tuple(clock), names.clock))
-        for name, joint in robot.joints.items():
-            nodes.append(_interpolator(joint, robot, motion, names))
-            target, source = names.joints[name], f"{names.joints[name]}{names.way}"
-            setter = "set_translation" if joint.slides else "set_rotation"
-            routes.append(Route(names.clock, "fraction_changed", source, "set_fraction"))
-            routes.append(Route(source, "value_changed", target, setter))
-    return World(tuple(nodes), tuple(routes))
+    return World(tuple(nodes))
 
 
 def vrml_files(robot: Robot, world: World) -> dict[str, bytes]:
@@ -349,18 +333,6 @@ def _material(material: Material) -> Node:
             ("shininess", round(min(max(1.0 - material.rough, 0.0), 1.0), 4)),
         ),
     )
-
-
-def _interpolator(joint: Joint, robot: Robot, motion: RecordedMotion, names: VrmlNames) -> Node:
-    name = f"{names.joints[joint.name]}{names.way}"
-    axis = robot.axis(joint)
-    t, values = motion.keys(joint.name)
-    keys = ("key", (t / motion.t[-1]).tolist())
-    if joint.slides:
-        rows = values[:, None] * axis
-        return Node("PositionInterpolator", (keys, ("keyValue", [*_rounded(rows, 9)])), name)
-    rows = np.column_stack((np.broadcast_to(axis, (len(t), 3)), values))
-    return Node("OrientationInterpolator", (keys, ("keyValue", [*_rounded(rows, 9)])), name)
 
 
 def _rounded(values: object, digits: int) -> tuple[float, ...]:

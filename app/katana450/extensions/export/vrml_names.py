@@ -10,9 +10,6 @@ from katana450.arm.robot.surfaces import Material
 from katana450.extensions.export.files import distinct
 from katana450.extensions.export.vrml_world import KEYWORDS
 
-CLOCK = "Clock"
-"""Name of the TimeSensor."""
-
 LOOK, PAINT = "look", "paint"
 """Suffixes for a link with shapes: the Switch between its materials and one colour, and the
 Material of that colour.
@@ -34,8 +31,6 @@ class VrmlNames:
         links: VRML name of each link, by its own name.
         joints: VRML name of each joint, by its own name.
         dressed: names of the appearance of each link with a shape.
-        clock: name of the TimeSensor of a motion.
-        way: suffix of a joint's name for its interpolator.
         appearances: name of the Appearance of each material.
     """
 
@@ -50,7 +45,6 @@ class VrmlNames:
             *robot.joints,
             *(f"{name}_{part}" for name in shown for part in (LOOK, PAINT)),
             *(material.name for material in ordered),
-            CLOCK,
         ]
         self._made = distinct(requested, KEYWORDS)
         unused = iter(self._made)
@@ -62,8 +56,6 @@ class VrmlNames:
         self.appearances: Mapping[Material, str] = {
             appearance: next(unused) for appearance in ordered
         }
-        self.clock = next(unused)
-        self.way = self.unused_suffix("_motion")
 
     def unused_suffix(self, suffix: str, others: Sequence[str] = ()) -> str:
         """Return ``suffix``, longer if a name with it would begin another name of the world.

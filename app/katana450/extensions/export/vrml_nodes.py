@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any
 
 import numpy as np
 
@@ -29,8 +28,6 @@ from katana450.arm.robot.surfaces import PLAIN
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_names import NodeNames, VrmlNames
 from katana450.extensions.export.vrml_world import axis_angle
-from katana450.extensions.touch.pad import COLUMNS, ROWS, PadPressure
-from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.api import answers, requests
@@ -42,8 +39,6 @@ class Type(Enum):
 
     INT = "SFInt32"
     FLOAT = "SFFloat"
-    FLOAT_LIST = "MFFloat"
-    PAIR = "SFVec2f"
     VECTOR = "SFVec3f"
     COLOR = "SFColor"
     ROTATION = "SFRotation"
@@ -100,39 +95,6 @@ class NamedNode:
     kind: str
     of: str
     fields: Mapping[str, NamedField]
-
-
-def gripper_nodes(model: TouchModel) -> dict[str, NamedNode]:
-    """Return the nodes of the pads of the gripper, which the files lack."""
-
-    def pad(number: int) -> NamedNode:
-        def value(
-            state: State, measure: Callable[[PadPressure], FieldValue], none: FieldValue
-        ) -> Any:
-            squeeze = model.squeeze(state)
-            return none if squeeze is None else measure(squeeze.pads[number])
-
-        no_pressure = [0.0] * (ROWS * COLUMNS)
-        fields = {
-            "force": NamedField(
-                Type.FLOAT, lambda state: value(state, lambda pressure: pressure.force, 0.0)
-            ),
-            "centre": NamedField(
-                Type.PAIR,
-                lambda state: value(
-                    state, lambda pressure: [*(pressure.centre or (0.0, 0.0))], [0.0, 0.0]
-                ),
-            ),
-            "pressure": NamedField(
-                Type.FLOAT_LIST,
-                lambda state: value(
-                    state, lambda pressure: pressure.pressure.ravel().tolist(), no_pressure
-                ),
-            ),
-        }
-        return NamedNode("Touch", f"link {model.pads[number].finger}", fields)
-
-    return {f"touch_{touched.finger.split('_')[1]}": pad(n) for n, touched in enumerate(model.pads)}
 
 
 AXIS_TOLERANCE = 1e-6
@@ -264,9 +226,6 @@ class VrmlNodes(Nodes):
             if link.shapes:
                 dressed = self._names.dressed[link.name]
                 nodes |= _dress(link.name, f"link {link.name}", dressed, link.colour)
-        hand = self._surroundings.hand
-        if hand is not None and isinstance(hand.grip_model, TouchModel):
-            nodes |= gripper_nodes(hand.grip_model)
         return nodes
 
     def _joint(self, joint: Joint) -> NamedNode:

@@ -66,28 +66,11 @@ Value = bool | float | str | Node | Use | tuple[float, ...] | list[Any]
 """The value of a field."""
 
 
-class Route(NamedTuple):
-    """A route that passes each event of one node on to another node.
-
-    Attributes:
-        source: DEF name of the node that sends the event.
-        out: name of the event that it sends.
-        target: DEF name of the node that receives the event.
-        into: name of the event that it receives.
-    """
-
-    source: str
-    out: str
-    target: str
-    into: str
-
-
 @dataclass(frozen=True)
 class World:
-    """The content of a VRML file: its top-level nodes, and its routes."""
+    """The content of a VRML file: its top-level nodes."""
 
     nodes: tuple[Node, ...]
-    routes: tuple[Route, ...] = ()
 
     def named(self) -> dict[str, Node]:
         """Return every node with a DEF name, by that name."""
@@ -126,7 +109,6 @@ def world_text(world: World) -> str:
     parts = [HEADER, "\n"]
     for node in world.nodes:
         _write(parts, node, 0)
-    parts += [f"ROUTE {r.source}.{r.out} TO {r.target}.{r.into}\n" for r in world.routes]
     return "".join(parts)
 
 
@@ -136,11 +118,6 @@ def x3d_text(world: World) -> str:
     parts = [X3D_HEADER]
     for node in world.nodes:
         _write_element(parts, node, kinds)
-    for route in world.routes:
-        parts.append(
-            f'<ROUTE fromNode="{route.source}" fromField="{route.out}" '
-            f'toNode="{route.target}" toField="{route.into}"/>\n'
-        )
     return "".join([*parts, "</Scene>\n</X3D>\n"])
 
 
