@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import msgspec
@@ -25,7 +25,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.motion.limiter import Limits
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers
 from katana450.server.service.arm_handle import ArmHandle
@@ -51,6 +50,11 @@ UNITS = {
 """Units of the amounts; the other reasons have no amount."""
 
 T = TypeVar("T")
+
+NO_TOOL = dict.fromkeys(
+    ("tool", "T", "pitch", "roll", "tool_speed", "margins", "branch", "priority"), None
+)
+"""Fields of a state about the tool, for a robot that has only joints."""
 
 _FOUND: WeakKeyDictionary[Snapshot, dict[str, Any]] = WeakKeyDictionary()
 """Values by snapshot and name, dropped with the snapshot. For the gateway's thread alone."""
@@ -98,8 +102,8 @@ def state(hub: Hub) -> answers.State:
     """Return the newest state. Raises LeaseError until there is an arm."""
     arm = hub.present()
     snapshot, holder, stopped = arm.snapshot, hub.lease.driver, hub.stopped
-    return msgspec.structs.replace(
-        once(snapshot, "state", lambda: _state(arm, snapshot)),
+    return answers.State(
+        **once(snapshot, "state", lambda: _of_snapshot(arm, snapshot)),
         sent=hub.clock(),
         moving=snapshot.state.moving or arm.busy,
         holder=None if holder is None else holder.name,
@@ -114,53 +118,34 @@ def state(hub: Hub) -> answers.State:
     )
 
 
-def _state(arm: ArmHandle, snapshot: Snapshot) -> answers.State:
-    """Return the part that depends on ``snapshot`` alone; ``state`` fills in the rest."""
-    now = snapshot.state
-    tool = None if arm.robot.arm is None else _Tool.of(arm.robot.arm, now)
+def _of_snapshot(arm: ArmHandle, snapshot: Snapshot) -> dict[str, Any]:
+    """Return the fields of a state that depend on ``snapshot`` alone."""
+    now, mounted = snapshot.state, arm.robot.arm
     hand = arm.environment.hand
     model = None if hand is None else hand.grip_model
-    return answers.State(
-        t=now.t,
-        sent=now.t,
-        ticket=snapshot.ticket,
-        q=now.q.tolist(),
-        setpoint=now.setpoint.tolist(),
-        qd=now.motion.qd.tolist(),
-        goal=now.goal.tolist(),
-        gripper=now.gripper,
-        gripper_goal=now.gripper_goal,
-        tool=None if tool is None else now.tool,
-        T=None if tool is None else tool.T,
-        pitch=None if tool is None else tool.pitch,
-        roll=None if tool is None else tool.roll,
-        tool_speed=None if tool is None else tool.speed,
-        margins=None if tool is None else margins(arm.margins),
-        holding=None if arm.holding is None else arm.holding.tolist(),
-        touching=list(touching(hand, now)),
-        touch=None if model is None else dict(model.report(now)),
-        held=None if now.held is None else now.held.name,
-        branch=None if tool is None else tuple(str(now.branch).split("-")),
-        priority=None if tool is None else now.priority.value,
-        status=now.status.value,
-        moving=now.moving,
-        why=sentence(now),
-        findings=[finding(cause) for cause in now.findings],
-        detour=None if now.detour is None else now.detour.duration / now.speed,
-        speed=now.speed,
-        holder=None,
-        stopped=None,
-        stop=None,
-        stopped_at=None,
-        clearable=False,
-        revocations=0,
-        silence_profile=arm.profile.value,
-        age=0.0,
-        participants=0,
-        water=water(arm.pouring, now),
-        arm=None if now.report is None else measured_arm(now, now.report),
-        program=None,
-    )
+    return {
+        "t": now.t,
+        "ticket": snapshot.ticket,
+        "q": now.q.tolist(),
+        "setpoint": now.setpoint.tolist(),
+        "qd": now.motion.qd.tolist(),
+        "goal": now.goal.tolist(),
+        "gripper": now.gripper,
+        "gripper_goal": now.gripper_goal,
+        "holding": None if arm.holding is None else arm.holding.tolist(),
+        "touching": list(touching(hand, now)),
+        "touch": None if model is None else dict(model.report(now)),
+        "held": None if now.held is None else now.held.name,
+        "status": now.status.value,
+        "why": sentence(now),
+        "findings": [finding(cause) for cause in now.findings],
+        "detour": None if now.detour is None else now.detour.duration / now.speed,
+        "speed": now.speed,
+        "silence_profile": arm.profile.value,
+        "water": water(arm.pouring, now),
+        "arm": None if now.report is None else measured_arm(now, now.report),
+        **(NO_TOOL if mounted is None else _of_tool(mounted, arm.margins, now)),
+    }
 
 
 def measured_arm(now: control.State, report: ArmReport) -> answers.MeasuredArm:
@@ -200,24 +185,20 @@ def margins(distances: Margins) -> answers.Margins:
     )
 
 
-class _Tool(NamedTuple):
-    """Tool of an arm: pose ``T`` (4, 4) in {S}, pitch and roll [rad], speed [m/s]."""
-
-    T: list[answers.Numbers]
-    pitch: float | None
-    roll: float | None
-    speed: float
-
-    @classmethod
-    def of(cls, arm: MountedArm, now: control.State) -> _Tool:
-        """Return the tool of ``arm`` in the state ``now``."""
-        kinematics = arm.kinematics_to(now.tool)
-        T = forward(kinematics.chain, now.q).tolist()
-        target = kinematics.target_at(now.q)
-        speed = kinematics.tool_speed(now.setpoint, now.motion.qd)
-        if target.is_pitched:
-            return cls(T, target.pitch, target.roll, speed)
-        return cls(T, None, None, speed)
+def _of_tool(arm: MountedArm, distances: Margins, now: control.State) -> dict[str, Any]:
+    """Return the fields of a state about the tool of ``arm``; ``distances``: its margins."""
+    kinematics = arm.kinematics_to(now.tool)
+    target = kinematics.target_at(now.q)
+    return {
+        "tool": now.tool,
+        "T": forward(kinematics.chain, now.q).tolist(),
+        "pitch": target.pitch if target.is_pitched else None,
+        "roll": target.roll if target.is_pitched else None,
+        "tool_speed": kinematics.tool_speed(now.setpoint, now.motion.qd),
+        "margins": margins(distances),
+        "branch": tuple(str(now.branch).split("-")),
+        "priority": now.priority.value,
+    }
 
 
 def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
@@ -239,51 +220,28 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
 def arm(robot: Robot, ready: list[float]) -> answers.Arm:
     """Return the description of ``robot``. ``ready``: posture to which Home moves."""
     mounted = robot.arm
-    if mounted is None:
-        joints = robot.joint_group
-        jointed = _Jointed(joints.names, joints.slides, joints.limits, joints.why)
-        return jointed.description(robot, ready)
-    names, gripper = mounted.chain.names, mounted.gripper
-    jointed = _Jointed(names, (False,) * len(names), mounted.limits)
-    return msgspec.structs.replace(
-        jointed.description(robot, ready),
-        tools={name: M.tolist() for name, M in mounted.tools.items()},
-        default_tool=mounted.default_tool,
-        freedoms=mounted.kinematics.freedoms,
+    model = robot.joint_group if mounted is None else mounted
+    names = robot.joint_group.names if mounted is None else mounted.chain.names
+    limits, gripper = model.limits, model.gripper
+    return answers.Arm(
+        name=robot.name,
+        joints=list(names),
+        lower=limits.lower.tolist(),
+        upper=limits.upper.tolist(),
+        speed=limits.speed.tolist(),
+        acceleration=limits.acceleration.tolist(),
+        jerk=limits.jerk.tolist(),
+        ready=ready,
+        tools={} if mounted is None else {name: M.tolist() for name, M in mounted.tools.items()},
+        default_tool=None if mounted is None else mounted.default_tool,
         gripper=(gripper.closed, gripper.opened, gripper.speed) if gripper.moves else None,
         gripper_slides=gripper.slides,
-        T_base_shoulder=mounted.T_base_shoulder.tolist(),
+        T_base_shoulder=None if mounted is None else mounted.T_base_shoulder.tolist(),
+        slides=list(model.slides),
+        links=_joint_links(robot, names),
+        joints_only=robot.why,
+        freedoms=0 if mounted is None else mounted.kinematics.freedoms,
     )
-
-
-class _Jointed(NamedTuple):
-    """Joints of a mechanism. ``why``: reason for which no tool can be moved to a pose."""
-
-    names: tuple[str, ...]
-    slides: tuple[bool, ...]
-    limits: Limits
-    why: str = ""
-
-    def description(self, robot: Robot, ready: list[float]) -> answers.Arm:
-        """Return the description of a mechanism without tools."""
-        return answers.Arm(
-            name=robot.name,
-            joints=list(self.names),
-            lower=self.limits.lower.tolist(),
-            upper=self.limits.upper.tolist(),
-            speed=self.limits.speed.tolist(),
-            acceleration=self.limits.acceleration.tolist(),
-            jerk=self.limits.jerk.tolist(),
-            ready=ready,
-            tools={},
-            default_tool=None,
-            gripper=None,
-            gripper_slides=False,
-            T_base_shoulder=None,
-            slides=list(self.slides),
-            links=_joint_links(robot, self.names),
-            joints_only=self.why,
-        )
 
 
 def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
@@ -301,34 +259,31 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
 
 def branch_option(choice: BranchOption) -> answers.BranchOption:
     """Return a branch that can be chosen as a part of an answer."""
-    metrics, contact = choice.metrics, choice.contact
-    return answers.BranchOption(
-        name=str(metrics.branch),
-        shoulder=None if isinstance(metrics.branch, str) else metrics.branch.shoulder,
-        elbow=None if isinstance(metrics.branch, str) else metrics.branch.elbow,
-        q=metrics.q.tolist(),
-        within_limits=metrics.within_limits,
-        position_error=metrics.position_error,
-        rotation_error=metrics.rotation_error,
-        distance=metrics.distance,
-        time=metrics.time,
-        smallest_singular_value=metrics.smallest_singular_value,
-        contact=None if contact is None else contact.parts,
-        refusal=choice.refusal,
+    metrics, branch = choice.metrics, choice.metrics.branch
+    return msgspec.convert(
+        {
+            **vars(metrics),
+            "name": str(branch),
+            "shoulder": None if isinstance(branch, str) else branch.shoulder,
+            "elbow": None if isinstance(branch, str) else branch.elbow,
+            "q": metrics.q.tolist(),
+            "contact": None if choice.contact is None else choice.contact.parts,
+            "refusal": choice.refusal,
+        },
+        answers.BranchOption,
     )
 
 
 def objects(arm: ArmHandle) -> answers.Objects:
     """Return all scene objects as an answer."""
     now = arm.state
-    x = now.x
     return answers.Objects(
         objects=[
             answers.SceneObject(
                 name=scene_object.name,
                 shape=scene_object.shape.value,
                 size=list(scene_object.size),
-                T=arm.environment.pose(scene_object, x).tolist(),
+                T=arm.environment.pose(scene_object, now.x).tolist(),
                 can_be_held=scene_object.can_be_held,
                 held=scene_object.held,
                 mesh=None if scene_object.solid is None else scene_object.solid.key,
