@@ -13,11 +13,9 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
-from katana450.errors import InputError
 from katana450.extensions.export.obj_text import DIGITS
 from katana450.extensions.export.vrml import part_world, views, vrml_files, world_of
 from katana450.extensions.export.vrml_world import (
-    HEADER,
     KEYWORDS,
     Node,
     Use,
@@ -162,39 +160,6 @@ def test_every_link_with_a_shape_has_a_file(gantry: Robot) -> None:
     assert sorted(files) == sorted(["gantry_2.wrl", *(f"parts/{part}.wrl" for part in parts)])
     for content in files.values():
         read_world(content.decode())
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "must begin"),
-        ("#VRML V1.0 ascii\n", "must begin"),
-        ("#VRML V2.0 utf8x\n", "must begin"),
-        (f"{HEADER}\nGroup {{", "ends too early"),
-        (f"{HEADER}\n\nSphere {{ }}", "line 3: the node 'Sphere' is not supported"),
-        (f"{HEADER}\nGroup {{ color 1 0 0 }}", "no field 'color'"),
-        (f"{HEADER}\nTransform {{ center 1 0 }}", "not form rows of 3"),
-        (f"{HEADER}\nCoordinate {{ point [ 1 2 3 4 ] }}", "not form rows of 3"),
-        (f"{HEADER}\nIndexedFaceSet {{ coordIndex [ 1.5 ] }}", "not of whole numbers"),
-        (f"{HEADER}\nIndexedFaceSet {{ solid 1 }}", "TRUE or FALSE"),
-        (f"{HEADER}\nGroup {{ children [ USE a ] }}", "before it is defined"),
-        (f"{HEADER}\nDEF a Group {{ children USE a }}", "before it is defined"),
-        (f"{HEADER}\nDEF a Group {{ }} DEF a Group {{ }}", "defined twice"),
-        (f"{HEADER}\nDEF TO Group {{ }}", "'TO' is not a name"),
-        (f"{HEADER}\nDEF a Group {{ }} USE a", "USE is not allowed"),
-        (f'{HEADER}\nWorldInfo {{ title "open }}', "unterminated"),
-        (f"{HEADER}\n" + "Group { children " * 300, "deep"),
-    ],
-)
-def test_invalid_vrml_is_refused(text: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_world(text)
-
-
-def test_comments_commas_and_bare_values_are_read() -> None:
-    text = f"{HEADER} by hand\n# one\nTransform{{center 1,2,3#two\nchildren Group{{}}}}"
-    shown = (("center", (1.0, 2.0, 3.0)), ("children", Node("Group")))
-    assert read_world(text) == World((Node("Transform", shown),))
 
 
 def picture(folder: Path, content: bytes, name: str = "scene.wrl", time: float = 0.0) -> Path:

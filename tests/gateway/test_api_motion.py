@@ -252,21 +252,6 @@ def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("rates", [pytest.param(False, marks=pytest.mark.long), True])
-def test_stream_inside_the_limits_is_not_overshot(program: Client, rates: bool) -> None:
-    """The stream uses 0.7 of the acceleration."""
-    program.go(requests.Home())
-    began, reached = time.monotonic(), 0.0
-    while (t := time.monotonic() - began) < 6.5:
-        q, qd = READY.copy(), np.zeros(5)
-        q[0], qd[0] = READY[0] + SIZE * math.sin(OMEGA * t), SIZE * OMEGA * math.cos(OMEGA * t)
-        # The answer arrives once the server has the sample.
-        program.ask(requests.Servo(q=q, qd=qd if rates else None))
-        reached = max(reached, abs(program.query(answers.State).setpoint[0] - READY[0]))
-        time.sleep(max(0.0, began + t + 0.02 - time.monotonic()))
-    assert 0.9 * SIZE < reached < 1.05 * SIZE
-
-
 SIZE, OMEGA = 0.4, math.tau / 3.0
 """Amplitude [rad] and maximum speed [rad/s] of a sine."""
 
@@ -279,6 +264,28 @@ def test_states_arrive_at_the_requested_rate(program: Client) -> None:
         if len(times) == 60:
             break
     assert np.mean(np.diff(times)) == pytest.approx(0.02, abs=1e-3)
+
+
+SLOW_WATCH = 0.1
+"""[Hz] Rate of the states of a watcher that learns of a stop between them."""
+
+
+def test_slow_watcher_learns_of_a_stop_at_once(local: VirtualServer, program: Client) -> None:
+    program.ask(requests.Speed(value=0.2))
+    program.ask(requests.Joints(q=THERE))
+    with local.connect("Watcher") as watcher:
+        states = watcher.states(SLOW_WATCH)
+        next(states)
+        began = time.monotonic()
+        program.stop()
+        while next(states).stop != "confirmed":
+            pass
+        assert time.monotonic() - began < 0.1
+        program.clear_stop()
+        while next(states).stopped is not None:
+            pass
+        # It can be cleared only at rest, and 1 s after it.
+        assert time.monotonic() - began < 2.0
 
 
 PLACE = np.deg2rad((20.0, -60.0, 80.0, 20.0, -30.0))

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from katana450.server.web.security import MAX_MESSAGE_BYTES
 from tests.browser.server import AppServer
@@ -203,11 +203,12 @@ def test_closed_browser_receives_no_more_frames(server: AppServer) -> None:
 
     async def knock(cookie: str) -> None:
         path = f"/viser?page={page_name()}"
-        with suppress(ConnectionClosed):
+        # A busy server may still count closed connections, and refuse more of this address.
+        with suppress(ConnectionClosed, InvalidHandshake, ConnectionError):
             async with websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL]) as bad:
                 for _ in range(200):
                     await bad.send(b"\xff")
-                await asyncio.wait_for(bad.wait_closed(), 10.0)
+                await asyncio.wait_for(bad.wait_closed(), 30.0)
 
     async def crowd() -> None:
         cookie = enter(server.url)

@@ -17,7 +17,7 @@ from katana450.server.web.access_links import AccessFile
 from katana450.server.web.stop_connection import MAX_HEAD_BYTES
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR
-from tests.gateway.test_frozen_arm import under_way
+from tests.gateway.test_watchdogs import under_way
 
 HELLO = b'{"do": "hello", "name": "Cell"}\n'
 STOP = b'{"do": "stop"}\n'

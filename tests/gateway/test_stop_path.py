@@ -20,7 +20,7 @@ from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer, ServerError
 from tests.gateway.client import ask, controlling, enter, page_name
 from tests.gateway.postures import THERE
-from tests.gateway.test_frozen_arm import under_way
+from tests.gateway.test_watchdogs import under_way
 from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(

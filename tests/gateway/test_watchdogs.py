@@ -25,8 +25,8 @@ from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
 from tests.gateway.client import ask, healthy
+from tests.gateway.lines import speaking
 from tests.gateway.postures import FAR
-from tests.gateway.test_frozen_arm import process_state
 from tests.waiting import until
 
 pytestmark = pytest.mark.skipif(
@@ -40,7 +40,7 @@ POST = "#VRML V2.0 utf8\nShape { geometry Box { size 0.04 0.04 0.1 } }"
 FATES = [
     ("arm", signal.SIGKILL),
     pytest.param("arm", signal.SIGSTOP, marks=pytest.mark.long),
-    # A killed front end is in `test_frozen_arm`.
+    ("front", signal.SIGKILL),
     pytest.param("front", signal.SIGSTOP, marks=pytest.mark.long),
 ]
 
@@ -204,3 +204,79 @@ def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
             os.kill(server.pid, number)
             until(lambda: all(process_state(each) == "Z" for each in others), 10.0)
         assert all(process_state(each) == "Z" for each in others)
+
+
+def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
+    command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
+    with AppServer(command) as server, speaking(server, "Driver") as driver:
+        driver.say(do="joints", q=FAR.tolist())
+        end = time.monotonic() + 20.0
+        while driver.answer(do="query")["q"][0] < 0.2:
+            assert time.monotonic() < end
+            time.sleep(0.02)
+        with server.frozen(server.arm):
+            end = time.monotonic() + 10.0
+            while look(server)["stopped"] is None:
+                driver.say(do="heartbeat")
+                assert time.monotonic() < end
+                time.sleep(0.1)
+            refused = driver.answer(do="clear_stop")
+            assert "has not answered" in refused["why"]
+        assert "did not answer" in str(look(server)["stopped"])
+        end = time.monotonic() + 5.0
+        while (state := look(server))["stop"] != "confirmed" or state["moving"]:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        assert driver.clear_stop()["is"] == "done"
+        time.sleep(0.5)
+        np.testing.assert_array_equal(look(server)["q"], state["q"])
+
+
+def under_way(arm: Client) -> answers.State:
+    """Start a motion to FAR; return the state once the arm moves."""
+    arm.ask(requests.Joints(q=FAR))
+    end = time.monotonic() + 20.0
+    while (state := arm.query(answers.State)).q[0] < 0.2:
+        assert state.stopped is None
+        assert time.monotonic() < end
+        # A client that asks without pause is taken for a flood.
+        time.sleep(0.01)
+    return state
+
+
+def may_have_real_time() -> bool:
+    """Return whether the system lets a process of this user have a real-time priority."""
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+    except PermissionError:
+        return False
+    os.sched_setscheduler(0, *before)
+    return True
+
+
+def test_threads_of_control_and_stop_preempt_everything(server: AppServer) -> None:
+    # Once somebody drives, everything has started.
+    with connect(server.url, "Driver") as arm:
+        clear_stop(arm)
+        arm.go(requests.Home())
+        arm.ask(requests.ReleaseLease())
+    threads = [int(task.name) for task in Path(f"/proc/{server.arm}/task").iterdir()]
+    policies = [os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK for thread in threads]
+    # The control thread, and the one that takes STOP. All others can wait.
+    assert policies.count(os.SCHED_RR) == (2 if may_have_real_time() else 0)
+    assert policies.count(os.SCHED_OTHER) == len(policies) - policies.count(os.SCHED_RR)
+    others = Path(f"/proc/{server.arm}/task").glob("*/children")
+    for process in [
+        server.front,
+        server.stop_process,
+        *" ".join(p.read_text() for p in others).split(),
+    ]:
+        for task in Path(f"/proc/{process}/task").iterdir():
+            assert os.sched_getscheduler(int(task.name)) == os.SCHED_OTHER
+
+
+def process_state(number: int) -> str:
+    with suppress(OSError):
+        return Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    return "Z"

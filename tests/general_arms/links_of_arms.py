@@ -1,4 +1,4 @@
-"""URDF files of published arms with links of plain shapes, for servers with a page."""
+"""URDF file of a published arm with links of plain shapes, for servers with a page."""
 
 from __future__ import annotations
 
@@ -60,39 +60,3 @@ def ur5e() -> str:
         '<child link="tool0"/><origin xyz="0 0 0" rpy="0 0 0"/></joint>'
     )
     return "\n".join(['<robot name="ur5e">', *links, *joints, flange, "</robot>"])
-
-
-OPENMANIPULATOR_X_JOINTS = (
-    ("joint1", "0 0 1", (0.012, 0.0, 0.017), -math.pi, math.pi),
-    ("joint2", "0 1 0", (0.0, 0.0, 0.0595), -1.5, 1.5),
-    ("joint3", "0 1 0", (0.024, 0.0, 0.128), -1.5, 1.4),
-    ("joint4", "0 1 0", (0.124, 0.0, 0.0), -1.7, 1.97),
-)
-"""Name, axis, place [m] and limits [rad] of each joint: ROBOTIS, description of the arm."""
-
-
-def openmanipulator_x() -> str:
-    """Return a URDF of an OpenMANIPULATOR-X with its tool, each link a rod to the next joint."""
-    places = [joint[2] for joint in OPENMANIPULATOR_X_JOINTS[1:]]
-    links = ['<link name="link1"/>']
-    joints = []
-    ends = [*places, (0.126, 0.0, 0.0)]
-    for number, (name, axis, (x, y, z), lower, upper) in enumerate(OPENMANIPULATOR_X_JOINTS):
-        end = ends[number]
-        middle = " ".join(str(0.5 * each) for each in end)
-        size = " ".join(str(max(0.02, abs(each) - 0.03)) for each in end)
-        geometry = f'<origin xyz="{middle}"/><geometry><box size="{size}"/></geometry>'
-        links.append(
-            f'<link name="link{number + 2}"><visual>{geometry}</visual>'
-            f"<collision>{geometry}</collision></link>"
-        )
-        joints.append(
-            f'<joint name="{name}" type="revolute"><parent link="link{number + 1}"/>'
-            f'<child link="link{number + 2}"/><origin xyz="{x} {y} {z}"/><axis xyz="{axis}"/>'
-            f'<limit lower="{lower}" upper="{upper}" velocity="4.8" effort="1"/></joint>'
-        )
-    tool = (
-        '<link name="end_effector_link"/><joint name="end_effector_joint" type="fixed">'
-        '<parent link="link5"/><child link="end_effector_link"/><origin xyz="0.126 0 0"/></joint>'
-    )
-    return "\n".join(['<robot name="open_manipulator_x">', *links, *joints, tool, "</robot>"])

@@ -25,7 +25,7 @@ from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from katana450.settings import Settings
 from tests.gateway.virtual import VirtualServer
 from tests.general_arms.chain_urdf import chain_urdf
-from tests.general_arms.links_of_arms import openmanipulator_x, ur5e
+from tests.general_arms.links_of_arms import ur5e
 from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
 
 STOP = 0.005
@@ -105,7 +105,7 @@ def test_tool_is_moved_turned_and_stepped_and_undone(tmp_path: Path) -> None:
 
 
 def test_each_branch_moves_the_arm_or_has_its_reason(tmp_path: Path) -> None:
-    with served(tmp_path, openmanipulator_x()) as (arm, _):
+    with served(tmp_path, chain_urdf("arm", OPENMANIPULATOR_X)) as (arm, _):
         choices = arm.query(answers.Branches).choices
         names = [choice.name for choice in choices]
         assert names == ["front-up", "front-down", "back-up", "back-down"]
