@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 from katana450.cli import open_page
 from katana450.cli.open_page import show_page
 from tests.browser.server import SIMULATION_APP, AppServer
+from tests.waiting import until
 
 URL = "http://127.0.0.1:8080"
 BROWSER = """#!/bin/sh
@@ -130,8 +130,5 @@ def test_start_does_not_wait_for_the_browser(tmp_path: Path) -> None:
     command = [part for part in SIMULATION_APP if part != "--no-browser"]
     environment = {key: value for key, value in os.environ.items() if key != "SSH_CONNECTION"}
     with AppServer(command, environment=environment | {"BROWSER": str(browser)}) as server:
-        due = time.monotonic() + 20.0
-        while not page.exists() or not page.read_text(encoding="utf-8"):
-            assert time.monotonic() < due, server.output
-            time.sleep(0.05)
+        until(lambda: page.exists() and page.read_text(encoding="utf-8"))
         assert page.read_text(encoding="utf-8") == f"{server.url}\n"

@@ -6,7 +6,6 @@ import ast
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from katana450.server.api.fields import ROOT as ROOT_PATH
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask
 from tests.gateway.lines import post
+from tests.waiting import until
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "nodding"
 
@@ -74,9 +74,6 @@ def test_installed_example_adds_a_request_and_a_step(
         goal = watcher.query(answers.State).goal[3] + 0.1
         status, answer = post(server, do="nod", by=0.1)
         assert (status, answer["is"]) == (200, "done"), answer
-        due = time.monotonic() + 20.0
-        while abs(watcher.query(answers.State).q[3] - goal) > 1e-6:
-            assert time.monotonic() < due
-            time.sleep(0.01)
+        until(lambda: abs(watcher.query(answers.State).q[3] - goal) <= 1e-6, 20.0)
         described = json.loads(ask(f"{server.url}{ROOT_PATH}/openapi.json")[2])
         assert described["components"]["schemas"]["Nod"]["properties"]["by"]

@@ -16,6 +16,7 @@ from katana450.client import connect
 from katana450.server.api import requests
 from tests.browser.server import AppServer
 from tests.gateway.virtual import VirtualServer
+from tests.waiting import until
 
 FORGED = "2026-01-01 00:00:00,000 WARNING Stopped: Eve pressed STOP."
 
@@ -75,10 +76,10 @@ def test_printable_text_is_left_as_it_is() -> None:
 def test_log_names_the_person_who_stopped_the_arm(server: AppServer) -> None:
     with connect(server.url, "Anna") as arm:
         arm.ask(requests.Stop())
-        end = time.monotonic() + 10.0
-        while " INFO Anna (websocket, anybody may stop the arm), Stop: " not in server.output:
-            assert time.monotonic() < end, server.output
-            time.sleep(0.02)
+        until(
+            lambda: " INFO Anna (websocket, anybody may stop the arm), Stop: " in server.output,
+            10.0,
+        )
 
 
 def test_requests_cannot_forge_a_line_of_the_log(

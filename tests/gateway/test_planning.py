@@ -26,6 +26,7 @@ from katana450.server.service import status
 from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
+from tests.waiting import until
 
 PROMPT = 0.5
 """Maximum time [s] until a cancelled planning has ended."""
@@ -70,9 +71,7 @@ def ask(
 
 def finish(table: Staged, participant: Participant, slow: Slow) -> None:
     slow.released.set()
-    due = time.monotonic() + 20.0
-    while table.status == "planning" and time.monotonic() < due:
-        time.sleep(0.005)
+    until(lambda: table.status != "planning", 20.0)
     table.wait(0.2, participant)
 
 

@@ -31,6 +31,7 @@ from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of
 from katana450.server.service.people import Connection
 from tests.gateway.test_hub import PAGES, Table
+from tests.waiting import until
 
 NOBODY = Person("nobody", "Nobody", Role.ADMIN)
 
@@ -61,9 +62,7 @@ class Staged(Table):
     def plan(self, participant: Participant, script: str = SCRIPT) -> None:
         """Plan ``script`` and wait for the planning thread."""
         self.programs.script(participant, script, more=False, speed=1.0)
-        due = time.monotonic() + 10.0
-        while self.status == "planning" and time.monotonic() < due:
-            time.sleep(0.005)
+        until(lambda: self.status != "planning", 10.0)
 
 
 @pytest.fixture
@@ -213,9 +212,7 @@ def test_command_from_before_a_stop_is_not_executed_after_it(table: Staged) -> N
         table.panel.plan(SCRIPT, ProgramOrder.RUN, clicked)
     with pytest.raises(LeaseError, match="Do it again"):
         table.panel.steer(ProgramOrder.RUN, clicked)
-    due = time.monotonic() + 10.0
-    while table.status == "planning" and time.monotonic() < due:
-        time.sleep(0.005)
+    until(lambda: table.status != "planning", 10.0)
     table.wait(1.0, participant)
     assert table.status == "ready"
     assert not program_runner.running
@@ -337,9 +334,7 @@ def test_owner_must_be_there_when_an_unattended_program_begins(
     assert not table.programs.running
     table.t += 2.0 * OWNER_SILENCE
     table.hub.tick()
-    due = time.monotonic() + 10.0
-    while table.status == "planning" and time.monotonic() < due:
-        time.sleep(0.005)
+    until(lambda: table.status != "planning", 10.0)
     table.wait(1.0)
     assert table.status == "ready"
     assert not table.programs.running

@@ -210,10 +210,7 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
     command = (*ATTENTIVE_APP, "--silence", "0.6", "--lines", "0")
     with AppServer(command) as server, speaking(server, "Driver") as driver:
         driver.say(do="joints", q=FAR.tolist())
-        end = time.monotonic() + 20.0
-        while driver.answer(do="query")["q"][0] < 0.2:
-            assert time.monotonic() < end
-            time.sleep(0.02)
+        until(lambda: driver.answer(do="query")["q"][0] >= 0.2, 20.0)
         with server.frozen(server.arm):
             end = time.monotonic() + 10.0
             while look(server)["stopped"] is None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from katana450.server.api.answers import MeasuredArm
 from tests.browser.server import APP, AppServer, free_port
 from tests.commands import completed
 from tests.real_arm.emulated import TIMEOUT, emulator
+from tests.waiting import until
 
 KATANA450 = (sys.executable, "-m", "katana450")
 
@@ -151,10 +151,7 @@ def measured(client: Client) -> MeasuredArm:
 
 
 def wait_for(client: Client, mode: str) -> None:
-    end = time.monotonic() + TIMEOUT
-    while measured(client).mode != mode:
-        assert time.monotonic() < end, measured(client)
-        time.sleep(0.05)
+    until(lambda: measured(client).mode == mode, TIMEOUT)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +21,7 @@ from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.planning.plan import Plan
+from tests.waiting import until
 
 
 class Sink:
@@ -45,10 +45,7 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     here = state.branch
     assert isinstance(here, Branch)
     worker.deliver(cmd.Branch(here.shoulder, "down" if here.elbow == "up" else "up"), None)
-    end = time.monotonic() + 30.0
-    while any(each.name == "planning" for each in threading.enumerate()):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    until(lambda: not any(each.name == "planning" for each in threading.enumerate()), 30.0)
     return worker, sink.commands
 
 

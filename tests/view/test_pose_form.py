@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import pytest
@@ -16,6 +15,7 @@ from katana450.server.view.readout import BASE, SHOULDER
 from katana450.server.viser_bridge.guard import Guard
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -33,10 +33,7 @@ def choose_frame(server: viser.ViserServer, frame: str) -> None:
     """Choose ``frame`` and wait until the numbers are converted."""
     before = control(server, "x, y, z").value
     control(server, "Frame").value = frame
-    end = time.monotonic() + 10.0
-    while control(server, "x, y, z").value == before:
-        assert time.monotonic() < end, "the numbers are not converted"
-        time.sleep(0.01)
+    until(lambda: control(server, "x, y, z").value != before, 10.0)
 
 
 @pytest.mark.usefixtures("form")

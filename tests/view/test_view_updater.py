@@ -1,4 +1,4 @@
-"""What is written while nothing changes, and the turns of scene and panel."""
+"""Panel and scene: neither waits for the other, and numbers are computed only after a change."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from katana450.server.view.readout import PoseDisplay
 from katana450.server.view.view_updater import ViewUpdater
 from tests.view.gestures import RecordedGestures
 from tests.viser_bridge import internals
+from tests.waiting import until
 
 FRAME_RATE = 10.0
 
@@ -59,9 +60,7 @@ def view(server: viser.ViserServer, publisher: StatePublisher) -> Iterator[Notin
 
 
 def wait_for(view: Noting, ticket: int, count: int) -> list[tuple[str, float]]:
-    end = time.monotonic() + 10.0
-    while len(view.of(ticket)) < count and time.monotonic() < end:
-        time.sleep(0.005)
+    until(lambda: len(view.of(ticket)) >= count, 10.0)
     return view.of(ticket)
 
 
