@@ -76,10 +76,7 @@ def test_printable_text_is_left_as_it_is() -> None:
 def test_log_names_the_person_who_stopped_the_arm(server: AppServer) -> None:
     with connect(server.url, "Anna") as arm:
         arm.ask(requests.Stop())
-        until(
-            lambda: " INFO Anna (websocket, anybody may stop the arm), Stop: " in server.output,
-            10.0,
-        )
+        until(lambda: " WARNING Stopped: Anna pressed STOP." in server.output)
 
 
 def test_requests_cannot_forge_a_line_of_the_log(
