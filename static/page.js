@@ -369,7 +369,7 @@
     line.title = `${ROUND_TRIP}: ${line.textContent.trim()}`;
     body.classList.toggle("stale", lost || bad);
     const banner = byId("banner");
-    const missing = status?.stop_path;
+    const missing = status?.problem;
     banner.hidden = !(lost || bad || missing) || !status;
     banner.className = lost ? "lost" : "";
     // Beside the panel, whose head says which arm it is.

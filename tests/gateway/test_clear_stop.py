@@ -267,6 +267,7 @@ def test_stop_during_the_start_is_confirmed_if_the_arm_was_stopped_on_another_pa
 def test_full_disk_is_reported(table: ClearingTable) -> None:
     table.hub.recorder.problem = "The event log is not written: No space left on device."
     assert status.health(table.hub) == table.hub.recorder.problem
+    assert status.common(table.hub)["problem"] == table.hub.recorder.problem
     table.hub.recorder.problem = ""
     table.hub.shown = {"episodes": {"problem": "Nothing is recorded now: No space left on device."}}
     assert status.health(table.hub) == "Nothing is recorded now: No space left on device."
@@ -278,4 +279,4 @@ def test_missing_path_of_stop_is_reported(table: ClearingTable) -> None:
     assert status.health(table.hub) is None
     table.hub.stop_path.problem = "STOP is not served on port 8081 now."
     assert status.health(table.hub) == "STOP is not served on port 8081 now."
-    assert status.common(table.hub)["stop_path"] == "STOP is not served on port 8081 now."
+    assert status.common(table.hub)["problem"] == "STOP is not served on port 8081 now."

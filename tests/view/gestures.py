@@ -15,7 +15,6 @@ class RecordedGestures:
     def __init__(self) -> None:
         self.commands: list[Command] = []
         self.revocations = 0
-        self.log_problem = ""
 
     def actor(self, _client_id: int | None) -> Actor:
         return ANNA

@@ -143,7 +143,7 @@ def common(hub: Hub) -> dict[str, Any]:
         "stopped": None if stopped is None else stopped.why,
         "stopped_at": None if stopped is None else stopped.cause.at or None,
         "wait": hub.gate.clear_refusal,
-        "stop_path": hub.stop_path.problem,
+        "problem": hub.stop_path.problem or hub.recorder.problem,
         "holder": None if holder is None else holder.name,
         "silence_profile": "" if hub.arm is None else hub.arm.profile.value,
         "detour": state is not None and state.detour is not None and age is None,

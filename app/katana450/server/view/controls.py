@@ -48,11 +48,6 @@ class GestureGate(Protocol):
         """Submit ``command`` and return its ticket. Raises LeaseError and InputError."""
         ...
 
-    @property
-    def log_problem(self) -> str:
-        """Why events are not recorded, as a sentence; empty while they are."""
-        ...
-
     def is_current(self, actor: Actor, /) -> bool:
         """Return False if a stop or a loss of the lease has happened since ``actor`` began."""
         ...
@@ -60,9 +55,6 @@ class GestureGate(Protocol):
 
 class NoGestures:
     """A `GestureGate` that refuses everything, for a scene that only shows an arm."""
-
-    log_problem = ""
-    """Nothing is recorded, so there is no problem."""
 
     def actor(self, _client_id: int | None) -> Actor:
         """Raise LeaseError."""

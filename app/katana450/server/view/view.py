@@ -23,7 +23,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras
 from katana450.server.view.controls import GestureGate
-from katana450.server.view.display_options import LogProblem, add_views
+from katana450.server.view.display_options import add_views
 from katana450.server.view.gizmo import Gizmo
 from katana450.server.view.layer import ViewLayer
 from katana450.server.view.paint import PaintNodes, Tint
@@ -178,7 +178,6 @@ class View(ViewUpdater):
                     with server.gui.add_folder("Show"):
                         for layer in self._layers:
                             layer.add_controls(server.gui)
-                self._log_problem = LogProblem(server.gui, gestures)
             # At the end of the panel, because the element takes an empty line.
             server.gui.add_html(style())
         self.show_panel(snapshot)
@@ -202,7 +201,6 @@ class View(ViewUpdater):
         with self._server.atomic():
             caught_up = snapshot.ticket == self._last_ticket()
             self._panel.follow(snapshot.state, time.perf_counter(), caught_up=caught_up)
-            self._log_problem.follow()
             for folder in self._folders:
                 folder.follow()
 

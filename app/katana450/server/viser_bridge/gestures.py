@@ -83,11 +83,6 @@ class Gestures:
         """See ``CommandGate.submit``."""
         return self._gate.submit(command, actor)
 
-    @property
-    def log_problem(self) -> str:
-        """See ``Recorder.problem``."""
-        return self._hub.recorder.problem
-
     def is_current(self, actor: Actor) -> bool:
         """See ``CommandGate.is_current``."""
         return self._gate.is_current(actor)
