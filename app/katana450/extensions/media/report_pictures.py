@@ -6,7 +6,6 @@ they show the arm on it, with the part that it has traced.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
@@ -31,6 +30,8 @@ from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.path import point_derivatives
+from katana450.server.view.cameras import camera_pose
+from katana450.server.viser_bridge.presets import Preset
 
 SIDES = 8
 """Number of sides of a tube."""
@@ -78,12 +79,6 @@ CLOSING = ": close"
 
 EMPTYING = 0.45
 """[1] Fraction of the pouring motion at which the cup pours."""
-
-BESIDE = (0.75, -0.6, 0.45)
-"""[1] Place of the camera beside the hand of another arm, in distances of `FROM_HAND`."""
-
-FROM_HAND = 2.2
-"""[1] Distance of the camera from that hand, in distances of the hand from the base."""
 
 DESIRED_RADIUS, TRACED_RADIUS = 1.2e-3, 2e-3
 """[m] Radii of the tubes of the desired and the traced path."""
@@ -146,13 +141,10 @@ Look = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 def _look(robot: Robot, state: State) -> Look:
     """Return the look at an object that the arm grasps in ``state``."""
-    arm = robot.require_arm()
-    if isinstance(arm.kinematics, FiveAxisTool):
+    if isinstance(robot.require_arm().kinematics, FiveAxisTool):
         return ON_TABLE
-    x, y, z = (arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q))[:3, 3].tolist()
-    reach = math.hypot(x, y, z)
-    distance_ahead, aside, above = (FROM_HAND * reach * share for share in BESIDE)
-    return (x + distance_ahead, y + aside, z + above), (0.6 * x, 0.6 * y, 0.4 * reach)
+    view = camera_pose(Preset.FREE, robot, state)
+    return view.position, view.target
 
 
 def _same(program: Program, one: int, other: int) -> bool:
