@@ -45,7 +45,6 @@ steps:
 - gripper: open
 - gripper: {to: closed, holding: cup}
 - wait: 0.5
-- wait_for: {placed: {object: cup, at: corner}, timeout: 3}
 - tool: grasp
 - speed: 0.4
 - put: {object: cup, x: 300, y: 0}
@@ -92,7 +91,6 @@ def everything() -> katana450.ScriptWriter:
         p.gripper("open")
         p.gripper("closed", holding="cup")
         p.wait(np.float64(0.5))
-        p.wait_for(placed={"object": "cup", "at": "corner"}, timeout=3)
         p.tool("grasp")
         p.speed(0.4)
         p.put("cup", 300, 0)

@@ -177,6 +177,9 @@ def test_state_is_measured_when_the_step_is_reached(stage: Stage, empty: State) 
         ("time: {at_most: 2 min}", True),
         ("gripper: {at_least: 1}", False),
         ("held: cup", False),
+        ("placed: {object: cup, at: [0, 0, 0], within: 1000}", True),
+        ("placed: {object: cup, at: [0, 0, 0]}", False),
+        ("volume: {of: basin, at_most: 1}", True),
     ],
 )
 def test_conditions_are_measured(stage: Stage, empty: State, condition: str, holds: bool) -> None:
@@ -186,6 +189,19 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
     assert run.choices == ((1, holds),)
     taken = program.tasks[program.predicted[-1]].action
     assert taken.fraction(empty, 0.1) == (1.0 if holds else 0.5)
+
+
+@pytest.mark.parametrize(
+    ("condition", "said"),
+    [
+        ("held: jug", "no object 'jug'"),
+        ("volume: {of: cup, at_least: 3}", "There is no water"),
+        ("volume: {of: jug, at_least: 3}", "no object 'jug'"),
+    ],
+)
+def test_condition_that_never_holds_is_refused(stage: Stage, condition: str, said: str) -> None:
+    with pytest.raises(ScriptError, match=said):
+        planned(stage, f"  - if: {{{condition}, then: [home]}}\n", stage.begin())
 
 
 def test_alternatives_in_loops_and_definitions(stage: Stage, empty: State) -> None:
@@ -230,20 +246,6 @@ def test_number_of_copies_of_a_step_is_bounded(stage: Stage, empty: State) -> No
     begin = PlanState(stage.plan_context, empty)
     assert Compiler(parse(HEAD + 4 * one + home), begin).tasks()
     assert Compiler(parse(HEAD + 8 * (one + home)), begin).tasks()
-
-
-def test_arrangement_after_different_ends_is_planned(stage: Stage, empty: State) -> None:
-    """The cup is put where the basin stands, which is moved by the step after that."""
-    cup, basin = (
-        "{{object: {}, x: {:.1f}, y: {:.1f}}}".format(name, *(1e3 * each.T[:2, 3]))
-        for name, each in zip(("basin", "cup"), empty.objects, strict=True)
-    )
-    text = (
-        "  - if: {time: {at_least: 50}, then: [{nudge: {axis: 5, by: 5}}]}\n"
-        f"  - put: {basin}\n  - put: {cup}\n  - home\n"
-    )
-    assert [each.name for each in empty.objects] == ["cup", "basin"]
-    assert planned(stage, text, empty).steps == 5
 
 
 def test_impossible_step_of_an_alternative_is_refused(stage: Stage, empty: State) -> None:

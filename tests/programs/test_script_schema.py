@@ -119,7 +119,6 @@ def test_schema_has_every_field_of_a_place() -> None:
         "steps: [{line: {to: [1, 2, 3], by: [1, 2, 3]}}]",
         "steps: [{trajectory: {}}]",
         "steps: [{place: {}}]",
-        "steps: [{wait_for: {volume: {of: cup}}}]",
         "steps: [{repeat: {times: 2, index: i, until: {held: cup}, steps: [home]}}]",
         "steps: [{lines: {through: [[1, 2, 3]]}}]",
         "steps: [{arc: {axis: x, angle: 20}}]",

@@ -37,7 +37,6 @@ steps:
 
 BOTH = """\
 - pour: {into: glass, ml: 100}
-- wait_for: {volume: {of: glass, at_least: 99}}
 - pour: basin
 - set_down
 - pick: glass

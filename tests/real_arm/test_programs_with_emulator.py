@@ -122,9 +122,7 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
         assert state.stopped is None, state.stopped
         return state
 
-    states = [
-        state for state, _ in simulated(plan.program.rehearsed, session, plan.start, PERIOD, drive)
-    ]
+    states = [state for state, _ in simulated(plan.program, session, plan.start, PERIOD, drive)]
     last = states[-1]
     for _ in range(200):
         last = drive(session.step(last, [], last.t + PERIOD))

@@ -150,25 +150,6 @@ class StepMethods:
             value: .
         """
 
-    def wait_for(
-        self,
-        *,
-        held: str | None = ...,
-        placed: Mapping[str, Any] | None = ...,
-        volume: Mapping[str, Any] | None = ...,
-        gripper: Mapping[str, Any] | None = ...,
-        timeout: float | str | None = ...,
-    ) -> None:
-        """Wait at rest until one condition holds.
-
-        Args:
-            held: The fingers hold this object.
-            placed: An object stands at a point.
-            volume: Water in the cup, the basin or another vessel, ml.
-            gripper: Angle of the fingers, deg, or their place, mm, if they slide.
-            timeout: s; 60 unless given.
-        """
-
     def fill(self, water: float | str) -> None:
         """Fill the cup with water, ml.
 

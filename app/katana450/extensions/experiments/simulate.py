@@ -51,9 +51,6 @@ def simulate(script: Script, options: Namespace) -> int:
     plan = plan_script(script, options.urdf, options.seed, options.speed, begin)
     program, robot = plan.program, plan.robot
     notes = (*((BARE,) if script.bare else ()), *program.notes)
-    if program.conditions and not options.dry_run:
-        lines = ", ".join(str(task.line) for task in program.conditions)
-        notes = (*notes, f"Simulated as if each awaited condition held at once: line {lines}.")
     for note in notes:
         print(note)
     if options.dry_run:

@@ -1,4 +1,4 @@
-"""Conditions on the arm, the objects and the water, as a script waits for them."""
+"""Conditions on the arm, the objects and the water, by which a script chooses its steps."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ class Condition(Declared):
 
     @property
     @abstractmethod
-    def awaited(self) -> str:
-        """Words for what is awaited, as in "wait for cup in the hand"."""
+    def words(self) -> str:
+        """Words for what is measured, as in "if cup in the hand"."""
 
     @abstractmethod
     def checked(self, plan: PlanState) -> Self:
@@ -78,8 +78,8 @@ class Held(Condition):
     name: ObjectName
 
     @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
+    def words(self) -> str:
+        """Words for what is measured."""
         return f"{self.name} in the hand"
 
     def checked(self, plan: PlanState) -> Self:
@@ -112,8 +112,8 @@ class Placed(Condition):
     in_base: bool = False
 
     @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
+    def words(self) -> str:
+        """Words for what is measured."""
         return f"{self.name} at its place"
 
     def checked(self, plan: PlanState) -> Self:
@@ -143,8 +143,8 @@ class Volume(Bounded, Condition):
     at_most: Millilitres = math.inf
 
     @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
+    def words(self) -> str:
+        """Words for what is measured."""
         return f"the water in the {self.of}"
 
     def checked(self, plan: PlanState) -> Self:
@@ -181,8 +181,8 @@ class FingerPlace(Bounded, Condition):
     at_most: FingerBound = math.inf
 
     @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
+    def words(self) -> str:
+        """Words for what is measured."""
         return "the gripper"
 
     def checked(self, plan: PlanState) -> Self:
@@ -208,23 +208,20 @@ class ProgramTime(Bounded):
     at_most: Seconds = math.inf
 
     @property
-    def awaited(self) -> str:
-        """Words for what is awaited."""
+    def words(self) -> str:
+        """Words for what is measured."""
         return "the time"
 
 
-CONDITIONS: dict[str, Kind[Condition]] = {
+Choice = Condition | ProgramTime
+CONDITIONS: dict[str, Kind[Choice]] = {
     "held": record(Held),
     "placed": record(Placed),
     "volume": record(Volume),
     "gripper": record(FingerPlace),
+    "time": record(ProgramTime),
 }
-"""The conditions on the state, by their names in a script."""
+"""The conditions, by their names in a script."""
 
-CONDITION: Group[Condition | None] = one_of(CONDITIONS)
-"""One condition on the state."""
-
-Choice = Condition | ProgramTime
-CHOICES: dict[str, Kind[Choice]] = {**CONDITIONS, "time": record(ProgramTime)}
-CHOICE: Group[Choice | None] = one_of({name: bound(kind) for name, kind in CHOICES.items()})
+CHOICE: Group[Choice | None] = one_of({name: bound(kind) for name, kind in CONDITIONS.items()})
 """One condition of an ``if``, in which names may stand for values."""

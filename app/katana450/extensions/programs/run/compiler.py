@@ -148,7 +148,7 @@ class _TaskList:
 
     def _add_choice(self, step: PlannedChoice, exits: Sequence[_Exit]) -> Sequence[_Exit]:
         jump = ConditionalJump(step.condition, step.predicted, 0, 0)
-        name = f"if {step.condition.awaited}"
+        name = f"if {step.condition.words}"
         index = self.add(Task(step.number, step.located.line, name, jump), exits)
         then = self.add_steps(step.then, (_Exit(index, THEN),))
         return (*then, *self.add_steps(step.otherwise, (_Exit(index, OTHERWISE),)))

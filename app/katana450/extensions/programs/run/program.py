@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from katana450.arm.control.state import State
@@ -21,7 +21,6 @@ from katana450.extensions.programs.building.step import (
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.run.compiler import Compiler, ConditionalJump, Report
 from katana450.extensions.programs.script.script import Script
-from katana450.extensions.programs.steps.settings_steps import WaitUntil
 from katana450.maths.geometry.arrays import FloatArray
 
 
@@ -163,22 +162,6 @@ class Program:
             for task in self.tasks
             if isinstance(task.action, FollowPlan) and task.action.note
         )
-
-    @property
-    def conditions(self) -> tuple[Task, ...]:
-        """The tasks that wait for a condition."""
-        return tuple(task for task in self.tasks if isinstance(task.action, WaitUntil))
-
-    @property
-    def rehearsed(self) -> Program:
-        """The program for a simulation in which nobody acts: all conditions count as true."""
-        tasks = [
-            replace(task, action=replace(task.action, assumed=True))
-            if isinstance(task.action, WaitUntil)
-            else task
-            for task in self.tasks
-        ]
-        return replace(self, tasks=tuple(tasks))
 
 
 def compiled(

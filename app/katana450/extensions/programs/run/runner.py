@@ -127,7 +127,7 @@ def _tau(program: Program, run: Run, state: State) -> float:
 
 
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
-    """Return the expected time until ``run`` ends [s], without pauses and awaited conditions.
+    """Return the expected time until ``run`` ends [s], without pauses.
 
     Of alternatives the longer one counts. ``allowed`` is the maximum fraction of full speed for the
     tasks to come.

@@ -203,7 +203,7 @@ def plan_script(
 
 
 def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
-    """Run ``plan`` to its end with a progress bar. Conditions count as true.
+    """Run ``plan`` to its end with a progress bar.
 
     ``driver``: the arm, at the start of the plan; None for one that follows exactly. Raises
     KatanaError if it ends early.
@@ -211,7 +211,7 @@ def run_by_clock(plan: Planned, driver: Driver | None = None) -> Simulation:
     if driver is None:
         driver = SimulatedDriver(plan.robot.require_arm(), plan.start.q, plan.start.gripper)
     driver.start(plan.start.t)
-    program, session, period = plan.program.rehearsed, plan.session, 1.0 / Settings().rate
+    program, session, period = plan.program, plan.session, 1.0 / Settings().rate
 
     def drive(state: State) -> State:
         return driven(session, state, state.t, driver.send)
@@ -343,7 +343,7 @@ def moments(
 ) -> Iterator[Moment]:
     """Simulate ``program`` from ``state``; yield moments at increasing times of ``timeline``.
 
-    Awaited conditions count as true. A program that fails, or takes another alternative than
+    A program that fails, or takes another alternative than
     predicted, ends early. One that takes longer than a day raises InputError.
     """
     at_rest = JointMotion.rest(state.setpoint)
@@ -354,7 +354,7 @@ def moments(
     apart = max(TICK, timeline.span / MAX_MOMENTS)
     last = Moment(0.0, start)
     yielded = -apart
-    for now, run in simulated(program.rehearsed, session, start, TICK, follow_exactly):
+    for now, run in simulated(program, session, start, TICK, follow_exactly):
         if run.number not in timeline.schedule:
             break
         t = max(timeline.time_of(now, run), last.t)

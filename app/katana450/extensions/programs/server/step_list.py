@@ -22,7 +22,7 @@ class ListedStep(NamedTuple):
 
     Attributes:
         name: its name, without the name of an action.
-        seconds: its expected duration, without awaited conditions [s].
+        seconds: its expected duration [s].
         alternative: ``then`` or ``else`` for a step of an alternative, otherwise "".
         predicted: whether it is executed if all is as predicted.
     """

@@ -11,12 +11,10 @@ from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
 from katana450.extensions.programs.building.actions import (
-    Action,
     FillCup,
     MoveFingers,
     PutObject,
@@ -24,7 +22,6 @@ from katana450.extensions.programs.building.actions import (
     UseTool,
     Wait,
 )
-from katana450.extensions.programs.building.conditions import CONDITION, Condition
 from katana450.extensions.programs.building.hand_motions import finger_unit, with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
@@ -150,52 +147,6 @@ class Speed(Step, word="speed"):
     def build(self, plan: PlanState) -> PlanState:
         """Append the change of the speed."""
         return plan.with_action(f"speed {self.value:g}", SetSpeed(self.value))
-
-
-TIMEOUT = 60.0
-"""[s] Timeout unless the script gives one."""
-
-
-@dataclass(frozen=True, eq=False)
-class WaitUntil(Action):
-    """Wait at rest until ``condition`` holds, for at most ``timeout`` [s].
-
-    ``assumed``: whether it counts as true, for a simulation in which nobody makes it true.
-    """
-
-    condition: Condition
-    timeout: float
-    assumed: bool = False
-
-    def done(self, state: State, waited: float) -> bool:
-        """Return whether the condition holds. Raises InputError after the timeout."""
-        if self.assumed or self.condition.holds(state):
-            return True
-        if waited > self.timeout:
-            raise InputError(f"The condition did not hold within {self.timeout:g} s.")
-        return False
-
-    def fraction(self, state: State, waited: float) -> float:  # noqa: ARG002
-        """Return the fraction of the timeout that has passed."""
-        return min(waited / self.timeout, 1.0)
-
-
-@dataclass(frozen=True)
-class WaitFor(Step, word="wait_for"):
-    """Wait at rest until one condition holds.
-
-    The steps after it are planned for the scene as it is when the script is planned. The program
-    fails after ``timeout`` [s].
-    """
-
-    condition: Annotated[Condition | None, CONDITION]
-    timeout: Annotated[float, number(0.01, MAX_PAUSE, "s", "s; 60 unless given")] = TIMEOUT
-
-    def build(self, plan: PlanState) -> PlanState:
-        """Append the wait. Raises InputError if the condition can never hold."""
-        assert self.condition is not None
-        action = WaitUntil(self.condition.checked(plan), self.timeout)
-        return plan.with_action(f"wait for {self.condition.awaited}", action)
 
 
 @dataclass(frozen=True)
