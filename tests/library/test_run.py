@@ -79,7 +79,7 @@ def test_run_that_is_stopped_during_planning_ends_with_the_reason(
 def test_plan_is_followed_at_a_fraction_of_its_speed(
     shoulder_arm: katana450.Arm, client: katana450.Client
 ) -> None:
-    plan = shoulder_arm.plan_through([[0.2, -1.0, 1.4, 0.3, 0.0], [0.0, -1.0, 1.4, 0.3, 0.0]])
+    plan = shoulder_arm.plan([0.2, -1.0, 1.4, 0.3, 0.0])
     client.joints(plan.start)
     begun = time.monotonic()
     state = plan.run(client, speed=0.5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
@@ -280,25 +279,7 @@ class Arm:
             ...
         katana450.errors.InputError: ...
         """
-        return self._plan(self._planner.through([goal], start, seed))
-
-    def plan_through(
-        self,
-        goals: Sequence[npt.ArrayLike],
-        start: npt.ArrayLike | None = None,
-        *,
-        seed: int = 0,
-    ) -> MotionPlan:
-        """Plan a motion that reaches each of ``goals`` in turn, and rests there for a moment.
-
-        Each goal is joint angles (n,) [rad] or a pose (4, 4) of the tool. Everything else is as in
-        `plan`.
-
-        >>> plan = arm.plan_through([[1.2, -1.0, 1.4, 0.3, 0.0], arm.fk(arm.ready)])
-        >>> bool(np.allclose(arm.fk(plan.end), arm.fk(arm.ready)))
-        True
-        """
-        return self._plan(self._planner.through(goals, start, seed))
+        return self._plan(self._planner.to(goal, start, seed))
 
     def line(
         self,

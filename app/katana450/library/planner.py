@@ -57,16 +57,13 @@ class Planner:
         gripper = self.session.require_arm().gripper.clamp(0.0)
         return replace(self.session.begin(angles, gripper, 0.0), objects=self.objects)
 
-    def through(
-        self, goals: Sequence[npt.ArrayLike], start: npt.ArrayLike | None, seed: int
-    ) -> Plan:
-        """Plan to each of ``goals`` in turn: joint angles (n,) [rad] or a pose (4, 4)."""
+    def to(self, goal: npt.ArrayLike, start: npt.ArrayLike | None, seed: int) -> Plan:
+        """Plan to ``goal``: joint angles (n,) [rad] or a pose (4, 4)."""
         plan = self._plan(start, seed)
-        for goal in goals:
-            if dimensions(goal) == 2:
-                plan = self._to_pose(plan, goal)
-            else:
-                plan = plan.move_to(self.kinematics.chain.check_q(goal), "plan")
+        if dimensions(goal) == 2:
+            plan = self._to_pose(plan, goal)
+        else:
+            plan = plan.move_to(self.kinematics.chain.check_q(goal), "plan")
         if not plan.actions:
             raise InputError("The arm is at the goal already; there is nothing to plan.")
         return _timed(plan)
