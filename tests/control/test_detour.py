@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,9 +17,15 @@ from katana450.arm.control.outcome import NO_DETOUR
 from katana450.arm.control.plans import detour_from, plan_to
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import Reason, State, Status, Verdict
+from katana450.arm.robot.loader import load
+from katana450.errors import BlockedError
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.planning.branch_region import BranchRegion
+from katana450.maths.planning.jet import Jet
+from katana450.maths.planning.sampling import collision_free_paths
 
 TICK = 0.01
 
@@ -87,18 +96,21 @@ def test_offer_is_in_the_same_sentence_and_moves_nothing(shipped: Session, offer
 
 @pytest.mark.parametrize("let_go", [False, True])
 def test_go_arrives_on_the_same_branch(shipped: Session, offered: State, let_go: bool) -> None:
+    chain = shipped.require_arm().chain
     state = offered
     if let_go:
         state = shipped.step(state, [cmd.EndDrag()], state.t + TICK)
         assert isinstance(state.target, JointTarget)
         # An offer outlasts the end of the drag.
         assert state.detour is offered.detour
+    region = BranchRegion(chain, state.branch)  # type: ignore[arg-type]
     state = shipped.step(state, [cmd.Go()], state.t + TICK)
     assert isinstance(state.mode, Following)
     for _ in range(2000):
         if not state.moving:
             break
         state = shipped.step(state, (), state.t + TICK)
+        assert region.holds(state.setpoint)
     assert not state.moving
     assert state.branch == offered.branch
     np.testing.assert_allclose(point(shipped, state), TARGET, rtol=0, atol=1e-6)
@@ -178,3 +190,49 @@ def test_offer_of_another_state_is_refused(shipped: Session, held: State) -> Non
         after = shipped.step(state, [command], state.t + TICK)
         assert after.outcomes[0].verdict is Verdict.REFUSED
         assert after.detour is None
+
+
+def test_line_on_a_branch_is_proven_for_every_place(pincher_back: BranchRegion) -> None:
+    region, held, left = pincher_back, 0, 0
+    for a, b in pairs_on(region, 60):
+        on_line = [region.holds(a + s * (b - a)) for s in np.linspace(0.0, 1.0, 300)]
+        assert region.holds_line(a, b) == all(on_line)
+        held += all(on_line)
+        left += not all(on_line)
+    assert held > 10
+    assert left > 10
+
+
+def test_sampled_path_stays_on_its_branch_with_rounded_corners(pincher_back: BranchRegion) -> None:
+    region = pincher_back
+    bent = [pair for pair in pairs_on(region, 60) if not region.holds_line(*pair)]
+    for a, b in bent[:2]:
+        for path in collision_free_paths(region.chain, a, b, None, 0.0, 0, region.branch):
+            for sigma in np.linspace(0.0, 1.0, 500).tolist():
+                q = [joint.derivatives()[0] for joint in path.joints(Jet.constant(sigma))]
+                assert region.holds(np.array(q))
+
+
+@pytest.fixture
+def pincher_back() -> BranchRegion:
+    """A branch of the PincherX-150 that straight lines leave often."""
+    path = Path(__file__).parents[1] / "robot" / "arms" / "pincherx_150.urdf"
+    return BranchRegion(load(path).require_arm().chain, Branch("back", "up"))
+
+
+def pairs_on(region: BranchRegion, count: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield pairs of random postures (5,) [rad] on a branch."""
+    chain, rng = region.chain, np.random.default_rng(1)
+    drawn = rng.uniform(chain.lower, chain.upper, (5000, 5))
+    kept = [q for q in drawn if region.holds(q)]
+    assert len(kept) >= 2 * count
+    yield from zip(kept[:count], kept[count : 2 * count], strict=True)
+
+
+def test_no_path_on_the_branch_is_refused(shipped: Session) -> None:
+    chain = shipped.require_arm().chain
+    front = chain.clamp(np.radians((0.0, -68.0, 85.0, 8.0, 0.0)))
+    back = chain.clamp(np.radians((0.0, -120.0, 10.0, -100.0, 0.0)))
+    assert not BranchRegion(chain, Branch("front", "up")).holds(back)
+    with pytest.raises(BlockedError, match="was found"):
+        collision_free_paths(chain, front, back, None, 0.0, 0, Branch("front", "up"))

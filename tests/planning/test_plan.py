@@ -21,7 +21,7 @@ from katana450.maths.planning.clearance import Sweep, SweptClearance
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, check_clear, plan
-from katana450.maths.planning.sampling import collision_free_path
+from katana450.maths.planning.sampling import collision_free_paths
 from katana450.maths.planning.scaling import Bounds
 
 
@@ -100,9 +100,9 @@ def test_path_around_the_wall_is_clear_and_deterministic(
     arm: ArmModel, world: CollisionWorld
 ) -> None:
     blocked = across(arm, 0.0)
-    path = collision_free_path(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    (path,) = collision_free_paths(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
     assert brute_force(path, world) >= MARGIN - 1e-4
-    again = collision_free_path(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
+    (again,) = collision_free_paths(arm.chain, blocked.start, blocked.end, world, 0.0, seed=2)
     assert (path.vias == again.vias).all()
     assert (path.blend == again.blend).all()
 
@@ -110,7 +110,7 @@ def test_path_around_the_wall_is_clear_and_deterministic(
 def test_an_end_in_the_wall_is_refused(arm: ArmModel, world: CollisionWorld) -> None:
     clear, inside = across(arm, 0.0).start, np.radians([0.0, -60.0, 80.0, 10.0, 0.0])
     with pytest.raises(BlockedError, match=r"At the end, .* are required"):
-        collision_free_path(arm.chain, clear, inside, world, 0.0, 0)
+        collision_free_paths(arm.chain, clear, inside, world, 0.0, 0)
 
 
 def test_unsuccessful_search_ends(
@@ -124,7 +124,7 @@ def test_unsuccessful_search_ends(
     with pytest.raises(
         BlockedError, match=r"found in 5 tries from seed 0\. On the straight .*wall"
     ):
-        collision_free_path(arm.chain, path.start, path.end, endless, 0.0, 0)
+        collision_free_paths(arm.chain, path.start, path.end, endless, 0.0, 0)
 
 
 def test_path_out_of_a_contact_is_allowed_and_deeper_is_not(

@@ -24,7 +24,7 @@ WAKE_INTERVAL = 0.5
 
 
 class DetourPlanner:
-    """Offers a detour at each gap that ended a drag, if a clear path leads round it.
+    """Offers a detour at each gap that ended a drag, if a clear path on the branch leads round it.
 
     The session withdraws the offer when anything changes; then a new one is planned.
     """

@@ -1,5 +1,7 @@
 """A path around obstacles: two trees of clear postures that grow together, then shortcuts.
 
+The path can also be kept on one branch, whose edges are then obstacles.
+
 Sources: Kuffner and LaValle, RRT-Connect, ICRA 2000; Geraerts and Overmars, Creating high-quality
 paths for motion planning, 2007, for shortcuts. Random numbers come from a seed, and effort is
 counted in postures, so the same question has the same answer on every machine.
@@ -8,6 +10,7 @@ counted in postures, so the same question has the same answer on every machine.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -16,7 +19,9 @@ from katana450.errors import BlockedError
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.clearance import SweptClearance
 from katana450.maths.planning.joint_path import JointPath
@@ -27,6 +32,9 @@ TREE_STEP: Final = 0.3
 
 MAX_POSTURES: Final = 3000
 """Maximum number of drawn postures before the search ends without success: some seconds."""
+
+MAX_DRAWS: Final = 50
+"""Maximum number of draws of one posture on a branch."""
 
 SHORTCUTS: Final = 150
 """Number of attempts to connect two places of the path by a straight line."""
@@ -75,17 +83,22 @@ class _Search:
         fingers: float,
         start: FloatArray,
         end: FloatArray,
+        region: BranchRegion | None,
     ) -> None:
         self.chain = chain
         self.fingers = fingers
+        self.region = region
         x = np.append(start, fingers), np.append(end, fingers)
         self.room = None if world is None else SweptClearance.about(world, MARGIN, *x)
         self.start, self.end = start, end
 
     def clear(self, a: FloatArray, b: FloatArray) -> bool:
-        """Return True if the straight path from `a` to `b` is clear."""
+        """Return True if the straight path from `a` to `b` is clear, and on the branch."""
         checkpoint()
-        return self.met(a, b) is None
+        return self._holds(a, b) and self.met(a, b) is None
+
+    def _holds(self, a: FloatArray, b: FloatArray) -> bool:
+        return self.region is None or self.region.holds_line(a, b)
 
     def met(self, a: FloatArray, b: FloatArray) -> Contact | None:
         """Return the contact on the straight path from `a` to `b`; None when it is clear."""
@@ -105,7 +118,7 @@ class _Search:
         trees = _Tree([self.start]), _Tree([self.end])
         for turn in range(MAX_POSTURES):
             growing, other = trees[turn % 2], trees[1 - turn % 2]
-            drawn = random.uniform(self.chain.lower, self.chain.upper)
+            drawn = self._drawn(random)
             new = self._extended(growing, growing.nearest(drawn, speed), drawn)
             if new is None:
                 continue
@@ -117,6 +130,15 @@ class _Search:
                 path = growing.path(new)[::-1] + other.path(number)[1:]
                 return path if turn % 2 == 0 else path[::-1]
         return None
+
+    def _drawn(self, random: np.random.Generator) -> FloatArray:
+        """Return a random posture inside the limits, as a rule on the branch."""
+        drawn = random.uniform(self.chain.lower, self.chain.upper)
+        for _ in range(MAX_DRAWS):
+            if self.region is None or self.region.holds(drawn):
+                break
+            drawn = random.uniform(self.chain.lower, self.chain.upper)
+        return drawn
 
     def _extended(self, tree: _Tree, number: int, towards: FloatArray) -> int | None:
         """Add a step from posture `number`; return None when it is not clear."""
@@ -157,11 +179,18 @@ class _Search:
         return path
 
     def _tidied(self, path: list[FloatArray]) -> list[FloatArray]:
-        """Return `path` without vias next to each other or to its end."""
+        """Return `path` without vias next to each other or to its end.
+
+        Of two vias next to each other the one stays that keeps the path on the branch.
+        """
         tidied = path[:1]
-        for q in path[1:-1]:
-            if not (self.same(tidied[-1], q) or self.same(path[-1], q)):
-                tidied.append(q)
+        for q, after in pairwise(path[1:]):
+            near = self.same(tidied[-1], q) or self.same(path[-1], q)
+            if near and self._holds(tidied[-1], after):
+                continue
+            if near and len(tidied) > 1 and self._holds(tidied[-2], q):
+                tidied.pop()
+            tidied.append(q)
         return [*tidied, path[-1]]
 
     def _duration(self, path: list[FloatArray]) -> float:
@@ -170,28 +199,33 @@ class _Search:
         return float(legs.max(axis=1).sum())
 
 
-def collision_free_path(
+def collision_free_paths(
     chain: Chain,
     start: FloatArray,
     end: FloatArray,
     world: CollisionWorld | None,
     fingers: float,
     seed: int,
-) -> JointPath:
-    """Return a clear path from `start` to `end` (n,) [rad] with the fingers at one angle [rad].
+    branch: Branch | None = None,
+) -> list[JointPath]:
+    """Return clear paths from `start` to `end` (5,) [rad] with the fingers at one angle [rad].
+
+    There is one path, except where a `branch` is so narrow that the arm has to stop in between.
 
     Args:
         chain: the arm.
-        start: the first posture (n,) [rad].
-        end: the last posture (n,) [rad].
+        start: the first posture (5,) [rad].
+        end: the last posture (5,) [rad].
         world: the obstacles; None for no obstacles.
         fingers: the finger joint [rad].
         seed: the seed of the search.
+        branch: the branch that the path stays on; None to allow all.
 
     Raises:
         BlockedError: an end is too near to an obstacle, or no path was found.
     """
-    search = _Search(chain, world, fingers, start, end)
+    region = None if branch is None else BranchRegion(chain, branch)
+    search = _Search(chain, world, fingers, start, end, region)
     for name, q in (("start", start), ("end", end)):
         if (contact := search.worst(q)) is not None:
             raise BlockedError(
@@ -210,18 +244,30 @@ def collision_free_path(
             parts=() if straight is None else straight.parts,
         )
     vias = search.taut(vias, random)
-    return _rounded(chain, vias, world, fingers)
+    blends = [
+        0.0
+        if region and (search.same(before, via) or search.same(via, after))
+        else _largest_blend(region, before, via, after)
+        for before, via, after in zip(vias, vias[1:], vias[2:], strict=False)
+    ]
+    # The arm stops at a corner that no rounding keeps on the branch, and beside another via.
+    stops = [0, *(n for n, blend in enumerate(blends, 1) if blend == 0.0), len(vias) - 1]
+    return [
+        _rounded(chain, vias[a : b + 1], np.array(blends[a : b - 1]), world, fingers)
+        for a, b in pairwise(stops)
+    ]
 
 
 def _rounded(
     chain: Chain,
     vias: list[FloatArray],
+    blend: FloatArray,
     world: CollisionWorld | None,
     fingers: float,
 ) -> JointPath:
-    """Return the path along `vias`, each corner as smooth as the free space allows."""
+    """Return the path along `vias`, each corner as smooth as `blend` and the free space allow."""
     for rounding in ROUNDINGS:
-        path = JointPath(chain, np.array(vias), np.full(len(vias) - 2, rounding))
+        path = JointPath(chain, np.array(vias), np.minimum(blend, rounding))
         try:
             if world is not None:
                 check_clear(path, world, fingers)
@@ -231,3 +277,16 @@ def _rounded(
     raise BlockedError(
         "The path found cannot be followed without stops at its corners. Try another seed."
     )
+
+
+def _largest_blend(
+    region: BranchRegion | None, before: FloatArray, via: FloatArray, after: FloatArray
+) -> float:
+    """Return the largest of ROUNDINGS that keeps a corner on the branch; 0 if none does."""
+    for blend in ROUNDINGS:
+        # A corner cuts off at most this fraction of each leg.
+        cut = 0.5 * blend
+        ends = via + cut * (before - via), via + cut * (after - via)
+        if region is None or region.holds_corner(ends[0], via, ends[1]):
+            return blend
+    return 0.0
