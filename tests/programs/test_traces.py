@@ -1,4 +1,4 @@
-"""The path and the trace of the tool in viser's scene; nothing is sent at rest."""
+"""The trace of the tool in viser's scene; nothing is sent at rest."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def server() -> Iterator[viser.ViserServer]:
     server.stop()
 
 
-def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedArm) -> None:
+def test_trace_follows_the_arc(server: viser.ViserServer, arm: MountedArm) -> None:
     session = Session(arm, np.array(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
     at = ToolTarget.at(arm.chain, session.ready)
@@ -44,9 +44,13 @@ def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedAr
                   Linear(at.pitch, at.pitch), Linear(0.0, 0.0))  # fmt: skip
     path = ToolPath(arm.chain, arc, branch_of(arm.chain, session.ready), session.ready)
     traces = Traces(server, arm)
-    desired, traced = traces._desired, traces._traced
+    traced = traces._traced
+
+    def is_shown() -> bool:
+        return bool(traced.visible)
+
     traces.follow(state)
-    assert [desired.visible, traced.visible] == [False, False]
+    assert not is_shown()
     state = session.step(state, [cmd.Follow(plan_along(arm, None, state, [path]))], 0.01)
     lengths = []
     while state.moving:
@@ -54,26 +58,25 @@ def test_path_and_trace_follow_the_arc(server: viser.ViserServer, arm: MountedAr
         state = session.observe(state, state.setpoint, 0.0)
         traces.follow(state)
         lengths.append(len(traced.points))
-    assert [desired.visible, traced.visible] == [True, True]
+    assert is_shown()
     middle = (arm.T_base_shoulder @ np.append(centre, 1.0))[:3]
-    for handle in (desired, traced):
-        away = np.linalg.norm(np.asarray(handle.points) - middle, axis=2)
-        assert np.abs(away - 0.05).max() < 1e-5
+    away = np.linalg.norm(np.asarray(traced.points) - middle, axis=2)
+    assert np.abs(away - 0.05).max() < 1e-5
     assert (np.asarray(traced.colors) == GOOD_COLOUR.astype(np.uint8)).all()
     # The trace is extended ten times a second, not at every tick.
     assert len(set(lengths)) < 1.2 * len(lengths) / 10 + 3
     last = traced.points
     traces.follow(state)
     assert traced.points is last
-    # Both stay until the arm is driven by hand.
+    # It stays until the arm is driven by hand.
     state = session.step(state, [cmd.Gripper(0.0)], state.t + 0.01)
     traces.follow(state)
-    assert [desired.visible, traced.visible] == [True, True]
+    assert is_shown()
     state = session.step(
         state, [cmd.StepTool(np.array((0.0, 0.0, 0.01, 0.0, 0.0)))], state.t + 0.01
     )
     traces.follow(state)
-    assert [desired.visible, traced.visible] == [False, False]
+    assert not is_shown()
 
 
 def test_errors_have_their_colours() -> None:

@@ -1,4 +1,4 @@
-"""The path of the tool in the scene: the planned path, and the trace coloured by its error."""
+"""The trace of the tool along its planned path in the scene, coloured by its error."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.path import CurvePath, point_derivatives
-from katana450.maths.planning.plan import Plan, Segment
+from katana450.maths.planning.path import CurvePath
+from katana450.maths.planning.plan import Plan
 from katana450.server.view.layer import LayerContext, ViewLayer
 
 DESIRED = (90, 100, 115)
-"""Colour of the planned path."""
+"""Colour of the planned path in a report."""
 
 GOOD_COLOUR, BAD_COLOUR = np.array((22.0, 163.0, 74.0)), np.array((220.0, 38.0, 38.0))
 """Colours of the trace without error, and with WORST_ERROR or more."""
@@ -26,7 +26,7 @@ WORST_ERROR = 1e-3
 """Distance [m] from the planned path at which the trace has BAD_COLOUR."""
 
 PATH_SAMPLES = 240
-"""Number of pieces in which a path is drawn."""
+"""Number of pieces in which a report draws a path."""
 
 SEND_INTERVAL = 0.1
 """Time [s] between two messages: the trace is extended in batches."""
@@ -41,10 +41,10 @@ Colours = npt.NDArray[np.uint8]
 
 
 class TracesLayer(ViewLayer):
-    """Path and trace as a layer of the scene, without controls."""
+    """The trace as a layer of the scene, without controls."""
 
     def attach(self, context: LayerContext) -> None:
-        """Add the hidden nodes."""
+        """Add the hidden node."""
         self._traces = Traces(context.server, context.robot.require_arm())
 
     def follow(self, state: State) -> None:
@@ -53,19 +53,16 @@ class TracesLayer(ViewLayer):
 
 
 class Traces:
-    """Path and trace of the last plan with a tool path, until the arm is driven otherwise.
+    """The trace of the last plan with a tool path, until the arm is driven otherwise.
 
-    Nothing is sent of an arm at rest.
+    The preview draws the path itself. Nothing is sent of an arm at rest.
     """
 
     def __init__(self, server: viser.ViserServer, arm: MountedArm) -> None:
         self._T_base_shoulder = arm.T_base_shoulder
-        two = np.zeros((1, 2, 3), dtype=np.float32)
-        self._desired = server.scene.add_line_segments(
-            "/path/desired", two, DESIRED, thickness=0.003, visible=False
-        )
+        points, colours = (np.zeros((1, 2, 3), dtype=kind) for kind in (np.float32, np.uint8))
         self._traced = server.scene.add_line_segments(
-            "/path/traced", two, np.zeros((1, 2, 3), dtype=np.uint8), thickness=0.006, visible=False
+            "/path/traced", points, colours, thickness=0.006, visible=False
         )
         self._plan: Plan | None = None
         self._points: list[FloatArray] = []
@@ -74,12 +71,12 @@ class Traces:
         self._shown = 0
 
     def follow(self, state: State) -> None:
-        """Extend the trace by the tool point of ``state``, and draw the path of a new plan."""
+        """Extend the trace by the tool point of ``state``."""
         following = state.following
         if following is None:
             if self._plan is not None and isinstance(state.mode, DRIVEN):
                 self._plan = None
-                self._desired.visible = self._traced.visible = False
+                self._traced.visible = False
             return
         if following.plan is not self._plan:
             self._begin(following.plan)
@@ -98,23 +95,11 @@ class Traces:
             self._show()
 
     def _begin(self, plan: Plan) -> None:
-        """Draw the tool paths of ``plan``. A plan without any keeps the last path and trace."""
+        """Begin the trace of ``plan``. A plan without a path of the tool keeps the last trace."""
         self._plan = plan
-        paths = [
-            self._lines(segment) for segment in plan.segments if isinstance(segment.path, CurvePath)
-        ]
-        if not paths:
-            return
-        self._points, self._errors, self._shown = [], [], 0
-        self._traced.visible = False
-        self._desired.points = np.concatenate(paths).astype(np.float32)
-        self._desired.visible = True
-
-    def _lines(self, segment: Segment) -> FloatArray:
-        """Return the line pieces (PATH_SAMPLES, 2, 3) [m] of a segment in the base frame."""
-        points = point_derivatives(segment.path, np.linspace(0.0, 1.0, PATH_SAMPLES + 1))[0]
-        in_base = points @ self._T_base_shoulder[:3, :3].T + self._T_base_shoulder[:3, 3]
-        return np.stack((in_base[:-1], in_base[1:]), axis=1)
+        if any(isinstance(segment.path, CurvePath) for segment in plan.segments):
+            self._points, self._errors, self._shown = [], [], 0
+            self._traced.visible = False
 
     def _in_base(self, point: FloatArray) -> FloatArray:
         """Return ``point`` (3,) [m], given in {S}, in the base frame."""
