@@ -9,10 +9,8 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
-from PIL import Image
 
 from katana450.cli.main import main
 from tests.commands import completed
@@ -76,18 +74,3 @@ def test_the_pages_of_both_demos_are_small_and_load_nothing(tmp_path: Path) -> N
         text = path.read_text(encoding="utf-8")
         assert f"<title>katana450: {run}</title>" in text
         assert "__VISER_EMBED_DATA__" in text
-
-
-def test_a_moment_of_a_motion(tmp_path: Path) -> None:
-    table = tmp_path / "m.csv"
-    table.write_text("t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n1,1.5,-1.19,1.48,0.14\n")
-    pictures = []
-    words = ["--trajectory", str(table), "--size", "160x100"]
-    for name, more in (("start", ["--at", "0"]), ("end", []), ("late", ["--at", "99"])):
-        path = tmp_path / f"{name}.png"
-        assert main(["render", "--out", str(path), *words, *more]) == 0
-        with Image.open(path) as picture:
-            pictures.append(np.asarray(picture).astype(int))
-    start, end, late = pictures
-    assert (end == late).all()
-    assert (np.abs(end - start).sum(axis=2) > 60).sum() > 200

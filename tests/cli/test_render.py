@@ -23,6 +23,14 @@ def test_the_picture_has_the_requested_size(
         assert picture.size == (160, 100)
 
 
+def test_a_picture_of_a_motion_shows_its_end(tmp_path: Path) -> None:
+    table, motion, pose = (tmp_path / name for name in ("m.csv", "motion.png", "pose.png"))
+    table.write_text("t,theta1,theta2,theta3,theta4\n0,0,-1.19,1.48,0.14\n1,1.5,-1.19,1.48,0.14\n")
+    assert main(["render", "--out", str(motion), "--trajectory", str(table), *SMALL]) == 0
+    assert main(["render", "--out", str(pose), "--pose=1.5,-1.19,1.48,0.14,0,0", *SMALL]) == 0
+    assert motion.read_bytes() == pose.read_bytes()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -31,8 +39,6 @@ def test_the_picture_has_the_requested_size(
         (("a.mp4", "--run", "pour", "--size", "101x80"), "must be even"),
         (("a.mp4", "--run", "pour", "--fps", "0"), "pictures per second"),
         (("a.mp4", "--run", "nowhere.yaml"), "nowhere.yaml cannot be read"),
-        (("a.png", "--at", "1"), "--at needs a picture of a motion"),
-        (("a.png", "--run", "circle", "--at", "nan"), "at least 0 s"),
         (("a.png", "--pose", "9,0"), "axis_1 cannot be at 9 rad"),
         (("a.png", "--trajectory", "nowhere.csv"), "nowhere.csv cannot be read"),
         (("nowhere/a.png",), "There is no directory"),

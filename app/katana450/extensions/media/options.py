@@ -23,12 +23,6 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
     add_shown_options(parser)
     parser.add_argument(
-        "--at",
-        type=float,
-        metavar="SECONDS",
-        help="time of a picture of a motion (default: its end)",
-    )
-    parser.add_argument(
         "--camera", choices=CAMERAS, default=CAMERAS[0], help="view (default: %(default)s)"
     )
     parser.add_argument(

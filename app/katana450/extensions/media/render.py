@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from katana450.arm.robot.props import load_props
@@ -22,17 +21,10 @@ def render(options: argparse.Namespace) -> int:
     """Write the file; print its name and size. Raises InputError."""
     path: Path = options.out
     kind = path.suffix.lower()
-    moves = options.run is not None or options.trajectory is not None
     if kind not in (".png", ".mp4"):
         raise InputError(f"{path} must end in .png for a picture or in .mp4 for a film.")
-    if kind == ".mp4" and not moves:
+    if kind == ".mp4" and options.run is None and options.trajectory is None:
         raise InputError("A film needs a motion. Use --run or --trajectory.")
-    if options.at is not None and (kind == ".mp4" or not moves):
-        raise InputError(
-            "--at needs a picture of a motion. Use a .png file with --run or --trajectory."
-        )
-    if options.at is not None and not 0.0 <= options.at < math.inf:
-        raise InputError(f"--at must be a time of at least 0 s, not {options.at:g}.")
     check_traceable()
     check_writable(path)
     if kind == ".mp4":
@@ -40,9 +32,8 @@ def render(options: argparse.Namespace) -> int:
     shot = Shot(Preset[options.camera.upper()], options.size)
     shown = chosen(options)
     if kind == ".png":
-        state = shown.at(shown.duration if options.at is None else options.at)
         stage = RenderStage(shown.robot, shown.session, load_props())
-        rendered = shot.taken(stage, shown.robot, state)
+        rendered = shot.taken(stage, shown.robot, shown.states[-1])
         write_files({path: writer_of(rendered.png)})
     else:
         _film(path, shown, shot, options)
