@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_world import HEADER
 from katana450.extensions.importers import archive
 from katana450.extensions.importers.archive import ChoiceError, packed
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.mesh_file import read_mesh, read_mesh_file
+from katana450.extensions.importers.mesh_file import read_mesh
 from katana450.extensions.importers.scene_file import (
     StoredScene,
-    load_initial_scene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,
@@ -146,12 +146,21 @@ def test_a_changed_file_of_a_zip_is_refused() -> None:
         read_shape(bytes(data), Format.ZIP, "a.zip")
 
 
+def in_folder(path: Path) -> Mesh:
+    """Return the mesh of a file with those of its folder, as a scene in the folder reads it."""
+    scene = path.with_name("scene.yaml")
+    entry = f"{{name: a, shape: mesh, mesh: {{file: {path.name}}}, pose: [400, 0, 0, 0, 0, 0]}}"
+    scene.write_text(f"scene: 1\nobjects: [{entry}]\n")
+    (mesh,) = read_scene_folder(scene, None).meshes
+    return mesh
+
+
 def test_a_file_takes_others_of_its_folder(tmp_path: Path) -> None:
-    mesh = read_mesh_file(written(tmp_path / "robot", ARTICULATED))
+    mesh = in_folder(written(tmp_path / "robot", ARTICULATED))
     assert (mesh.name, mesh.format, len(mesh.faces)) == ("robot", "zip", 36)
     assert sorted(zipfile.ZipFile(io.BytesIO(mesh.file)).namelist()) == sorted(ARTICULATED)
     assert read_mesh(mesh.file, "again.zip").key == mesh.key
-    alone = read_mesh_file(tmp_path / "robot" / "parts" / "x.wrl")
+    alone = in_folder(tmp_path / "robot" / "parts" / "x.wrl")
     assert alone.format == "wrl"
 
 
@@ -164,7 +173,7 @@ def test_no_file_outside_of_the_folder_is_read(tmp_path: Path) -> None:
     for url in ("../secret.wrl", str(secret), f"file://{secret}", "link.wrl", "", "."):
         (folder / "a.wrl").write_text(f'{HEADER}\nInline {{ url "{url}" }}')
         with pytest.raises(InputError, match="no triangles"):
-            read_mesh_file(folder / "a.wrl")
+            in_folder(folder / "a.wrl")
 
 
 def test_files_of_a_folder_are_bounded(tmp_path: Path) -> None:
@@ -172,7 +181,7 @@ def test_files_of_a_folder_are_bounded(tmp_path: Path) -> None:
     (tmp_path / "a.gltf").write_text(json.dumps(document))
     (tmp_path / "a.bin").write_bytes(DATA + bytes(20_000_000))
     with pytest.raises(InputError, match="and the files that it names have over 20 MB"):
-        read_mesh_file(tmp_path / "a.gltf")
+        in_folder(tmp_path / "a.gltf")
 
 
 def test_files_beyond_the_limit_are_not_read() -> None:
@@ -188,26 +197,6 @@ def test_files_beyond_the_limit_are_not_read() -> None:
         read_mesh(world.encode(), "a.wrl", companion=beside)
     left = 20_000_000 - len(world)
     assert asked == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
-
-
-@pytest.mark.long
-def test_serve_places_objects_of_several_files_and_with_a_scale(
-    tmp_path: Path, session: object
-) -> None:
-    path = written(tmp_path, ARTICULATED)
-    big = tmp_path / "big.wrl"
-    big.write_text(f"{HEADER}\nShape {{ geometry Box {{ size 3000 3000 3000 }} }}")
-    with pytest.raises(InputError, match=r"3000 mm long, over 2000 mm.*big.wrl@0.5"):
-        load_initial_scene(session, None, [str(big)])  # type: ignore[arg-type]
-    stored, notes = load_initial_scene(
-        session,  # type: ignore[arg-type]
-        None,
-        [f"{path}@400,300,0", f"{big}@0.05", f"{path}@400,-300,0@0.1"],
-    )
-    placed = {each.name: each for each in stored.scene.objects if each.shape is Shape.MESH}
-    assert [each.scale for each in placed.values()] == [1.0, 0.05, 0.1]
-    assert placed["robot"].T[:3, 3] == pytest.approx([0.4, 0.3, 0.0])
-    assert "36 triangles" in notes[0]
 
 
 @pytest.mark.long

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import pytest
 from msgspec import structs
 
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.client import Client, RefusedError
 from katana450.extensions.export.vrml_world import HEADER
-from katana450.extensions.importers.scene_file import load_initial_scene
 from katana450.server.api import requests
-from tests.exchange.test_several_files import ARTICULATED, PARTS, written, zipped
+from tests.exchange.test_several_files import ARTICULATED, PARTS, zipped
 from tests.gateway.virtual import VirtualServer
 
 
@@ -23,13 +20,6 @@ def upload(local: VirtualServer, data: bytes, **query: str) -> tuple[int, dict[s
     words = "&".join(f"{key}={quote(value)}" for key, value in query.items())
     status, _, body = local.ask(f"/api/v1/mesh?{words}", data=data)
     return status, json.loads(body)
-
-
-def test_serve_reads_the_files_of_a_folder(described: DescribedRobot, tmp_path: Path) -> None:
-    path = written(tmp_path, ARTICULATED)
-    stored, _ = load_initial_scene(described.session, None, [f"{path}@400,300,0@0.5"])
-    (robot,) = (each for each in stored.scene.objects if each.name == "robot")
-    assert robot.scale == 0.5
 
 
 def test_a_zip_is_one_object_and_its_file_is_chosen(local: VirtualServer) -> None:

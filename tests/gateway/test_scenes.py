@@ -54,6 +54,7 @@ objects:
   mesh: {file: ring.stl, unit: mm}
   pose: [420, 150, 0, 90, 0, 30]
   colour: "#2477d4"
+- {name: ring, shape: mesh, mesh: {file: ring.stl, unit: mm}, pose: [300, -400, 50, 0, 0, 0]}
 """
     )
     return path
@@ -71,11 +72,10 @@ def tokens(ring: Path) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def local(
-    described: DescribedRobot, ring: Path, scene: Path, tokens: dict[str, str]
+    described: DescribedRobot, scene: Path, tokens: dict[str, str]
 ) -> Iterator[VirtualServer]:
     access = AccessFile.open(Path(tokens["file"]))
-    begun = ("--scene", str(scene), "--object", f"{ring}@300,-400,50")
-    with VirtualServer(described, *begun, access=access) as server:
+    with VirtualServer(described, "--scene", str(scene), access=access) as server:
         yield server
 
 
@@ -225,7 +225,4 @@ def test_invalid_scene_is_refused_before_the_server_starts(scene: Path) -> None:
     ):
         broken.write_text(text)
         with pytest.raises(InputError, match=reason):
-            load_initial_scene(robot.session, broken, [])
-    for option in ("/nowhere/it.stl", f"{scene}@1,2,x"):
-        with pytest.raises(InputError, match=r"it\.stl cannot be read|unknown format"):
-            load_initial_scene(robot.session, None, [option])
+            load_initial_scene(robot.session, broken)

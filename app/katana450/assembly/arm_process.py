@@ -14,7 +14,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
-from katana450.assembly.log_output import say
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import ServerFacts, results
 
@@ -112,8 +111,6 @@ def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScen
     scene: InitialScene | None = next(results("initial_scene", config.options, session), None)
     if scene is not None:
         Meshes(config.folder).put(scene.meshes, ())
-        for note in scene.notes:
-            say(f"katana450: {note}")
     return (found_robots[0] if found_robots else None), scene
 
 

@@ -61,5 +61,5 @@ def load(
         session=session,
         notes=notes,
         pose_frame=PoseFrame.of(robot.require_arm().T_base_shoulder, frame),
-        objects=load_initial_scene(session, scene_path, ())[0].scene.objects,
+        objects=load_initial_scene(session, scene_path).scene.objects,
     )

@@ -16,10 +16,8 @@ class InitialScene(NamedTuple):
         command: Places its objects and its water.
         joints: (n,) initial joint angles [rad]; None for the ready posture.
         meshes: Meshes of its objects.
-        notes: Sentences to print about the files that were read.
     """
 
     command: cmd.ReplaceScene
     joints: FloatArray | None
     meshes: tuple[Mesh, ...]
-    notes: tuple[str, ...]

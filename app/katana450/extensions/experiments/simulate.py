@@ -103,8 +103,7 @@ def exit_status(report: Report) -> int:
 
 def _begin(session: Session, scene: Path) -> State:
     """Return the state of an arm at rest in the scene of a file. Raises InputError."""
-    stored, _ = load_initial_scene(session, scene, ())
-    return begun(session, stored.scene)
+    return begun(session, load_initial_scene(session, scene).scene)
 
 
 def _choices(program: Program, simulation: Simulation) -> Iterator[str]:

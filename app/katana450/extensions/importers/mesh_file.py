@@ -71,23 +71,6 @@ def read_mesh(
     )
 
 
-def read_mesh_file(path: Path, unit: str | None = None, up: Up | None = None) -> Mesh:
-    """Return the mesh in a file on this machine, with the files in its folder that it names.
-
-    Arguments and errors are those of `read_mesh`. No file outside of the folder is opened.
-    """
-    folder = path.resolve().parent
-
-    def companion(name: str, maximum: int) -> bytes | None:
-        file = (folder / name).resolve()
-        if not file.is_relative_to(folder) or not file.is_file():
-            return None
-        return content_of(file, maximum)
-
-    content = content_of(path, Format.of(path.name).max_bytes)
-    return read_mesh(content, path.name, unit, up, companion=companion)
-
-
 def content_of(path: Path, maximum: int) -> bytes:
     """Return up to ``maximum`` + 1 bytes of the file at ``path``. Raises InputError."""
     try:

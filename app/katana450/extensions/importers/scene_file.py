@@ -7,29 +7,27 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 import numpy as np
 import yaml
 
 from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.free_place import free_place
 from katana450.extensions.importers.archive import (
     MAX_ARCHIVE_BYTES,
     SCENE,
     contents,
     packed,
 )
-from katana450.extensions.importers.mesh_file import content_of, read_mesh, read_mesh_file
+from katana450.extensions.importers.mesh_file import content_of, read_mesh
 from katana450.extensions.importers.shape_file import Format, Up
-from katana450.extensions.objects.scenes import free_name
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import MAX_BYTES, Problem, ScriptError
 from katana450.extensions.programs.script.script import is_script, parse
@@ -288,29 +286,18 @@ def _text(content: bytes, name: str) -> str:
         raise InputError(f"{name} is not UTF-8 text: {error.reason}.") from error
 
 
-PLACED = re.compile(
-    r"(?P<file>.+?)(?:@(?P<at>[^@,]+(?:,[^@,]+){2}))?(?:@(?P<scale>[0-9.]+(?:e-?[0-9]+)?))?"
-)
-"""Pattern of an ``--object`` value: FILE[@x,y,z][@SCALE]."""
-
-
-def initial_scene(
-    session: Session, scene: Path | None, object_files: Sequence[str]
-) -> InitialScene:
+def initial_scene(session: Session, scene: Path) -> InitialScene:
     """Return the initial scene. Raises InputError; see ``load_initial_scene``."""
-    stored, notes = load_initial_scene(session, scene, object_files)
+    stored = load_initial_scene(session, scene)
     command = cmd.ReplaceScene(stored.scene.objects, stored.scene.water)
-    return InitialScene(command, stored.scene.joints, stored.meshes, notes)
+    return InitialScene(command, stored.scene.joints, stored.meshes)
 
 
-def load_initial_scene(
-    session: Session, scene: Path | None, object_files: Sequence[str]
-) -> tuple[StoredScene, tuple[str, ...]]:
-    """Return the scene of the file ``scene`` with the objects of ``object_files``, and notes.
+def load_initial_scene(session: Session, scene: Path | None) -> StoredScene:
+    """Return the scene of the file ``scene``; without a file, the robot's own objects.
 
-    Each of ``object_files`` is FILE[@x,y,z][@SCALE] with x, y, z in mm. Without a scene file, the
-    scene has the robot's own objects. Raises InputError for a file that cannot be read, and for an
-    object that cannot stand at its place.
+    Raises InputError for a file that cannot be read, and for an object that cannot stand at its
+    place.
     """
     hand = session.environment.hand
     stored = StoredScene(Scene(session.begin(session.ready, 0.0, 0.0).objects))
@@ -320,41 +307,5 @@ def load_initial_scene(
         check_scene(session, stored.scene)
     except InputError as error:
         raise InputError(f"{scene}: {error}") from error
-    objects, meshes, notes = list(stored.scene.objects), list(stored.meshes), []
-    for argument in object_files:
-        mesh, scene_object = _object(argument, objects, session.environment.table_height)
-        objects.append(scene_object)
-        meshes.append(mesh)
-        notes.append(f"{scene_object.name}: {mesh.text}")
-    session.check(cmd.ReplaceScene(tuple(objects), stored.scene.water))
-    distinct = {mesh.key: mesh for mesh in meshes}
-    complete = StoredScene(replace(stored.scene, objects=tuple(objects)), tuple(distinct.values()))
-    return complete, tuple(notes)
-
-
-def _object(
-    argument: str, objects: Sequence[SceneObject], table: float
-) -> tuple[Mesh, SceneObject]:
-    match = PLACED.fullmatch(argument)
-    assert match is not None
-    mesh = read_mesh_file(Path(match["file"]))
-    name = free_name(mesh.name, {scene_object.name for scene_object in objects})
-    scale = 1.0
-    if match["scale"] is not None:
-        try:
-            scale = float(match["scale"])
-        except ValueError:
-            raise InputError(f"{argument!r}: the scale must be a number, as in @0.5.") from None
-    elif mesh.scale != 1.0:
-        raise InputError(
-            f"{match['file']}: {mesh.text} Give the scale after the file, as in "
-            f"{match['file']}@{mesh.scale:g}."
-        )
-    scene_object = SceneObject(name, Shape.MESH, (), np.eye(4), solid=mesh.solid, scale=scale)
-    if match["at"] is None:
-        return mesh, replace(scene_object, T=free_place(scene_object, objects, table))
-    try:
-        position = [1e-3 * float(number) for number in match["at"].split(",")]
-    except ValueError:
-        raise InputError(f"{argument!r}: the place must be x,y,z in mm, as in @300,0,0.") from None
-    return mesh, replace(scene_object, T=se3.from_rotation_translation(np.eye(3), position))
+    session.check(cmd.ReplaceScene(stored.scene.objects, stored.scene.water))
+    return stored

@@ -19,32 +19,22 @@ if TYPE_CHECKING:
 
 
 def add_serve_options(parser: ArgumentParser) -> None:
-    """Add the options for the initial scene to ``katana450 serve``."""
+    """Add the option for the initial scene to ``katana450 serve``."""
     parser.add_argument(
         "--scene",
         type=Path,
         metavar="FILE",
         help="initial scene: a scene.yaml with its meshes beside it, or a .zip of both",
     )
-    parser.add_argument(
-        "--object",
-        dest="objects",
-        action="append",
-        default=[],
-        metavar="FILE[@x,y,z][@SCALE]",
-        help="additional object from a .wrl, .stl, .obj, .ply, .glb or .gltf "
-        "file, with the files in its folder that it names, or from a .zip of them; at "
-        "x,y,z in mm or else in front of the arm; can be repeated",
-    )
 
 
 def chosen_scene(options: Namespace, session: Callable[[], Session]) -> InitialScene | None:
-    """Return the scene that the options name; None without one. Raises KatanaError."""
-    if options.scene is None and not options.objects:
+    """Return the scene of ``--scene``; None without one. Raises KatanaError."""
+    if options.scene is None:
         return None
     from katana450.extensions.importers.scene_file import initial_scene
 
-    return initial_scene(session(), options.scene, options.objects)
+    return initial_scene(session(), options.scene)
 
 
 def upload_routes(context: RouteContext) -> list[BaseRoute]:
