@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Route
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.export.vrml import views, vrml_files, world_of
+from katana450.extensions.export.vrml import view, vrml_files, world_of
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
@@ -69,7 +69,7 @@ def test_x_ite_draws_what_we_do(browser: Browser, tmp_path: Path) -> None:
             picture = tmp_path / "picture.png"
             page.screenshot(path=picture)
             values = katana.values(pose)
-            ours = silhouette(placed(URDF_PATH, values), views(katana, values)["All"])
+            ours = silhouette(placed(URDF_PATH, values), view(katana, values))
             assert overlap(seen(picture), ours) >= 0.98
     finally:
         page.close()

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.obj_text import DIGITS
-from katana450.extensions.export.vrml import part_world, views, vrml_files, world_of
+from katana450.extensions.export.vrml import part_world, view, vrml_files, world_of
 from katana450.extensions.export.vrml_world import (
     KEYWORDS,
     Node,
@@ -177,6 +177,6 @@ def test_another_program_draws_the_reference_picture(
     tmp_path: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     values = katana.values(pose)
-    ours = silhouette(placed(URDF_PATH, values), views(katana, values)["All"])
+    ours = silhouette(placed(URDF_PATH, values), view(katana, values))
     theirs = picture(tmp_path, vrml_files(katana, world_of(katana, values))["katana450.wrl"])
     assert overlap(seen(theirs), ours) >= 0.98

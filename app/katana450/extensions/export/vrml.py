@@ -85,41 +85,12 @@ def initial_objects(robot: Robot) -> tuple[PlacedObject, ...]:
     )
 
 
-DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
-    "All": VIEW_DIRECTION,
-    "Front": (-1.0, 0.0, 0.0),
-    "Side": (0.0, 1.0, 0.0),
-    "Top": (0.0, 0.0, -1.0),
-}
-"""Directions of view in the root's frame, by viewpoint. x of the root points ahead."""
-
-TOOL = "Tool"
-"""Name of the viewpoint of the links behind the last axis of an arm."""
-
-
-def views(robot: Robot, values: Mapping[str, float]) -> dict[str, InitialCamera]:
-    """Return the cameras of all viewpoints with the joints at ``values`` [rad, m], by name."""
-    points: dict[str, FloatArray] = {}
+def view(robot: Robot, values: Mapping[str, float]) -> InitialCamera:
+    """Return the camera that sees the whole robot with the joints at ``values`` [rad, m]."""
+    points = [np.zeros((1, 3))]
     for link, T in zip(robot.links, robot.frames(values).values(), strict=True):
-        if link.shapes:
-            vertices = np.concatenate([shape.vertices for shape in link.shapes])
-            points[link.name] = vertices @ T[:3, :3].T + T[:3, 3]
-    everything = np.concatenate([*points.values(), np.zeros((1, 3))])
-    cameras = {name: fitted(everything, np.array(way)) for name, way in DIRECTIONS.items()}
-    if robot.arm is not None:
-        last = robot.arm.chain.names[-1]
-        behind = [
-            points[link.name]
-            for link in robot.links
-            if link.name in points
-            and any(
-                ancestor.joint is not None and ancestor.joint.name == last
-                for ancestor in robot.path_to(link)
-            )
-        ]
-        if behind:
-            cameras[TOOL] = fitted(np.concatenate(behind), np.array(VIEW_DIRECTION))
-    return cameras
+        points += [shape.vertices @ T[:3, :3].T + T[:3, 3] for shape in link.shapes]
+    return fitted(np.concatenate(points), np.array(VIEW_DIRECTION))
 
 
 SURFACE = "_surface"
@@ -214,21 +185,15 @@ def _surroundings(robot: Robot, values: Mapping[str, float]) -> list[Node]:
         Node("Background", (("skyColor", [*SKY]),)),
         Node("DirectionalLight", (("direction", (0.3, -1.0, -0.4)), ("intensity", 0.6))),
     ]
-    for title, view in views(robot, values).items():
-        nodes.append(
-            Node(
-                "Viewpoint",
-                (
-                    ("position", _rounded(_TURN @ view.eye, 6)),
-                    (
-                        "orientation",
-                        _rounded(axis_angle(_TURN @ looking(view.target - view.eye)), 9),
-                    ),
-                    ("fieldOfView", FIELD_OF_VIEW),
-                    ("description", title),
-                ),
-            )
-        )
+    camera = view(robot, values)
+    turn = axis_angle(_TURN @ looking(camera.target - camera.eye))
+    fields: tuple[tuple[str, Value], ...] = (
+        ("position", _rounded(_TURN @ camera.eye, 6)),
+        ("orientation", _rounded(turn, 9)),
+        ("fieldOfView", FIELD_OF_VIEW),
+        ("description", "All"),
+    )
+    nodes.append(Node("Viewpoint", fields))
     return nodes
 
 
