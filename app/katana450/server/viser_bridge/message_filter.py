@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import Counter
 from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any
@@ -38,9 +37,6 @@ MADE = "made"
 """Field that our script adds to each message, with the time of its making [s] on the page's clock.
 viser never gets it."""
 
-MAX_LOGGED_MESSAGES = 20
-"""Maximum number of bad messages of one browser in the log, so that a flood cannot fill it."""
-
 
 class Ruling(Enum):
     """The decision on a message. ``CLOSE`` drops it and closes the connection."""
@@ -68,11 +64,7 @@ class FilterResult:
 
 
 class MessageFilter:
-    """The filter of one connection.
-
-    Attributes:
-        dropped: number of bad messages by their type.
-    """
+    """The filter of one connection."""
 
     def __init__(self, guard: Guard, who: str, t: float) -> None:
         """Begin at ``t`` [s]; ``who`` names the sender in the log."""
@@ -80,7 +72,6 @@ class MessageFilter:
         self._who = who
         self._flood = TokenBucket(RATE, BURST, t)
         self._tolerance = TokenBucket(FORGIVEN_PER_SECOND, MAX_BAD_MESSAGES, t)
-        self.dropped: Counter[str] = Counter()
 
     def judge(self, data: bytes | None, t: float) -> FilterResult:
         """Return the result for a message that came at ``t`` [s]; ``data`` is None for a text."""
@@ -106,11 +97,6 @@ class MessageFilter:
         return FilterResult(Ruling.PASS, message=message, made=sent)
 
     def _drop(self, kind: str, objection: str, t: float, weight: float = 1.0) -> FilterResult:
-        self.dropped[kind] += 1
-        count = self.dropped.total()
-        if count <= MAX_LOGGED_MESSAGES:
-            log.warning("Dropped a %s of %s: %s.", kind, self._who, objection)
-        if count == MAX_LOGGED_MESSAGES:
-            log.warning("Further dropped messages of %s are not logged.", self._who)
+        log.warning("Dropped a %s of %s: %s.", kind, self._who, objection)
         tolerated = self._tolerance.take(t, weight)
         return FilterResult(Ruling.DROP if tolerated else Ruling.CLOSE)
