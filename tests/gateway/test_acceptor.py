@@ -25,7 +25,7 @@ from katana450.arm.control.lease import Role
 from katana450.assembly.gateway import control_routes
 from katana450.assembly.web_server import WebServer
 from katana450.server.service.budget import Budgets
-from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.viser_bridge.proxy import Proxy
@@ -246,7 +246,7 @@ class Torrent:
 
     def __init__(self) -> None:
         self.left = ASKED
-        self.arrival = Arrival(None)
+        self.arrival = LastHeartbeat()
 
     async def receive(self) -> str:
         if not self.left:

@@ -24,7 +24,7 @@ from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.server.service import status
 from katana450.server.service.command_gate import SETTLE_TIME
-from katana450.server.service.heartbeats import MAX_ACK_AGE, Arrival, LastHeartbeat, keep_alive
+from katana450.server.service.heartbeats import MAX_ACK_AGE, LastHeartbeat, keep_alive
 from katana450.server.service.hub import TICK
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
@@ -169,7 +169,7 @@ def test_open_connection_counts_as_long_as_the_other_host_answers() -> None:
         with socket.create_connection(listening.getsockname()):
             far, _ = listening.accept()
             with far:
-                arrival = Arrival(far)
+                arrival = LastHeartbeat(line=far)
                 arrival.open = 1
                 time.sleep(MAX_ACK_AGE + 1.0)
                 # The probes of the kernel were answered.
@@ -199,7 +199,7 @@ class LostLine:
 def test_open_connection_to_a_lost_host_is_no_heartbeat(
     line: tuple[socket.socket, socket.socket], *, seconds: float, counts: bool
 ) -> None:
-    arrival = Arrival(LostLine(line[1], seconds))
+    arrival = LastHeartbeat(line=LostLine(line[1], seconds))
     time.sleep(0.15)
     arrival.open = 1
     assert (time.monotonic() - arrival.newest < 0.1) is counts
@@ -210,7 +210,7 @@ def test_arrival_is_when_the_kernel_received_the_message(
     line: tuple[socket.socket, socket.socket],
 ) -> None:
     near, far = line
-    arrival = Arrival(far)
+    arrival = LastHeartbeat(line=far)
     time.sleep(0.2)
     assert time.monotonic() - arrival.newest > 0.15
     before = time.monotonic()

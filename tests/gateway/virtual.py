@@ -46,7 +46,7 @@ from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budgets
 from katana450.server.service.command_gate import guarded
-from katana450.server.service.heartbeats import ARRIVAL, Arrival
+from katana450.server.service.heartbeats import ARRIVAL, LastHeartbeat
 from katana450.server.service.hub import TICK, Hub
 from katana450.server.service.people import People
 from katana450.server.viser_bridge.proxy import Proxy
@@ -140,7 +140,7 @@ class Socket:
         self.transport = SimpleNamespace(abort=lambda: None)
         self._closed = asyncio.Event()
         scope = server.scope(path, headers) | {"type": "websocket", "subprotocols": []}
-        scope[ARRIVAL] = Arrival(None, server.clock.now)
+        scope[ARRIVAL] = LastHeartbeat(server.clock.now)
         self._to_server.put_nowait({"type": "websocket.connect"})
         served = server.app(scope, self._to_server.get, cast(Any, self._to_client.put))
         self._task = asyncio.ensure_future(served)

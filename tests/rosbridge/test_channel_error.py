@@ -12,7 +12,7 @@ from katana450.arm.control.lease import Role
 from katana450.extensions.rosbridge.channel import RosChannel
 from katana450.extensions.rosbridge.publications import Publications
 from katana450.server.service.budget import Budgets
-from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.web.channel import GoneError
@@ -22,7 +22,7 @@ class SilentLine:
     """A connection whose client sends nothing until it is closed."""
 
     def __init__(self) -> None:
-        self.arrival = Arrival(None)
+        self.arrival = LastHeartbeat()
         self.closed: list[tuple[int, str]] = []
         self._gone = asyncio.Event()
 

@@ -20,7 +20,7 @@ KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
 """Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
 
 ARRIVAL = "katana450.arrival"
-"""Key of the ``Arrival`` in the scope of a websocket."""
+"""Key of the ``LastHeartbeat`` in the scope of a websocket."""
 
 PING = "katana450.ping"
 """Key of the function in the scope of a websocket that sends a ping of the protocol. The answer of
@@ -44,10 +44,13 @@ MIN_MESSAGES = 10
 
 
 class LastHeartbeat:
-    """The newest heartbeat of one participant, stamped when its message is handled.
+    """The newest heartbeat of one participant.
 
-    A message with the time of its making counts from the time at which it would have arrived with
-    the least delay of its connection: a late one does not prove that the sender is there now.
+    A message counts from its arrival, which the kernel stamps, so late handling does not make the
+    heartbeat later, and a message that waits for a busy server does not count as silence. Without a
+    socket it counts from its handling. A message with the time of its making counts from the time
+    at which it would have arrived with the least delay of its connection: a late one does not prove
+    that the sender is there now.
 
     Attributes:
         open: Number of its requests that wait for the end of a motion. While there is one, its open
@@ -55,9 +58,11 @@ class LastHeartbeat:
         pinged: Whether it answers pings, so that an open connection alone is no heartbeat.
     """
 
-    def __init__(self, clock: Callable[[], float]) -> None:
-        """Count the participant as alive now. ``clock`` is in seconds."""
-        self._clock = clock
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, line: SocketChannel | None = None
+    ) -> None:
+        """Count the participant as alive now. ``clock`` is in seconds. ``line``: its socket."""
+        self._clock, self._line = clock, line
         self._newest = clock()
         self._least_delay = LeastDelay()
         self._delays: deque[float] = deque(maxlen=RECENT_MESSAGES)
@@ -88,46 +93,18 @@ class LastHeartbeat:
 
     @property
     def newest(self) -> float:
-        """Time of the newest heartbeat [s], on the clock."""
-        waits = self.open and not self.pinged and self._is_connected()
-        return self._clock() if waits else self._newest
+        """Time of the newest heartbeat [s], including a message that is not read yet."""
+        line = self._line
+        if line is not None and readable(line.fileno()):
+            self._newest = max(self._newest, self._clock() - self._age() - self.delay)
+        waits = self.open and not self.pinged
+        if waits and (line is None or ack_age(line) < MAX_ACK_AGE):
+            return self._clock()
+        return self._newest
 
     def _age(self) -> float:
         """Return the age of the newest message [s]."""
-        return 0.0
-
-    def _is_connected(self) -> bool:
-        """Return whether the other host answers."""
-        return True
-
-
-class Arrival(LastHeartbeat):
-    """The newest heartbeat on one TCP connection, stamped by the kernel on arrival.
-
-    A message counts from its arrival. Late handling does not make the heartbeat later, and a
-    message that waits for a busy server does not count as silence.
-    """
-
-    def __init__(
-        self, line: SocketChannel | None, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        """Stamp by ``line``, the socket; by the time of handling if it is None."""
-        self._line = line
-        super().__init__(clock)
-
-    @property
-    def newest(self) -> float:
-        """Time of the newest heartbeat [s], including a message that is not read yet."""
-        if self._line is not None and readable(self._line.fileno()):
-            unread = self._clock() - self._age() - self.delay
-            self._newest = max(self._newest, unread)
-        return super().newest
-
-    def _age(self) -> float:
         return 0.0 if self._line is None else data_age(self._line)
-
-    def _is_connected(self) -> bool:
-        return self._line is None or ack_age(self._line) < MAX_ACK_AGE
 
 
 def keep_alive(listening: socket.socket) -> None:

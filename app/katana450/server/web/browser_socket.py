@@ -11,7 +11,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.frames import Frame
 from websockets.http11 import Request
 
-from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival
+from katana450.server.service.heartbeats import ARRIVAL, PING, LastHeartbeat
 from katana450.server.web.security import FOR_PROGRAMS
 
 MAX_UNSENT_BYTES = 16_384
@@ -52,7 +52,7 @@ class BrowserSocket(WebSocketsSansIOProtocol):
         if self.response.status_code == HTTPStatus.SWITCHING_PROTOCOLS:
             # The socket knows when its newest message arrived.
             sock = self.transport.get_extra_info("socket")
-            self.arrival = Arrival(sock)
+            self.arrival = LastHeartbeat(line=sock)
             cast(dict[str, Any], self.scope).update({ARRIVAL: self.arrival, PING: self.ping})
             if self.scope["path"].startswith(FOR_PROGRAMS):
                 self.conn.max_message_size = MAX_PROGRAM_MESSAGE_BYTES

@@ -21,7 +21,7 @@ from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.heartbeats import ARRIVAL, PING, Arrival
+from katana450.server.service.heartbeats import ARRIVAL, PING, LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
@@ -48,7 +48,7 @@ class JsonChannel(Protocol):
     """Exchange of JSON texts. ``receive`` and ``send`` raise GoneError on a closed connection."""
 
     @property
-    def arrival(self) -> Arrival:
+    def arrival(self) -> LastHeartbeat:
         """Newest heartbeat on the connection, by the time of its receipt."""
 
     async def receive(self) -> str | bytes:
@@ -66,8 +66,8 @@ class WebSocketJsonChannel:
 
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
-        arrival: Arrival | None = socket.scope.get(ARRIVAL)
-        self.arrival = Arrival(None) if arrival is None else arrival
+        arrival: LastHeartbeat | None = socket.scope.get(ARRIVAL)
+        self.arrival = LastHeartbeat() if arrival is None else arrival
         self.ping: Callable[[], None] = socket.scope.get(PING, lambda: None)
 
     async def receive(self) -> str | bytes:

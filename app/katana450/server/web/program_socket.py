@@ -23,7 +23,7 @@ from katana450.server.service import serialize
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.budget import Budget, Budgets, BusyError
 from katana450.server.service.dispatcher import driver_key
-from katana450.server.service.heartbeats import Arrival
+from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of
@@ -322,7 +322,7 @@ class _TcpLine:
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
         self._writer = writer
-        self.arrival = Arrival(writer.get_extra_info("socket"))
+        self.arrival = LastHeartbeat(line=writer.get_extra_info("socket"))
 
     async def receive(self) -> str | bytes:
         """Return the next line. Raises GoneError on a closed connection."""
