@@ -19,7 +19,7 @@ def test_map_has_the_counts_of_its_voxels_however_many_are_counted_at_once(
     assert len(whole.points) > 50
     every = Reachability(chain, T, 0.0, FAMILY.pitches, FAMILY.rolls)
     counts = every.count(whole.points)
-    np.testing.assert_array_equal(whole.fraction, counts / every.orientations)
+    np.testing.assert_array_equal(whole.fraction, counts / every.orientations.number)
     assert (whole.points[:, 2] >= 0.0).all()
     monkeypatch.setattr(map_module, "POSES", 300)
     pieces = reachability_map(chain, T, voxel=0.2)

@@ -113,7 +113,7 @@ def of_three_axes() -> Chain:
 )
 def test_other_arms_reach_points_in_some_orientation(chain: Chain) -> None:
     every = reachability(chain)
-    assert every.orientations == 1
+    assert every.orientations.number == 1
     points = np.array([forward(chain, q)[:3, 3] for q in inside(chain, 8, 8)])
     assert every.count(in_base(every, points)).tolist() == [1] * 8
     assert every.count(in_base(every, points + 2.0)).tolist() == [0] * 8

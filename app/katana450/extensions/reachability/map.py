@@ -26,57 +26,39 @@ MIN_VOXEL = 1e-3
 """[m] Minimum edge of a voxel: the accuracy of the arm's joints at the tool."""
 
 
-@dataclass(frozen=True)
-class VoxelGrid:
-    """Voxels of edge ``size`` [m] whose corners lie on multiples of it in the base frame.
+def voxel_ranges(
+    middle: npt.ArrayLike, reach: float, size: float, table: float
+) -> tuple[range, range, range]:
+    """Return the numbers in x, y, z of the voxels of the ball of ``reach`` [m] about ``middle``.
 
-    Flat indices run over z first.
-
-    Attributes:
-        size: edge of a voxel [m].
-        first: index of the lowest voxel in x, y, z; voxel i reaches from i * size to (i + 1) *
-            size.
-        shape: number of voxels in x, y, z.
+    Voxel i has the edge ``size`` [m] and begins at i * size in the base frame. ``table`` is a
+    height z [m]; voxels with their centre below it are left out. Raises InputError for an invalid
+    ``size``, and for a table above the reach.
     """
+    centre = finite_array(middle, (3,), "The centre of the reach")
+    if not MIN_VOXEL <= size <= reach:
+        raise InputError(
+            f"The edge of a voxel is {1e3 * size:g} mm; it must be from "
+            f"{1e3 * MIN_VOXEL:g} to {1e3 * reach:.0f} mm."
+        )
+    top = float(centre[2]) + reach
+    if not -math.inf < table < top:
+        raise InputError(
+            f"A table at {1e3 * table:g} mm leaves no reachable space above it. The tool "
+            f"reaches up to {1e3 * top:.0f} mm."
+        )
+    low = np.floor((centre - reach) / size).astype(int).tolist()
+    high = np.ceil((centre + reach) / size).astype(int).tolist()
+    low[2] = max(low[2], math.ceil(table / size - 0.5))
+    high[2] = max(high[2], low[2] + 1)
+    x, y, z = map(range, low, high)
+    return x, y, z
 
-    size: float
-    first: tuple[int, int, int]
-    shape: tuple[int, int, int]
 
-    @staticmethod
-    def around(center: npt.ArrayLike, reach: float, size: float, table: float) -> VoxelGrid:
-        """Return the voxels of the ball of ``reach`` [m] about ``center`` (3,), above ``table``.
-
-        ``table`` is a height z [m]; voxels with their centre below it are left out. Raises
-        InputError for an invalid ``size``, and for a table above the reach.
-        """
-        middle = finite_array(center, (3,), "The centre of the grid")
-        if not MIN_VOXEL <= size <= reach:
-            raise InputError(
-                f"The edge of a voxel is {1e3 * size:g} mm; it must be from "
-                f"{1e3 * MIN_VOXEL:g} to {1e3 * reach:.0f} mm."
-            )
-        top = float(middle[2]) + reach
-        if not -math.inf < table < top:
-            raise InputError(
-                f"A table at {1e3 * table:g} mm leaves no reachable space above it. The tool "
-                f"reaches up to {1e3 * top:.0f} mm."
-            )
-        low = np.floor((middle - reach) / size).astype(int).tolist()
-        high = np.ceil((middle + reach) / size).astype(int).tolist()
-        low[2] = max(low[2], math.ceil(table / size - 0.5))
-        high[2] = max(high[2], low[2] + 1)
-        (x, y, z), (nx, ny, nz) = low, (b - a for a, b in zip(low, high, strict=True))
-        return VoxelGrid(size, (x, y, z), (nx, ny, nz))
-
-    def __len__(self) -> int:
-        return math.prod(self.shape)
-
-    def centers(self, indices: npt.ArrayLike) -> FloatArray:
-        """Return the centres (N, 3) of the voxels ``indices`` (N,), in the base frame [m]."""
-        cells = np.stack(np.unravel_index(np.asarray(indices, dtype=np.int64), self.shape), axis=-1)
-        centers: FloatArray = (cells + np.array(self.first) + 0.5) * self.size
-        return centers
+def voxel_centers(ranges: tuple[range, range, range], size: float) -> FloatArray:
+    """Return the centres (N, 3) of all voxels of ``ranges`` in the base frame [m], z first."""
+    axes = [(np.array(numbers) + 0.5) * size for numbers in ranges]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +66,7 @@ class ReachabilityMap:
     """The points that a tool reaches, in the base frame [m].
 
     Attributes:
-        points: (N, 3) centres of the voxels with at least one orientation, in the order of the
-            grid.
+        points: (N, 3) centres of the voxels with at least one orientation.
         fraction: (N,) fraction of orientations in each voxel, above 0 and up to 1.
     """
 
@@ -112,7 +93,7 @@ class Fineness(NamedTuple):
     poses: int
 
 
-FAMILY: Final = Fineness(32, 36, 24, 20_000_000_000)
+FAMILY: Final = Fineness(32, 36, 24, 2_000_000_000)
 CLOSED: Final = Fineness(16, 24, 6, 100_000_000)
 SWIVEL: Final = Fineness(10, 12, 4, 10_000_000)
 POINTS: Final = Fineness(10, 1, 1, 200_000)
@@ -136,22 +117,19 @@ def reachability_map(
     arm = Reachability(chain, T_base_shoulder, table, fineness.pitches, fineness.rolls)
     if voxel is None:
         voxel = ROUND * math.ceil(arm.reach / fineness.voxels / ROUND)
-    grid = VoxelGrid.around(arm.middle, arm.reach, voxel, table)
-    poses = len(grid) * arm.orientations
+    ranges = voxel_ranges(arm.middle, arm.reach, voxel, table)
+    poses = math.prod(map(len, ranges)) * arm.orientations.number
     if poses > fineness.poses:
         raise InputError(
             f"The map would take {poses:.2g} poses, and at most {fineness.poses:.0e} are tried for "
             f"this arm ({kinematics.method}). Choose larger voxels than {1e3 * voxel:g} mm."
         )
-    step = max(1, POSES // arm.poses_at_once)
-    counts = np.concatenate(
-        [
-            arm.count(grid.centers(range(len(grid))[start : start + step]))
-            for start in range(0, len(grid), step)
-        ]
-    )
+    centers = voxel_centers(ranges, voxel)
+    step = max(1, POSES // arm.orientations.poses_at_once)
+    starts = range(0, len(centers), step)
+    counts = np.concatenate([arm.count(centers[start : start + step]) for start in starts])
     reached = np.flatnonzero(counts)
-    return ReachabilityMap(grid.centers(reached), counts[reached] / arm.orientations)
+    return ReachabilityMap(centers[reached], counts[reached] / arm.orientations.number)
 
 
 def _fineness(kinematics: Kinematics) -> Fineness:

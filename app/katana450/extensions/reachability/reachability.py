@@ -353,7 +353,8 @@ class Reachability:
         return links_of(self.chain, exact=False)
 
     @cached_property
-    def _orientations(self) -> Orientations:
+    def orientations(self) -> Orientations:
+        """The orientations that are tried at a point."""
         kinematics = kinematics_of(self.chain)
         solver = PoseSolver(kinematics, self.clear)
         if isinstance(kinematics, FiveAxisKinematics):
@@ -362,16 +363,6 @@ class Reachability:
             return PointSearch(self.chain, self.clear)
         R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
         return Rotations(solver, R)
-
-    @property
-    def orientations(self) -> int:
-        """The number of orientations that are tried at a point."""
-        return self._orientations.number
-
-    @property
-    def poses_at_once(self) -> int:
-        """The number of poses of each point that are solved at once."""
-        return self._orientations.poses_at_once
 
     @property
     def reach(self) -> float:
@@ -389,7 +380,7 @@ class Reachability:
         near = np.flatnonzero((points[:, 2] >= self.table) & ~far)
         p = (points[near] - self.T_base_shoulder[:3, 3]) @ self.T_base_shoulder[:3, :3]
         counts = np.zeros(len(points), dtype=np.int64)
-        counts[near] = self._orientations.possible(p).sum(axis=1)
+        counts[near] = self.orientations.possible(p).sum(axis=1)
         return counts
 
     def clear(self, q: FloatArray) -> BoolArray:
