@@ -1,5 +1,4 @@
 // The page's connection to the gateway, in a worker, so that a busy page or a hidden tab cannot slow it.
-"use strict";
 const HEARTBEAT = 100; // ms between heartbeats of a page that may drive; app/katana450/arm/control/lease.py expects it
 const REST = 500; // ms between them while nobody drives and this page is not used
 const USE = 2000; // ms after the last act for which a page counts as used
@@ -7,7 +6,9 @@ const AGAIN = 400; // ms before the next attempt to connect
 const GIVE_UP = 3000; // ms, timeout for opening a connection and for silence on an open one
 const AHEAD = 3; // maximum of unanswered queries: fewer states are requested on a slow connection
 
+/** @type {string | null} */
 let url = null;
+/** @type {WebSocket | null} */
 let socket = null;
 let count = 0;
 let heard = 0;
@@ -15,11 +16,18 @@ let opened = 0;
 let beaten = -Infinity; // time of the newest heartbeat
 let used = -Infinity; // time of the newest act of a person
 let free = false; // whether nobody drives and nothing is planned, so that nothing moves
+/** @type {Map<number, number>} */
 const heartbeats = new Map();
-let pace = null; // timer of the queries for states, while they are shown
+/** @type {number | undefined} */
+let pace; // timer of the queries for states, while they are shown
+/** @type {Map<number | string, number>} */
 const looks = new Map();
 
+/** @param {Page.LinkMessage} message */
+const post = (message) => postMessage(message);
+
 function connect() {
+  if (url === null) return;
   socket = new WebSocket(url);
   opened = performance.now();
   free = false;
@@ -28,26 +36,27 @@ function connect() {
     heard = performance.now();
     heartbeats.clear();
     looks.clear();
-    postMessage({ link: "up" });
+    post({ link: "up" });
   };
   mine.onmessage = ({ data }) => {
     heard = performance.now();
     const message = JSON.parse(data);
     if (looks.has(message.id)) return shown(message);
     if (message.is === "status") learn(message);
-    if (message.is !== "echo") return postMessage({ heard: message });
+    if (message.is !== "echo") return post({ heard: message });
     const sent = heartbeats.get(message.n);
-    if (sent !== undefined) postMessage({ trip: heard - sent });
+    if (sent !== undefined) post({ trip: heard - sent });
     for (const n of heartbeats.keys()) if (n <= message.n) heartbeats.delete(n);
   };
   mine.onclose = ({ code }) => {
     if (mine !== socket) return;
-    postMessage({ link: "down", code });
+    post({ link: "down", code });
     socket = null;
     setTimeout(connect, AGAIN);
   };
 }
 
+/** @param {Api.Act} message */
 function say(message) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   // The server does not execute what arrives late, by this page's own clock.
@@ -61,20 +70,22 @@ function look() {
   if (say({ do: "query", id })) looks.set(id, performance.now());
 }
 
-// Pass on the answer to a query. It is no state while there is no arm yet.
+/** Pass on the answer to a query. It is no state while there is no arm yet. @param {Api.Answer} message */
 function shown(message) {
-  const took = performance.now() - looks.get(message.id);
-  looks.delete(message.id);
-  if (message.is === "state") postMessage({ heard: message, took });
+  const took = performance.now() - (looks.get(message.id ?? "") ?? 0);
+  looks.delete(message.id ?? "");
+  if (message.is === "state") post({ heard: message, took });
 }
 
-// Learn from the changes of the status whether the arm is free.
+/** Learn from the changes of the status whether the arm is free. @type {Partial<Page.Status>} */
 const known = {};
+/** @param {Partial<Page.Status>} changes */
 function learn(changes) {
   Object.assign(known, changes);
   free = known.holder === null && !known.planning;
 }
 
+/** @param {number} now */
 function beat(now) {
   beaten = now;
   heartbeats.set(++count, now);
@@ -87,9 +98,10 @@ function use() {
   if (used - beaten >= HEARTBEAT && socket?.readyState === WebSocket.OPEN) beat(used);
 }
 
+/** @param {number} hz */
 function watch(hz) {
   clearInterval(pace);
-  pace = hz > 0 ? setInterval(look, 1000 / hz) : null;
+  pace = hz > 0 ? setInterval(look, 1000 / hz) : undefined;
 }
 
 setInterval(() => {
@@ -101,15 +113,16 @@ setInterval(() => {
     const old = socket;
     socket = null;
     old.close();
-    postMessage({ link: "down", code: 0 });
+    post({ link: "down", code: 0 });
     setTimeout(connect, AGAIN);
   } else if (open) {
     if (!free || now - used < USE || now - beaten > REST - HEARTBEAT / 2) beat(now);
     const [unanswered = now] = heartbeats.values();
-    postMessage({ silent: now - Math.max(heard, unanswered) });
+    post({ silent: now - Math.max(heard, unanswered) });
   }
 }, HEARTBEAT);
 
+/** @param {MessageEvent<Page.Order>} event */
 onmessage = ({ data }) => {
   if (data.open) {
     url = data.open;
@@ -117,7 +130,7 @@ onmessage = ({ data }) => {
   } else if (data.watch !== undefined) watch(data.watch);
   else if (data.used) use();
   else {
-    if (!say(data.say)) postMessage({ unsaid: data.say.do });
+    if (data.say && !say(data.say)) post({ unsaid: data.say.do });
     use();
   }
 };

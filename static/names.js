@@ -1,38 +1,42 @@
 // Names for screen readers of the controls in viser's panel, which viser leaves without one.
-"use strict";
-(() => {
-  const EVERY = 300; // ms
-  const LIST = ", ";
-  let waiting = false;
+import { controlOf } from "./viser.js";
 
-  const nameless = (control) =>
-    !control.getAttribute("aria-label") && (!control.labels?.length || isList(control));
+const EVERY = 300; // ms
+const LIST = ", ";
+let waiting = false;
 
-  // A row of several boxes has one label that is a list, such as "x, y, z".
-  const isList = (control) => control.labels?.[0]?.textContent.includes(LIST);
+/** @param {Element} control */
+const labelOf = (control) => ("labels" in control ? /** @type {HTMLInputElement} */ (control).labels?.[0] : null);
 
-  function nameOfInput(control) {
-    const { label, index } = Viser.controlOf(control);
-    return label.includes(LIST) ? label.split(LIST)[index] : label;
-  }
+/** @param {Element} control */
+const isNameless = (control) => !control.getAttribute("aria-label") && (!labelOf(control) || isList(control));
 
-  function nameOfButton(button) {
-    if (button.closest("[role=alert]")) return "Close this message";
-    const beside = button.parentElement?.parentElement?.querySelector("input");
-    return beside ? "Pick a colour from the screen" : "Settings of the display";
-  }
+/** A row of several boxes has one label that is a list, such as "x, y, z". @param {Element} control */
+const isList = (control) => labelOf(control)?.textContent?.includes(LIST);
 
-  function nameAll() {
-    waiting = false;
-    for (const control of document.querySelectorAll("input:not([type=hidden]), [role=slider]"))
-      if (nameless(control)) control.setAttribute("aria-label", nameOfInput(control));
-    for (const button of document.querySelectorAll("button:not([aria-hidden])"))
-      if (nameless(button) && !button.textContent) button.setAttribute("aria-label", nameOfButton(button));
-  }
+/** @param {Element} control */
+function nameOfInput(control) {
+  const { label, index } = controlOf(control);
+  return label.includes(LIST) ? label.split(LIST)[index] : label;
+}
 
-  new MutationObserver(() => {
-    if (waiting) return;
-    waiting = true;
-    setTimeout(nameAll, EVERY);
-  }).observe(document, { childList: true, subtree: true });
-})();
+/** @param {Element} button */
+function nameOfButton(button) {
+  if (button.closest("[role=alert]")) return "Close this message";
+  const input = button.parentElement?.parentElement?.querySelector("input");
+  return input ? "Pick a colour from the screen" : "Settings of the display";
+}
+
+function nameAll() {
+  waiting = false;
+  for (const control of document.querySelectorAll("input:not([type=hidden]), [role=slider]"))
+    if (isNameless(control)) control.setAttribute("aria-label", nameOfInput(control));
+  for (const button of document.querySelectorAll("button:not([aria-hidden])"))
+    if (isNameless(button) && !button.textContent) button.setAttribute("aria-label", nameOfButton(button));
+}
+
+new MutationObserver(() => {
+  if (waiting) return;
+  waiting = true;
+  setTimeout(nameAll, EVERY);
+}).observe(document, { childList: true, subtree: true });

@@ -1,25 +1,46 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
-import { html, write } from "../instruments/shape.js";
+import { element, first, styled, write } from "../dom.js";
+import { html } from "../instruments/shape.js";
 
+/** @typedef {Page.Outcome} Outcome */
+/** @typedef {"success" | "failure" | "discard" | "rerecord" | "undo"} Act */
+/**
+ * An episode of the list, and the answer to a request.
+ * @typedef {object} Episode
+ * @property {number} number @property {Outcome} outcome @property {number} start @property {number} end
+ * @property {number} recorded @property {number} bytes @property {string} task @property {string} note
+ * @property {string} file @property {number} missing_ticks
+ */
+/** @type {Record<Outcome, string>} */
 const OUTCOMES = { success: "Success", failure: "Failure", unjudged: "Not judged", unfinished: "Unfinished" };
-// Name and key of each button below REC.
+/** Name and key of each button below REC. @type {Record<Act, [label: string, letter: string]>} */
 const ACTS = { success: ["Success", "Y"], failure: ["Failure", "N"], discard: ["Discard", "X"], rerecord: ["Re-record", "B"], undo: ["Undo", "U"] };
 const MEGA = 1e6; // bytes
-const button = document.getElementById("episodes-button");
+const entriesOfActs = /** @type {[Act, [string, string]][]} */ (Object.entries(ACTS));
+const button = element("episodes-button", HTMLButtonElement);
+/** @param {number} seconds */
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
+/** @param {number} bytes */
 const size = (bytes) => (bytes < MEGA ? `${Math.round(bytes / 1000)} kB` : `${(bytes / MEGA).toFixed(1)} MB`);
 const touch = matchMedia("(any-pointer: coarse)").matches;
-// A length with what the disk did not take of it: ticks of 10 ms.
+/** A length with what the disk did not take of it: ticks of 10 ms. @param {number} seconds @param {number} ticks */
 const extent = (seconds, ticks) => `${seconds.toFixed(1)} s${ticks ? `, ${(ticks / 100).toFixed(1)} s of it missing` : ""}`;
-// The name of a key, where there may be one.
+/** The name of a key, where there may be one. @param {string} words @param {string} letter */
 const by = (words, letter) => (touch ? words : `${words}${letter}`);
+/** @param {string} letter */
 const key = (letter) => html("kbd", { "aria-hidden": true }, letter);
 
+/** @param {string} act @returns {act is Outcome} */
+const isOutcome = (act) => act in OUTCOMES;
+
 export class Episodes {
+  /** @type {Page.EpisodesState | null} */
   #state = null; // state of the server
   #may = false; // whether this person may record
+  /** @type {string | null} */
   #notice = null; // newest notice of the server
   #listed = -1; // revision of the list that is shown
+  /** @type {Set<number>} */
   #open = new Set(); // numbers of the episodes whose fields are shown
   #task = html("input", { maxlength: 200, placeholder: "What is to be done", autocomplete: "off" });
   #rec = html("button", { type: "button", class: "rec" });
@@ -28,13 +49,12 @@ export class Episodes {
   #list = html("ol", {});
   #about = html("p", { class: "about" });
 
-  // `page` is the name of this page, `toast` shows a sentence to the person.
-  constructor(stage, { page, toast }) {
-    this.page = page;
-    this.toast = toast;
-    const style = html("link", { rel: "stylesheet", href: new URL("episodes.css", import.meta.url).href });
-    document.head.append(style);
-    for (const [act, [label, letter]] of Object.entries(ACTS)) {
+  /** @param {Page.Context} page */
+  constructor(page) {
+    this.page = page.name;
+    this.toast = page.toast;
+    styled("episodes.css", import.meta.url);
+    for (const [act, [label, letter]] of entriesOfActs) {
       const made = html("button", { type: "button", "data-act": act, "aria-keyshortcuts": letter }, label, key(letter));
       made.addEventListener("click", () => this.#act(act));
       this.#acts.append(made);
@@ -50,7 +70,7 @@ export class Episodes {
     this.#list.addEventListener("focusout", () => setTimeout(() => this.#fill()));
     const task = html("label", { class: "task" }, "Task", this.#task);
     this.sheet = html("section", { id: "episodes", class: "sheet", "aria-label": "Episodes", hidden: "" }, task, this.#rec, this.#says, this.#acts, this.#list, this.#about);
-    stage.querySelector("#toast").before(this.sheet);
+    first("#toast", HTMLElement, page.stage).before(this.sheet);
     new MutationObserver(() => this.#show()).observe(this.sheet, { attributeFilter: ["hidden"] });
   }
 
@@ -61,36 +81,38 @@ export class Episodes {
     if (this.#may && matchMedia("(hover: hover)").matches) (this.#task.value ? this.#rec : this.#task).focus();
   }
 
-  // Show the state in a status.
+  /** Show the state in a status. @param {Page.Status} status */
   draw({ episodes: state, role }) {
     const before = this.#state;
     if (!state && before?.running) this.toast("The recording is interrupted. It begins again in a few seconds.");
-    this.#state = state;
+    this.#state = state ?? null;
     this.#may = role !== "viewer";
     button.hidden = !state;
     if (!state) return;
     const { running, saving, last, undo, problem } = state;
     button.classList.toggle("on", Boolean(running));
     const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
-    [...button.children].forEach((each, i) => write(each, parts[i]));
-    for (const each of [this.#task.parentElement, this.#rec, this.#acts]) each.hidden = !this.#may;
+    [...button.children].forEach((span, i) => write(span, parts[i]));
+    this.#task.labels?.forEach((label) => (label.hidden = !this.#may));
+    for (const control of [this.#rec, this.#acts]) control.hidden = !this.#may;
     if (document.activeElement !== this.#task && before?.task !== state.task) this.#task.value = state.task;
     this.#rec.replaceChildren(saving ? "Saving…" : running ? `End episode ${running.number}, ${clock(running.seconds)}` : "Start an episode", key("T"));
-    this.#rec.disabled = saving;
+    this.#rec.disabled = Boolean(saving);
     this.#rec.classList.toggle("on", Boolean(running));
     const asks = running || saving || last;
-    for (const each of this.#acts.children) each.hidden = each.dataset.act === "undo" ? !undo : !asks;
+    for (const act of this.#acts.querySelectorAll("button")) act.hidden = act.dataset.act === "undo" ? !undo : !asks;
     const left = running?.left != null ? ` It ends by itself in ${clock(running.left)}: an episode has at most an hour.` : "";
     const one = last && `Episode ${last.number}, ${extent(last.seconds, last.missing_ticks)}: `;
-    const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : one && last.outcome === "unjudged" ? `${one}how did it go?` : one ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
+    const now = saving ? "Saving…" : running ? `Recording episode ${running.number}, by ${running.by}.${left}` : last && last.outcome === "unjudged" ? `${one}how did it go?` : last ? `${one}${OUTCOMES[last.outcome].toLowerCase()}.` : "No episode is kept.";
     write(this.#says, problem || now);
     this.#says.classList.toggle("bad", Boolean(problem));
     this.#tell(before);
     this.#fill();
   }
 
-  // Say what has changed, also by other people.
+  /** Say what has changed, also by other people. @param {Page.EpisodesState | null} before */
   #tell(before) {
+    if (!this.#state) return;
     const { running, problem, notice } = this.#state;
     const said = this.#notice;
     this.#notice = notice;
@@ -101,28 +123,29 @@ export class Episodes {
     else if (running && before && running.number !== before.running?.number) this.toast(`Recording episode ${running.number}, by ${running.by}.`);
   }
 
-  // Return whether the key was handled.
+  /** Return whether the key was handled. @param {KeyboardEvent} event */
   key(event) {
     if (!this.#state || !this.#may || event.ctrlKey || event.metaKey || event.altKey) return false;
     // The letter on the key, which is elsewhere on other keyboards.
     const letter = /^[a-z]$/i.test(event.key) ? event.key.toUpperCase() : event.code.slice(3);
     const { running, saving, last, undo } = this.#state;
     const judged = last && !["unjudged", "unfinished"].includes(last.outcome);
-    const act = letter === "T" ? "rec" : Object.keys(ACTS).find((each) => ACTS[each][1] === letter);
+    const act = letter === "T" ? "rec" : entriesOfActs.find(([, [, own]]) => own === letter)?.[0];
     const asks = act === "undo" ? undo : running || saving || (last && (!judged || !this.sheet.hidden));
     if (!act || (act !== "rec" && !asks)) return false;
     if (event.type === "keydown" && !event.repeat) this.#act(act);
     return true;
   }
 
+  /** @param {Act | "rec"} act */
   async #act(act) {
-    const { running, saving, last: before, undo } = this.#state ?? {};
+    const { running = null, saving = null, last: before = null, undo = null } = this.#state ?? {};
     if (act === "rec" && saving) return;
     // The episode that is seen: another person may have ended it, or judged another one.
     const seen = { number: running?.number ?? saving ?? before?.number };
     const request =
       act === "rec" ? (running ? { do: "stop", ...seen } : { do: "start", task: this.#task.value })
-      : act in OUTCOMES ? { do: "judge", outcome: act, ...seen }
+      : isOutcome(act) ? { do: "judge", outcome: act, ...seen }
       : act === "undo" ? { do: act, number: undo?.number }
       : { do: act, ...seen };
     const done = await this.#ask(request);
@@ -130,17 +153,18 @@ export class Episodes {
     // The next key may come before the next state.
     const { number, outcome, start, end, missing_ticks } = done;
     const last = { number, outcome, seconds: end - start, missing_ticks };
-    const judged = act in OUTCOMES && (running || saving || before?.outcome !== act);
-    const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : this.#state?.undo;
-    this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
+    const judged = isOutcome(act) && (running || saving || before?.outcome !== act);
+    const undoable = act === "undo" ? null : judged || act === "discard" || act === "rerecord" ? { number } : undo;
+    if (this.#state) this.#state = { ...this.#state, ...(end && act !== "discard" && { running: null, last }), undo: undoable };
     const name = `Episode ${number}`;
     if (act === "rec" && running) this.toast(by(`${name} has ended${missing_ticks ? `: ${extent(end - start, missing_ticks)}` : ""}.`, " Y: success, N: failure, X: discard"));
-    else if (act in OUTCOMES) this.toast(by(`${name}: ${act}.`, " U: undo"));
+    else if (isOutcome(act)) this.toast(by(`${name}: ${act}.`, " U: undo"));
     else if (act === "discard") this.toast(by(`${name} is discarded.`, " U: undo"));
     else if (act === "undo") this.toast(end ? `${name} is as before.` : "Both attempts are kept.");
   }
 
   // Send `request`; return the episode, or null after a refusal, which is shown.
+  /** @param {object} request @returns {Promise<Episode | null>} */
   async #ask(request) {
     try {
       const answer = await fetch(`api/v1/episodes?page=${this.page}`, { method: "POST", body: JSON.stringify(request) });
@@ -159,33 +183,38 @@ export class Episodes {
   async #fill() {
     const { revision } = this.#state ?? {};
     if (this.sheet.hidden || revision === this.#listed || document.activeElement?.matches("#episodes ol :is(input, select)")) return;
-    this.#listed = revision;
+    this.#listed = revision ?? -1;
     const answer = await fetch("api/v1/episodes");
     if (!answer.ok) return (this.#listed = -1);
+    /** @type {{ episodes: Episode[], discarded: Episode[], unreadable: string[], folder: string }} */
     const { episodes, discarded, unreadable, folder } = await answer.json();
-    /** @type {HTMLElement | null} */
+    /** @type {HTMLElement | null | undefined} */
     const focused = document.activeElement?.closest("#episodes ol [data-key]");
     const kept = focused?.dataset.key;
-    this.#list.replaceChildren(...episodes.reverse().map((each) => this.#row(each)), ...discarded.reverse().map((each) => this.#gone(each)));
-    this.#list.querySelector(`[data-key="${kept}"]`)?.focus();
+    this.#list.replaceChildren(...episodes.reverse().map((episode) => this.#row(episode)), ...discarded.reverse().map((episode) => this.#gone(episode)));
+    /** @type {HTMLElement | null} */ (this.#list.querySelector(`[data-key="${kept}"]`))?.focus();
     const wrong = unreadable.length ? ` ${unreadable.join(" ")}` : "";
     // People who may only watch do not learn where the files are.
     write(this.#about, `${episodes.length} kept, ${discarded.length} discarded${folder && `, in ${folder}`}.${wrong}`);
   }
 
-  #row(each) {
-    const { number, outcome, start, end, recorded, bytes, task, note, file } = each;
-    const length = extent(end - start, each.missing_ticks);
+  /** @param {Episode} episode */
+  #row(episode) {
+    const { number, outcome, start, end, recorded, bytes, task, note, file } = episode;
+    const length = extent(end - start, episode.missing_ticks);
     const summary = html("summary", { "data-key": number }, html("b", {}, `${number}`), html("span", {}, length), html("i", { class: outcome }, OUTCOMES[outcome]), html("span", {}, task));
     const row = html("details", this.#open.has(number) ? { open: "" } : {}, summary);
     row.addEventListener("toggle", () => this.#open[row.open ? "add" : "delete"](number));
     if (!this.#may) return html("li", {}, row);
+    /** @param {string} label @param {Record<string, string | number>} attributes @param {(value: string) => void} change */
     const field = (label, attributes, change) => {
       const input = html("input", attributes);
       input.addEventListener("change", () => change(input.value));
       return html("label", {}, label, input);
     };
+    /** @param {object} request */
     const ask = (request) => this.#ask({ ...request, number });
+    /** @param {number} value */
     const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
     select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
@@ -202,6 +231,7 @@ export class Episodes {
     return html("li", {}, row);
   }
 
+  /** @param {Episode} episode */
   #gone({ number, task }) {
     const back = html("button", { type: "button", "data-key": `${number} kept`, "aria-label": `Restore episode ${number}` }, "Restore");
     back.addEventListener("click", () => this.#ask({ do: "restore", number }));

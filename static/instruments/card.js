@@ -1,11 +1,24 @@
 // The frame of an instrument: its name and, in arrange mode, controls for place and size.
 import { html, set } from "./shape.js";
 
+/** @typedef {import("./catalogue.js").Instrument} Instrument */
+/**
+ * @typedef {object} Arranging
+ * @property {(card: Card, event: PointerEvent) => void} lift
+ * @property {(id: string, by: number) => void} nudge
+ * @property {(id: string) => void} grow
+ * @property {(id: string) => void} hide
+ */
+/** @type {Record<string, number>} */
 const KEYS = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 };
+/** @type {Record<string, string>} */
 const SIZES = { small: "Small", wide: "Wide", large: "Large", broad: "Full width" };
+/** @type {Record<string, string>} */
+const LETTERS = { small: "S", wide: "W", large: "L", broad: "F" };
 
 export class Card {
   // on: {lift(card, event), nudge(id, by), grow(id), hide(id)}, called when a person arranges the card.
+  /** @param {Instrument} instrument @param {Arranging} on */
   constructor(instrument, on) {
     const { id, title, sizes } = instrument;
     this.instrument = instrument;
@@ -23,7 +36,8 @@ export class Card {
       on.nudge(id, KEYS[event.key]);
     });
     header.addEventListener("pointerdown", (event) => {
-      if (!event.button && !event.target.closest("button:not(.grip)")) on.lift(this, event);
+      const onButton = event.target instanceof Element && event.target.closest("button:not(.grip)");
+      if (!event.button && !onButton) on.lift(this, event);
     });
     this.grip.classList.add("grip");
     this.#size.addEventListener("click", () => on.grow(id));
@@ -32,15 +46,17 @@ export class Card {
 
   #size;
 
+  /** @param {import("./layout.js").Place} place */
   place({ size, shown }) {
     this.element.hidden = !shown;
     set(this.element, "data-size", size);
     set(this.#size, "aria-description", SIZES[size]);
-    this.#size.textContent = { small: "S", wide: "W", large: "L", broad: "F" }[size];
+    this.#size.textContent = LETTERS[size];
     this.instrument.plot?.refresh();
   }
 }
 
+/** @param {string} name @param {string} sign @param {string} title */
 function tool(name, sign, title) {
   return html("button", { type: "button", class: "tool", "aria-label": name, title }, sign);
 }

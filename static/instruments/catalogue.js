@@ -1,12 +1,21 @@
 // All instruments of an arm, with their titles, elements and the values that they show of a state.
+import { PressureMaps } from "../touch/maps.js";
 import { DEGREES, MM, readings } from "./channels.js";
 import { Command } from "./command.js";
 import { Bars, Gauge } from "./gauge.js";
 import { Knob } from "./knob.js";
 import { Plot } from "./plot.js";
 import { signed } from "./shape.js";
-import { PressureMaps } from "../touch/maps.js";
 
+/**
+ * @typedef {object} Instrument
+ * @property {string} id @property {string} title @property {string[]} sizes @property {boolean} shown
+ * @property {HTMLElement} element
+ * @property {(state: Api.State, loop: Api.Loop | null) => void} draw
+ * @property {Knob} [knob] @property {Plot} [plot]
+ */
+/** @typedef {import("./channels.js").Fingers} Fingers */
+/** @typedef {{ history: import("./history.js").History, groups: Record<string, number[]>, view: import("./plot.js").Span }} Plotted */
 const MS = 1000;
 const AXES = ["base turn", "shoulder", "elbow", "wrist bend", "wrist roll"];
 const ONE = ["small", "large"];
@@ -14,18 +23,28 @@ const ROW = ["wide", "large", "broad"];
 const BIG = ["broad", "large", "wide"];
 
 // Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say }} page @returns {Instrument[]} */
 export function instruments(arm, gripper, { say, history, groups, view }) {
   const touch = gripper && !arm.joints_only ? [pads()] : [];
   return [...knobs(arm, gripper, say), ...touch, ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
 }
 
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Page.Say} say */
 function knobs(arm, gripper, say) {
+  /**
+   * @param {string} id @param {string} title
+   * @param {Omit<import("./knob.js").KnobOptions, "title" | "command">} options
+   * @param {(value: number) => Api.Act} request @param {(state: Api.State) => [number, number]} of
+   * @returns {Instrument}
+   */
   const made = (id, title, options, request, of) => {
     const knob = new Knob({ title, ...options, command: new Command(id, request, say) });
+    /** @param {Api.State} state */
     const draw = (state) => knob.take(state, ...of(state));
     return { id, title, sizes: ONE, shown: true, element: knob.element, draw, knob };
   };
   const read = readings(arm);
+  /** @param {number} value */
   const percent = (value) => `${signed(value, 0)} %`;
   const joints = arm.joints.map((_, i) =>
     made(
@@ -59,23 +78,36 @@ function knobs(arm, gripper, say) {
   return [...joints, ...(fingers ? [fingers] : []), speed];
 }
 
+/** @returns {Instrument} */
 function pads() {
   const maps = new PressureMaps();
+  /** @param {Api.State} state */
   const draw = ({ touch }) => maps.show(touch);
   return { id: "pads", title: "Pressure on the pads", sizes: ["large", "wide"], shown: true, element: maps.element, draw };
 }
 
+/**
+ * @param {string} id @param {string} title @param {Omit<import("./gauge.js").GaugeOptions, "title">} options
+ * @param {(state: Api.State, loop: Api.Loop | null) => [value: number | null, note?: string]} of
+ * @returns {Instrument}
+ */
+function gauge(id, title, options, of) {
+  const made = new Gauge({ title, ...options });
+  /** @type {Instrument["draw"]} */
+  const draw = (state, loop) => made.show(...of(state, loop));
+  return { id, title, sizes: ONE, shown: true, element: made.element, draw };
+}
+
+/** @param {number} value */
+const one = (value) => signed(value, 1);
+
+/** @param {Api.Arm} arm @returns {Instrument[]} */
 function gauges(arm) {
-  const gauge = (id, title, options, of) => {
-    const made = new Gauge({ title, ...options });
-    const draw = (state, loop) => made.show(...of(state, loop));
-    return { id, title, sizes: ONE, shown: true, element: made.element, draw };
-  };
-  const one = (value) => signed(value, 1);
   const read = readings(arm);
   const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * read[i].of }));
   const units = [...new Set(read.map(({ mark }) => `${mark.trim()}/s`))];
   const bars = new Bars({ title: "Joint speeds", rows, text: one, unit: units.join(", ") });
+  /** @type {Instrument} */
   const rates = {
     id: "rates", title: "Joint speeds", sizes: ROW, shown: true, element: bars.element,
     draw: ({ qd }) => bars.show(qd.map((rate, i) => rate * read[i].of)),
@@ -91,6 +123,12 @@ function gauges(arm) {
   );
   // The other gauges need a tool, which a mechanism of joints does not have.
   if (arm.joints_only) return [rates, late];
+  const [clearance, ...others] = toolGauges(arm);
+  return [clearance, rates, ...others, late];
+}
+
+/** @param {Api.Arm} arm @returns {Instrument[]} */
+function toolGauges(arm) {
   return [
     gauge(
       "clearance",
@@ -99,15 +137,16 @@ function gauges(arm) {
         low: 0, high: 100, unit: "mm", text: one,
         zones: [{ below: 6, tone: "bad" }, { below: 20, tone: "warn" }],
       },
-      ({ margins: { clearance, parts } }) =>
-        parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not checked"],
+      ({ margins }) => {
+        const { clearance, parts } = margins ?? {};
+        return clearance != null && parts ? [clearance * MM, parts.map(spoken).join(" – ")] : [null, "not checked"];
+      },
     ),
-    rates,
     gauge(
       "tool-speed",
       "Tool speed",
       { low: 0, high: 500, unit: "mm/s", text: (value) => signed(value, 0), zones: [{ above: 450, tone: "warn" }] },
-      ({ tool_speed: speed }) => [speed * MM],
+      ({ tool_speed: speed }) => [(speed ?? 0) * MM],
     ),
     gauge(
       "limit",
@@ -116,7 +155,7 @@ function gauges(arm) {
         low: 0, high: 90, unit: "°", text: one,
         zones: [{ below: 2, tone: "bad" }, { below: 8, tone: "warn" }],
       },
-      ({ margins: { limit, axis } }) => [limit * DEGREES, `axis ${axis}`],
+      ({ margins }) => (margins ? [margins.limit * DEGREES, `axis ${margins.axis}`] : [null]),
     ),
     gauge(
       "singular",
@@ -125,7 +164,7 @@ function gauges(arm) {
         low: 0, high: 0.5, unit: "smallest", text: (value) => signed(value, 3),
         zones: [{ below: 0.02, tone: "bad" }, { below: 0.05, tone: "warn" }],
       },
-      ({ margins }) => [margins.smallest_singular_value],
+      ({ margins }) => [margins?.smallest_singular_value ?? null],
     ),
     // Other arms have a rotation in place of a pitch.
     ...(arm.freedoms === 5
@@ -134,7 +173,7 @@ function gauges(arm) {
             "pitch",
             "Tool pitch",
             { low: -180, high: 180, origin: 0, unit: "°, + is down", text: one },
-            ({ pitch }) => [pitch * DEGREES],
+            ({ pitch }) => [(pitch ?? 0) * DEGREES],
           ),
         ]
       : []),
@@ -144,11 +183,15 @@ function gauges(arm) {
       { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
       ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
     ),
-    late,
   ];
 }
 
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted["history"]} history @param {Plotted["groups"]} groups @param {Plotted["view"]} view @returns {Instrument[]} */
 function plots(arm, gripper, history, groups, view) {
+  /**
+   * @param {string} id @param {string} title @param {string} group @param {number} least @param {number} decimals
+   * @param {boolean} shown @returns {Instrument}
+   */
   const plot = (id, title, group, least, decimals, shown) => {
     const made = new Plot({ id, title, history, channels: groups[group], view, least, decimals });
     return { id, title, sizes: BIG, shown, element: made.element, draw: () => made.draw(), plot: made };
@@ -172,4 +215,5 @@ function plots(arm, gripper, history, groups, view) {
   ];
 }
 
+/** @param {string} part */
 const spoken = (part) => part.replace(/_link$/, "").replaceAll("_", " ");

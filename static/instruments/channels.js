@@ -2,19 +2,27 @@
 export const DEGREES = 180 / Math.PI;
 export const MM = 1000;
 
-// Return {of, unit, mark} for each joint: factor to display units, unit, and its mark after numbers.
+/** @typedef {{ label: string, short?: string, unit: string, of: (state: Api.State) => number | null | undefined }} Channel */
+/** @typedef {{ percent: (angle: number) => number, angle: (percent: number) => number }} Fingers */
+
+/** Return {of, unit, mark} for each joint: factor to display units, unit, and its mark after numbers. @param {Api.Arm} arm */
 export function readings(arm) {
   return arm.slides.map((slides) => (slides ? { of: MM, unit: "mm", mark: " mm" } : { of: DEGREES, unit: "deg", mark: "°" }));
 }
 
 // Return {channels, groups}; a group is a list of channel indices. gripper: {percent(angle)} or null.
+/** @param {Api.Arm} arm @param {Fingers | null} gripper */
 export function channelsOf(arm, gripper) {
+  /** @type {Channel[]} */
   const channels = [];
+  /** @type {Record<string, number[]>} */
   const groups = {};
+  /** @param {string} name @param {Channel[]} more */
   const group = (name, ...more) => {
     groups[name] = more.map((channel) => channels.push(channel) - 1);
   };
   const read = readings(arm);
+  /** @param {(unit: string) => string} unit @param {(i: number) => Channel["of"]} of */
   const axes = (unit, of) =>
     arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, short: `${i + 1}`, unit: unit(read[i].unit), of: of(i) }));
   group("angles", ...axes((unit) => unit, (i) => ({ q }) => q[i] * read[i].of));
@@ -22,9 +30,9 @@ export function channelsOf(arm, gripper) {
   group("errors", ...axes((unit) => unit, (i) => ({ q, setpoint }) => (setpoint[i] - q[i]) * read[i].of));
   if (arm.joints_only) return { channels, groups };
   group("loads", ...axes(() => "N m", (i) => ({ holding }) => holding?.[i]));
-  group("tool", ...["x", "y", "z"].map((label, i) => ({ label, unit: "mm", of: ({ T }) => T[i][3] * MM })));
-  group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins.clearance ?? NaN) * MM });
-  group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => speed * MM });
+  group("tool", ...["x", "y", "z"].map((label, i) => /** @type {Channel} */ ({ label, unit: "mm", of: ({ T }) => T && T[i][3] * MM })));
+  group("clearance", { label: "Nearest", unit: "mm", of: ({ margins }) => (margins?.clearance ?? NaN) * MM });
+  group("speed", { label: "Tool", unit: "mm/s", of: ({ tool_speed: speed }) => (speed ?? NaN) * MM });
   if (gripper) {
     group(
       "gripper",
@@ -32,7 +40,7 @@ export function channelsOf(arm, gripper) {
       { label: "Goal", unit: "%", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
     );
     const pads = ["Right", "Left"]; // in the order of the state
-    group("forces", ...pads.map((label, i) => ({ label, unit: "N", of: ({ touch }) => touch?.pads[i].force })));
+    group("forces", ...pads.map((label, i) => /** @type {Channel} */ ({ label, unit: "N", of: ({ touch }) => touch?.pads[i].force })));
   }
   return { channels, groups };
 }

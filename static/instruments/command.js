@@ -6,7 +6,8 @@ const HEED = 300; // ms after which a state includes a request without a ticket
 export class Command {
   #say;
   #request;
-  #value = null;
+  #value = 0;
+  /** @type {number | null} */
   #timer = null;
   #sent = 0;
   #open = 0; // number of unanswered requests
@@ -14,12 +15,14 @@ export class Command {
   #until = 0;
 
   // id: id of the requests. request: returns the message for a value, without the id.
+  /** @param {string} id @param {(value: number) => Api.Act} request @param {Page.Say} say */
   constructor(id, request, say) {
     this.id = id;
     this.#request = request;
     this.#say = say;
   }
 
+  /** @param {number} value */
   send(value) {
     this.#value = value;
     if (this.#timer === null)
@@ -33,20 +36,21 @@ export class Command {
     this.#say({ ...this.#request(this.#value), id: this.id });
   }
 
+  /** @param {Api.Done} answer */
   done({ ticket }) {
     this.#open = Math.max(0, this.#open - 1);
-    if (ticket === undefined) this.#until = performance.now() + HEED;
+    if (ticket == null) this.#until = performance.now() + HEED;
     else this.#ticket = ticket;
   }
 
   // Drop all requests after a refusal or a loss of the connection. A new server counts tickets from the start.
   forget() {
-    clearTimeout(this.#timer);
+    clearTimeout(this.#timer ?? undefined);
     this.#timer = null;
     this.#open = this.#ticket = this.#until = 0;
   }
 
-  // Return whether `state` includes all requests; until then its goal is older.
+  /** Return whether `state` includes all requests; until then its goal is older. @param {Api.State} state */
   heededIn(state) {
     const underWay = this.#timer !== null || this.#open > 0 || performance.now() < this.#until;
     return !underWay && state.ticket >= this.#ticket;

@@ -1,6 +1,13 @@
 // Gauges: a number on an arc with zones, and rows of bars for several numbers of one kind.
-import { arc, clamp, html, set, svg, write } from "./shape.js";
+import { write } from "../dom.js";
+import { arc, clamp, html, set, svg } from "./shape.js";
 
+/** @typedef {{ below?: number, above?: number, tone: string }} Zone */
+/**
+ * @typedef {object} GaugeOptions
+ * @property {string} title @property {number} low @property {number} high @property {string} unit
+ * @property {(value: number) => string} text @property {Zone[]} [zones] @property {number} [origin]
+ */
 const RING = 44;
 const [FROM, TO] = [-120, 120]; // degrees of the dial
 const HIGH = 0.9; // fraction of a limit from which a bar warns
@@ -11,6 +18,7 @@ export class Gauge {
 
   // text: returns the text of a value. zones: [{below | above, tone}], of which the first match counts.
   // origin: the value where the arc begins, low by default.
+  /** @param {GaugeOptions} options */
   constructor(options) {
     this.#options = options;
     const { title, low, high, zones = [], unit } = options;
@@ -20,8 +28,8 @@ export class Gauge {
       note: html("span", { class: "note" }, " "),
     };
     const marks = zones.map(({ below, above, tone }) => {
-      const ends = below === undefined ? [above, high] : [low, below];
-      return svg("path", { class: `zone ${tone}`, d: arc(53, ...ends.map((each) => this.#turn(each))) });
+      const [from, to] = below === undefined ? [above ?? high, high] : [low, below];
+      return svg("path", { class: `zone ${tone}`, d: arc(53, this.#turn(from), this.#turn(to)) });
     });
     this.element = html(
       "div",
@@ -46,21 +54,23 @@ export class Gauge {
     );
   }
 
-  // Show `value` with a note; null if there is no value.
+  /** Show `value` with a note; null if there is no value. @param {number | null} value */
   show(value, note = " ") {
     const { text, low, origin = low, zones = [] } = this.#options;
     const { way, value: shown, note: below } = this.#parts;
     const words = value === null ? "–" : text(value);
     write(shown, words);
     write(below, note);
+    /** @param {Zone} zone */
     const fits = ({ below = -Infinity, above = Infinity }) => value !== null && (value < below || value > above);
     set(this.element, "data-tone", zones.find(fits)?.tone ?? "ok");
-    const ends = [origin, value ?? origin].map((each) => this.#turn(each));
-    set(way, "d", Math.abs(ends[1] - ends[0]) < 0.5 ? "" : arc(RING, ...ends));
+    const [from, to] = [this.#turn(origin), this.#turn(value ?? origin)];
+    set(way, "d", Math.abs(to - from) < 0.5 ? "" : arc(RING, from, to));
     set(this.element, "aria-valuenow", value === null ? low : value.toFixed(3));
     set(this.element, "aria-valuetext", value === null ? "none" : `${words} ${this.#options.unit} ${note}`.trim());
   }
 
+  /** @param {number} value */
   #turn(value) {
     const { low, high } = this.#options;
     return FROM + ((TO - FROM) * clamp(value - low, 0, high - low)) / (high - low);
@@ -72,6 +82,7 @@ export class Bars {
   #text;
 
   // rows: [{label, limit}]; each bar extends from the middle to either side, up to its limit.
+  /** @param {{ title: string, rows: { label: string, limit: number }[], text: (value: number) => string, unit: string }} options */
   constructor({ title, rows, text, unit }) {
     this.#text = text;
     this.#rows = rows.map(({ label, limit }) => {
@@ -93,6 +104,7 @@ export class Bars {
     this.element = html("div", { class: "bars" }, ...this.#rows.map(({ row }) => row), limits);
   }
 
+  /** @param {number[]} values */
   show(values) {
     this.#rows.forEach(({ row, bar, value, limit }, i) => {
       const fraction = clamp(values[i] / limit, -1, 1);

@@ -9,12 +9,13 @@ export class History {
   #columns;
   #count = 0; // number of all samples; the last CAPACITY of them are stored
 
-  // channels: [{label, unit, of(state)}]; a missing number is NaN.
+  /** channels: [{label, unit, of(state)}]; a missing number is NaN. @param {import("./channels.js").Channel[]} channels */
   constructor(channels) {
     this.channels = channels;
     this.#columns = channels.map(() => new Float64Array(CAPACITY));
   }
 
+  /** @param {Api.State} state */
   take(state) {
     const t = state.sent - state.t > AT_REST ? state.sent : state.t;
     if (t < this.newest - RESTART) this.#count = 0;
@@ -37,15 +38,17 @@ export class History {
     return this.#count;
   }
 
+  /** @param {number} n */
   time(n) {
     return this.#times[n % CAPACITY];
   }
 
+  /** @param {number} channel @param {number} n */
   value(channel, n) {
     return this.#columns[channel][n % CAPACITY];
   }
 
-  // Return the first sample that is not before t.
+  /** Return the first sample that is not before t. @param {number} t */
   at(t) {
     let [low, high] = [this.first, this.end];
     while (low < high) {
@@ -56,14 +59,16 @@ export class History {
     return low;
   }
 
-  // Return the sample nearest to t; -1 if there is none.
+  /** Return the sample nearest to t; -1 if there is none. @param {number} t */
   nearest(t) {
     const n = this.at(t);
     if (n > this.first && (n === this.end || t - this.time(n - 1) < this.time(n) - t)) return n - 1;
     return n < this.end ? n : -1;
   }
 
+  /** @param {number[]} channels @param {number} from @param {number} to */
   csv(channels, from, to) {
+    /** @param {number} i */
     const name = (i) => `"${this.channels[i].label} [${this.channels[i].unit}]"`;
     const lines = [['"t [s]"', ...channels.map(name)].join(",")];
     for (let n = this.at(from); n < this.end && this.time(n) <= to; n += 1) {

@@ -1,6 +1,12 @@
 // A knob: an arc for the range, a pointer for the goal, a mark for the value of the arm.
-import { arc, clamp, html, onDial, set, svg, write } from "./shape.js";
+import { write } from "../dom.js";
+import { arc, clamp, html, onDial, set, svg } from "./shape.js";
 
+/**
+ * @typedef {object} KnobOptions
+ * @property {string} title @property {number} low @property {number} high @property {number} step @property {number} [full]
+ * @property {(value: number) => string} text @property {import("./command.js").Command} command
+ */
 const RING = 47;
 const MAX_TURN = 330; // degrees, maximum range of a dial
 const DEAD = 10; // px, radius round the middle where the direction is ignored
@@ -14,13 +20,16 @@ export class Knob {
   #step;
   #command;
   #turn; // {of, back}: value to degrees on the dial, and degrees to value
+  /** @type {{ pointer: number, angle: number | null } | null} */
   #held = null; // {pointer, angle} during a drag
+  /** @type {number | null} */
   #goal = null;
-  #now = null;
-  #parts = {};
+  #now = 0;
+  #parts;
 
   // low, high, step: range and step of the value. full: degrees on the dial per unit; without it the
   // range fills the dial. text: returns the text of a value. command: the Command that sends values.
+  /** @param {KnobOptions} options */
   constructor({ title, low, high, step, full, text, command }) {
     this.#range = [low, high];
     this.#step = step;
@@ -28,7 +37,7 @@ export class Knob {
     this.#command = command;
     const scale = Math.min(full ?? Infinity, (full ? MAX_TURN : 270) / (high - low));
     const middle = full ? 0 : (low + high) / 2;
-    this.#turn = { of: (value) => (value - middle) * scale, back: (degrees) => degrees / scale };
+    this.#turn = { of: (/** @type {number} */ value) => (value - middle) * scale, back: (/** @type {number} */ degrees) => degrees / scale };
     const limits = [low, high].map((limit) => onDial(RING, this.#turn.of(limit)));
     this.#parts = {
       way: svg("path", { class: "way" }),
@@ -59,13 +68,14 @@ export class Knob {
     this.#listen();
   }
 
-  // Show the goal and the value of the arm in `state`.
+  /** Show the goal and the value of the arm in `state`. @param {Api.State} state @param {number} goal @param {number} now */
   take(state, goal, now) {
     this.#now = now;
     if (this.#held === null && this.#command.heededIn(state)) this.#goal = goal;
     this.#draw();
   }
 
+  /** @param {Api.Done | Api.Refused} message */
   answered(message) {
     if (message.is !== "refused") return this.#command.done(message);
     this.spring();
@@ -80,6 +90,7 @@ export class Knob {
     this.dial.classList.remove("held");
   }
 
+  /** @param {number} value */
   #request(value) {
     const [low, high] = this.#range;
     const target = clamp(value, low, high);
@@ -89,6 +100,7 @@ export class Knob {
     this.#draw();
   }
 
+  /** @param {number} count @param {boolean} fine */
   #notch(count, fine) {
     const by = this.#step * (fine ? FINE : 1);
     if (this.#goal !== null) this.#request(Math.round((this.#goal + count * by) / by) * by);
@@ -96,6 +108,7 @@ export class Knob {
 
   #listen() {
     const { dial } = this;
+    /** @param {PointerEvent} event */
     const angle = ({ clientX, clientY }) => {
       const { left, top, width, height } = dial.getBoundingClientRect();
       const [x, y] = [clientX - left - width / 2, clientY - top - height / 2];
@@ -109,7 +122,7 @@ export class Knob {
     });
     // The knob turns by the same angle as the pointer, so a mere touch moves nothing.
     dial.addEventListener("pointermove", (event) => {
-      if (event.pointerId !== this.#held?.pointer) return;
+      if (event.pointerId !== this.#held?.pointer || this.#goal === null) return;
       const [before, now] = [this.#held.angle, angle(event)];
       this.#held.angle = now ?? before;
       if (before === null || now === null) return;
@@ -131,7 +144,7 @@ export class Knob {
       },
       { passive: false },
     );
-    // Home and End are left out: a single key would move the arm to a limit.
+    /** Home and End are left out: a single key would move the arm to a limit. @type {Record<string, number>} */
     const keys = {
       ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: PAGE, PageDown: -PAGE,
     };

@@ -1,43 +1,52 @@
 // The instrument panel: it queries states while it is open, stores them for a time and shows them.
+import { styled, write } from "../dom.js";
 import { Board } from "./board.js";
 import { instruments } from "./catalogue.js";
 import { channelsOf } from "./channels.js";
 import { History } from "./history.js";
-import { html, set, write } from "./shape.js";
+import { html, set } from "./shape.js";
 
 const HZ = 30;
 const LOOK_EVERY = 1000; // ms; the control loop reports its lateness at this interval
 const SPANS = { 10: "10 s", 30: "30 s", 120: "2 min" };
 const OLD = 1.0; // s, age from which values are marked as old
-const STYLE = "static/instruments/instruments.css";
+
+/** @typedef {{ say: Page.Say, watch: (hz: number) => void, kept: Storage | null, quietly: string }} Connection */
 
 export class Panel {
   #root;
-  #line;
+  #connection;
+  /** @type {import("./plot.js").Span} */
   #view = { span: 30, end: null };
+  /** @type {History | null} */
   #history = null;
+  /** @type {Board | null} */
   #board = null;
+  /** @type {Api.State | null} */
   #state = null;
+  /** @type {Api.Loop | null} */
   #loop = null;
   #fresh = false;
   #heard = -Infinity;
   #took = 0;
-  #timer = null;
-  #frame = null;
+  #timer = 0;
+  #frame = 0;
   #age = html("span", { class: "age", title: "Maximum age of the values" });
   #body = html("div", { class: "body" }, html("p", { class: "note" }, "Waiting for the arm."));
 
-  // line: {say, watch, kept, quietly}, the page's connection to the server and its storage.
-  constructor(root, line) {
+  // connection: {say, watch, kept, quietly}, that of the page to the server, and its storage.
+  /** @param {HTMLElement} root @param {Connection} connection */
+  constructor(root, connection) {
     this.#root = root;
-    this.#line = line;
-    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    this.#connection = connection;
+    styled("instruments.css", import.meta.url);
     root.append(this.#toolbar(), this.#body);
   }
 
+  /** @param {boolean} shown */
   show(shown) {
     this.#root.hidden = !shown;
-    this.#line.watch(shown ? HZ : 0);
+    this.#connection.watch(shown ? HZ : 0);
     clearInterval(this.#timer);
     cancelAnimationFrame(this.#frame);
     if (!shown) return this.#spring();
@@ -46,34 +55,36 @@ export class Panel {
     this.#draw();
   }
 
-  // Handle each event of the page's connection.
+  /** Handle each event of the page's connection. @param {Page.LinkMessage} message */
   hear({ heard, took, link }) {
     if (link === "down") this.#spring();
     if (heard?.is === "arm" && !this.#board) this.#build(heard);
     else if (heard?.is === "loop") this.#loop = heard;
     else if (heard?.is === "state") {
-      [this.#state, this.#took, this.#heard, this.#fresh] = [heard, took, performance.now(), true];
+      [this.#state, this.#took, this.#heard, this.#fresh] = [heard, took ?? 0, performance.now(), true];
       this.#history?.take(heard);
     } else if (heard?.is === "done" || heard?.is === "refused")
       this.#board?.instruments.find(({ id }) => id === heard.id)?.knob?.answered(heard);
   }
 
   #ask() {
-    const { say, quietly } = this.#line;
+    const { say, quietly } = this.#connection;
     if (!this.#board) say({ do: "query", at: "arm", id: quietly });
     say({ do: "query", at: "loop", id: quietly });
   }
 
+  /** @param {Api.Arm} arm */
   #build(arm) {
-    const [closed, open] = arm.gripper ?? [];
+    const [closed, open] = arm.gripper ?? [0, 0];
+    /** @type {import("./channels.js").Fingers | null} */
     const gripper = arm.gripper && {
       percent: (angle) => (100 * (angle - closed)) / (open - closed),
       angle: (percent) => closed + (percent / 100) * (open - closed),
     };
     const { channels, groups } = channelsOf(arm, gripper);
     this.#history = new History(channels);
-    const parts = { say: this.#line.say, history: this.#history, groups, view: this.#view };
-    this.#board = new Board(instruments(arm, gripper, parts), this.#line.kept);
+    const parts = { say: this.#connection.say, history: this.#history, groups, view: this.#view };
+    this.#board = new Board(instruments(arm, gripper, parts), this.#connection.kept);
     this.#body.replaceChildren(this.#board.list, this.#board.grid);
   }
 
@@ -111,12 +122,14 @@ export class Panel {
     );
   }
 
+  /** @param {Partial<import("./plot.js").Span>} news */
   #look(news) {
     Object.assign(this.#view, news);
     for (const { plot } of this.#board?.instruments ?? []) plot?.refresh();
   }
 }
 
+/** @param {string} label @param {string} title @param {(on: boolean) => void} change */
 function toggle(label, title, change) {
   const button = html("button", { type: "button", title, "aria-pressed": "false" }, label);
   button.addEventListener("click", () => {

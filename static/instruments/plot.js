@@ -1,15 +1,24 @@
 // A plot of some channels over the last seconds, with a cursor for reading and export as CSV.
+import { save, write } from "../dom.js";
 import { GAP } from "./history.js";
 import { digits, scale } from "./scale.js";
-import { clamp, html, set, signed, write } from "./shape.js";
+import { clamp, html, set, signed } from "./shape.js";
 
+/** @typedef {{ span: number, end: number | null }} Span */
+/** @typedef {{ left: number, right: number, top: number, bottom: number }} Box */
+/** @typedef {(value: number) => number} Place */
+/** @typedef {{ at: number, text: string, line: string, font: string, series: string[] }} Palette */
+/** @typedef {{ low: number, high: number, by: number }} Axis */
 const MARGIN = { left: 42, right: 8, top: 8, bottom: 18 }; // px
 const LINE_HEIGHT = 24; // px between horizontal lines, about
+/** @type {Record<number, number>} */
 const APART = { 10: 2, 30: 5, 120: 20 }; // s between vertical lines, for each span
 const LABEL_WIDTH = 56; // px for the time below a line; the outermost labels are not centred
 const COLOURS_KEPT = 500; // ms
 const SERIES = 5; // number of colours in instruments.css; further lines repeat them
 const READ_BY = 0.01; // fraction of the width by which a key moves the cursor
+/** @type {Record<string, number>} */
+const READ_KEYS = { ArrowLeft: -READ_BY, ArrowRight: READ_BY };
 
 export class Plot {
   #history;
@@ -20,14 +29,20 @@ export class Plot {
   #legend;
   #canvas = html("canvas", { tabindex: 0, role: "img" });
   #size = { width: 0, height: 0 };
+  /** @type {number | null} */
   #cursor = null; // fraction of the width
   #stale = true;
   #drawn = 0;
-  /** @type {any} */
-  #colours = { at: -Infinity };
+  /** @type {Palette} */
+  #colours = { at: -Infinity, text: "", line: "", font: "", series: [] };
 
-  // channels: indices in the history. view: {span, end} [s] of all plots; end is null while they run.
+  // history: of the values. channels: indices in it. view: {span, end} [s] of all plots; end is null while they run.
   // least: minimum range of the vertical axis. decimals: decimals of the read-out.
+  /**
+   * @param {object} options
+   * @param {string} options.id @param {string} options.title @param {import("./history.js").History} options.history
+   * @param {number[]} options.channels @param {Span} options.view @param {number} options.least @param {number} options.decimals
+   */
   constructor({ id, title, history, channels, view, least, decimals }) {
     this.#history = history;
     this.#channels = channels;
@@ -67,6 +82,7 @@ export class Plot {
     this.#paint();
   }
 
+  /** @param {number} channel @param {number} i */
   #entry(channel, i) {
     const value = html("output", {}, "–");
     const { label, short = label } = this.#history.channels[channel];
@@ -92,32 +108,35 @@ export class Plot {
       canvas.height = Math.round(clientHeight * devicePixelRatio);
       this.refresh();
     }).observe(canvas);
+    /** @param {number | null} fraction */
     const read = (fraction) => {
       this.#cursor = fraction === null ? null : clamp(fraction, 0, 1);
       this.refresh();
     };
+    /** @param {PointerEvent} event */
     const across = ({ offsetX }) => (offsetX - MARGIN.left) / (this.#size.width - MARGIN.left - MARGIN.right);
     canvas.addEventListener("pointermove", (event) => read(across(event)));
     canvas.addEventListener("pointerdown", (event) => read(across(event)));
     canvas.addEventListener("pointerleave", () => read(null));
     canvas.addEventListener("blur", () => read(null));
     canvas.addEventListener("keydown", (event) => {
-      const by = { ArrowLeft: -READ_BY, ArrowRight: READ_BY }[event.key];
+      const by = READ_KEYS[event.key];
       if (by === undefined) return;
       event.preventDefault();
       read((this.#cursor ?? 1) + by);
     });
   }
 
-  // A canvas cannot use CSS variables, so the colours are read from elements that use them.
+  /** A canvas cannot use CSS variables, so the colours are read from elements that use them. @param {number} now */
   #palette(now) {
     if (now - this.#colours.at < COLOURS_KEPT) return this.#colours;
     const { color, borderTopColor, fontFamily } = getComputedStyle(this.#canvas);
-    const series = this.#legend.map(({ button }) => getComputedStyle(button.firstElementChild).backgroundColor);
+    const series = this.#legend.map(({ button }) => getComputedStyle(button.firstElementChild ?? button).backgroundColor);
     this.#colours = { at: now, text: color, line: borderTopColor, font: `11px ${fontFamily}`, series };
     return this.#colours;
   }
 
+  /** @returns {[number, number]} */
   #ends() {
     const end = this.#view.end ?? this.#history.newest;
     return [end - this.#view.span, end];
@@ -128,11 +147,14 @@ export class Plot {
     const shown = this.#legend.map(({ button }) => button.getAttribute("aria-pressed") === "true");
     const axis = this.#scale(from, to, shown);
     const pen = this.#canvas.getContext("2d");
+    if (!pen) return;
     const { width, height } = this.#size;
     const box = {
       left: MARGIN.left, right: width - MARGIN.right, top: MARGIN.top, bottom: height - MARGIN.bottom,
     };
+    /** @type {Place} */
     const x = (t) => box.left + ((t - from) / (to - from)) * (box.right - box.left);
+    /** @type {Place} */
     const y = (value) => box.bottom - ((value - axis.low) / (axis.high - axis.low)) * (box.bottom - box.top);
     const colours = this.#palette(this.#drawn);
     pen.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
@@ -150,6 +172,7 @@ export class Plot {
     this.#readOut(pen, box, from, to, x, y, shown, colours);
   }
 
+  /** @param {number} from @param {number} to @param {boolean[]} shown */
   #scale(from, to, shown) {
     let [low, high] = [Infinity, -Infinity];
     for (let n = this.#history.at(from); n < this.#history.end && this.#history.time(n) <= to; n += 1)
@@ -163,6 +186,7 @@ export class Plot {
     return low <= high ? scale(low, high, this.#least, lines) : scale(0, 0, this.#least, lines);
   }
 
+  /** @param {CanvasRenderingContext2D} pen @param {Box} box @param {Axis} axis @param {Place} y @param {Palette} palette */
   #grid(pen, box, axis, y, { text, line, font }) {
     const { span, end } = this.#view;
     pen.strokeStyle = line;
@@ -194,6 +218,10 @@ export class Plot {
   }
 
   // If there are more samples than pixels, draw the minimum and the maximum of each few.
+  /**
+   * @param {CanvasRenderingContext2D} pen @param {number} channel @param {string} colour @param {number} from
+   * @param {number} to @param {Place} x @param {Place} y
+   */
   #trace(pen, channel, colour, from, to, x, y) {
     const history = this.#history;
     const first = Math.max(history.first, history.at(from) - 1);
@@ -213,19 +241,23 @@ export class Plot {
       if (low < 0) continue;
       for (const k of low === high ? [low] : [Math.min(low, high), Math.max(low, high)]) {
         const t = history.time(k);
-        const at = [x(t), y(history.value(channel, k))];
-        if (t - before > GAP) pen.moveTo(...at);
-        else pen.lineTo(...at);
+        const height = y(history.value(channel, k));
+        if (t - before > GAP) pen.moveTo(x(t), height);
+        else pen.lineTo(x(t), height);
         before = t;
       }
     }
     pen.stroke();
   }
 
+  /**
+   * @param {CanvasRenderingContext2D} pen @param {Box} box @param {number} from @param {number} to @param {Place} x
+   * @param {Place} y @param {boolean[]} shown @param {Palette} palette
+   */
   #readOut(pen, box, from, to, x, y, shown, { text, line, series }) {
     const history = this.#history;
     const read = this.#cursor !== null && history.end > 0;
-    const n = history.nearest(read ? from + this.#cursor * (to - from) : to);
+    const n = history.nearest(read ? from + (this.#cursor ?? 0) * (to - from) : to);
     this.#legend.forEach(({ channel, value }) => {
       const number = n < 0 ? NaN : history.value(channel, n);
       write(value, Number.isNaN(number) ? "–" : signed(number, this.#digits));
@@ -255,10 +287,9 @@ export class Plot {
     pen.fillText(words, left + 5, box.bottom + 14);
   }
 
+  /** @param {string} id */
   #save(id) {
     const text = this.#history.csv(this.#channels, ...this.#ends());
-    const url = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
-    html("a", { href: url, download: `katana450-${id}.csv` }).click();
-    URL.revokeObjectURL(url);
+    save(new Blob([text], { type: "text/csv" }), `katana450-${id}.csv`);
   }
 }

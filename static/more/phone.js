@@ -1,16 +1,17 @@
 // The address of this server for a phone, as a QR code and as text. Loaded on first use.
+import { element, styled } from "../dom.js";
 import { html } from "../instruments/shape.js";
+import { messageOf, request } from "../server.js";
 
-const box = /** @type {HTMLDialogElement} */ (document.getElementById("phone"));
-const style = html("link", { rel: "stylesheet", href: new URL("phone.css", import.meta.url).href });
-const styled = new Promise((resolve) => ["load", "error"].forEach((kind) => style.addEventListener(kind, resolve)));
-document.head.append(style);
+const box = element("phone", HTMLDialogElement);
+const style = styled("phone.css", import.meta.url);
 
 const expand = () => {
-  for (const each of document.querySelectorAll("[aria-controls=phone]")) each.setAttribute("aria-expanded", String(box.open));
+  for (const button of document.querySelectorAll("[aria-controls=phone]")) button.setAttribute("aria-expanded", String(box.open));
 };
 box.addEventListener("close", expand);
 
+/** @param {{ url: string, code: string, note: string }} address @param {Page.Toast} toast */
 function shown({ url, code, note }, toast) {
   const head = html("form", { method: "dialog" }, html("h1", {}, "Open on your phone"), html("button", {}, "Close"));
   if (!url) return [head, html("p", {}, note)];
@@ -28,17 +29,16 @@ function shown({ url, code, note }, toast) {
   return [head, html("img", { src: code, alt: `QR code of ${url}` }), html("div", {}, field, copy), html("p", {}, note)];
 }
 
-// Show the address, or hide it again. `toast` shows a sentence to the person.
+/** Show the address, or hide it again. `toast` shows a sentence to the person. @param {Page.Toast} toast */
 export async function toggle(toast) {
   if (box.open) return box.close();
   try {
-    const answer = await fetch("api/v1/phone");
-    if (!answer.ok) throw new Error(await answer.text());
+    const answer = await request("api/v1/phone");
     box.replaceChildren(...shown(await answer.json(), toast));
-    await styled;
+    await style;
     box.show();
     expand();
   } catch (error) {
-    toast(`There is no address for a phone: ${error.message}`);
+    toast(`There is no address for a phone: ${messageOf(error)}`);
   }
 }

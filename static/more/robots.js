@@ -1,28 +1,29 @@
 // The choice of another robot. Loaded on first use.
+import { element, styled } from "../dom.js";
 import { html } from "../instruments/shape.js";
+import { messageOf, request } from "../server.js";
 
 /** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
-/** @typedef {{ name: string, key: string, loading: string | null, problem: string }} Driven */
 
-const box = /** @type {HTMLDialogElement} */ (document.getElementById("robots"));
-document.head.append(html("link", { rel: "stylesheet", href: new URL("robots.css", import.meta.url).href }));
+const box = element("robots", HTMLDialogElement);
+styled("robots.css", import.meta.url);
 
 const KINDS = { own: "Of this app", first: "With which the server began", uploaded: "Opened here", gallery: "Gallery" };
 const PATH = "api/v1/robots";
 
-const search = /** @type {HTMLInputElement} */ (html("input", { type: "search", placeholder: "Name or maker", "aria-label": "Search a robot" }));
+const search = html("input", { type: "search", placeholder: "Name or maker", "aria-label": "Search a robot" });
 const list = html("div", { class: "list" });
 const state = html("p", { role: "status" });
-const field = /** @type {HTMLInputElement} */ (html("input", { type: "file", accept: ".urdf,.xacro,.zip", hidden: "", "aria-label": "File of a robot" }));
+const field = html("input", { type: "file", accept: ".urdf,.xacro,.zip", hidden: "", "aria-label": "File of a robot" });
 const opener = html("button", { type: "button" }, "Open a URDF, xacro or .zip…");
 const details = html("form", { class: "arguments", hidden: "" });
 
 /** @type {Robot[]} */
 let robots = [];
-/** @type {Driven | null} */
+/** @type {Page.Context | null} */
+let page = null; // that of the first use
+/** @type {Page.Robot | null} */
 let driven = null;
-/** @type {(request: object) => void} */
-let say = () => {};
 
 box.append(
   html("form", { method: "dialog" }, html("h1", {}, "Change the robot"), html("button", {}, "Close")),
@@ -38,26 +39,25 @@ const report = (words) => {
   state.textContent = words;
 };
 
-/** @param {Robot} robot */
+/** @param {Robot} robot @param {Record<string, string>} [values] */
 function choose(robot, values = {}) {
   report(`${robot.title} is being read…`);
-  say({ do: "choose_robot", robot: robot.name, arguments: values, id: "robot" });
+  page?.say({ do: "choose_robot", robot: robot.name, arguments: values, id: "robot" });
 }
 
-// Ask for the values of the arguments of a xacro file, which has `robot.arguments`.
-/** @param {Robot} robot */
+/** Ask for the values of the arguments of a xacro file, which has `robot.arguments`. @param {Robot} robot */
 function ask(robot) {
-  const boxes = Object.entries(robot.arguments ?? {}).map(([name, value]) => [name, html("input", { name, value })]);
+  const boxes = Object.entries(robot.arguments ?? {}).map(([name, value]) => ({ name, input: html("input", { name, value }) }));
   if (!boxes.length) return choose(robot);
   details.replaceChildren(
     html("p", {}, `Arguments of ${robot.title}`),
-    ...boxes.map(([name, input]) => html("label", {}, html("span", {}, name), input)),
+    ...boxes.map(({ name, input }) => html("label", {}, html("span", {}, name), input)),
     html("button", { class: "main" }, "Drive it"),
   );
   details.hidden = false;
   details.onsubmit = (event) => {
     event.preventDefault();
-    const given = Object.fromEntries(boxes.filter(([, input]) => input.value !== input.defaultValue).map(([name, input]) => [name, input.value]));
+    const given = Object.fromEntries(boxes.filter(({ input }) => input.value !== input.defaultValue).map(({ name, input }) => [name, input.value]));
     details.hidden = true;
     choose(robot, given);
   };
@@ -83,12 +83,10 @@ function draw() {
 
 async function load() {
   try {
-    const answer = await fetch(PATH);
-    if (!answer.ok) throw new Error(await answer.text());
-    ({ robots } = await answer.json());
+    ({ robots } = await (await request(PATH)).json());
     draw();
   } catch (error) {
-    report(`The list cannot be loaded: ${/** @type {Error} */ (error).message}`);
+    report(`The list cannot be loaded: ${messageOf(error)}`);
   }
 }
 
@@ -112,7 +110,7 @@ async function upload(file, main = "") {
     await load();
     ask(robot);
   } catch (error) {
-    report(`${file.name} was not sent: ${/** @type {Error} */ (error).message}`);
+    report(`${file.name} was not sent: ${messageOf(error)}`);
   }
 }
 
@@ -131,20 +129,21 @@ for (const type of ["dragover", "drop"])
     event.stopPropagation();
     if (type === "drop" && dataTransfer?.files.length) upload(dataTransfer.files[0]);
   });
-window.addEventListener("status", (event) => {
-  const now = /** @type {CustomEvent<{ robot?: Driven }>} */ (event).detail.robot;
-  if (!now) return;
+/** @param {Page.Status} status */
+function note({ robot }) {
+  if (!robot) return;
   const before = driven;
-  driven = now;
-  if (now.loading) report(`${now.loading} is being read…`);
-  else if (now.problem && now.problem !== before?.problem) report(now.problem);
-});
+  driven = robot;
+  if (robot.loading) report(`${robot.loading} is being read…`);
+  else if (robot.problem && robot.problem !== before?.problem) report(robot.problem);
+}
 
 // Show the choice, or hide it again. `options.file`: a description that was dropped on the page.
-/** @param {{ say: (request: object) => void, robot?: Driven, file?: File }} options */
+/** @param {{ page: Page.Context, file?: File }} options */
 export async function toggle(options) {
-  ({ say } = options);
-  driven = options.robot ?? driven;
+  if (!page) options.page.store.follow(note);
+  ({ page } = options);
+  driven = page.store.status?.robot ?? driven;
   if (box.open && !options.file) return box.close();
   report(driven?.problem ?? "");
   details.hidden = true;

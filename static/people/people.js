@@ -1,4 +1,7 @@
 // Who is connected, for admins: a list with buttons that disconnect.
+import { html } from "../instruments/shape.js";
+import { element, first, styled } from "../dom.js";
+
 const EVERY = 1000; // ms between two queries while the list is open
 const CONTENT = `
   <form method="dialog"><h1 id="people-title">Who is connected</h1><button class="main" autofocus>Close</button></form>
@@ -9,11 +12,11 @@ const CONTENT = `
   <ul id="people-list"></ul>
   <p id="people-note">A disconnected person can still stop the arm from a page that is open, until the link is revoked.</p>
 `;
-/** @type {(id: string) => any} */
-const byId = (id) => document.getElementById(id);
 
+/** @param {string} since */
 const time = (since) => new Date(since).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
 
+/** @param {Api.ConnectedPerson} person */
 function about(person) {
   const { role, drives, asks, program, connections, kept_out: out, link } = person;
   const addresses = [...new Set(connections.map(({ address }) => address))].join(", ");
@@ -28,25 +31,22 @@ function about(person) {
 }
 
 export class People {
-  // The dialog is below the bar and not modal, so that mouse and finger can press STOP.
+  /** The dialog is below the bar and not modal, so that mouse and finger can press STOP. @param {Page.Say} say */
   constructor(say) {
     this.say = say;
-    this.timer = null;
+    this.timer = 0;
     this.drawn = "";
-    const style = document.createElement("link");
-    style.rel = "stylesheet";
-    style.href = new URL("people.css", import.meta.url).href;
-    document.head.append(style);
-    this.dialog = document.createElement("dialog");
-    this.dialog.id = "people";
-    this.dialog.setAttribute("aria-labelledby", "people-title");
+    styled("people.css", import.meta.url);
+    this.dialog = html("dialog", { id: "people", "aria-labelledby": "people-title" });
     this.dialog.innerHTML = CONTENT;
-    document.querySelector("main").append(this.dialog);
+    first("main", HTMLElement).append(this.dialog);
+    this.list = element("people-list", HTMLElement);
+    this.select = element("kick-for", HTMLSelectElement);
     this.dialog.addEventListener("close", () => {
       clearInterval(this.timer);
-      byId("help-button").focus();
+      element("help-button", HTMLButtonElement).focus();
     });
-    byId("kick-for").addEventListener("change", () => {
+    this.select.addEventListener("change", () => {
       this.drawn = "";
       this.look();
     });
@@ -65,12 +65,9 @@ export class People {
   }
 
   // `key` stays the same while the label changes, so that the focus finds the button again.
+  /** @param {string} key @param {string} label @param {string} name @param {(button: HTMLButtonElement) => void} act */
   button(key, label, name, act) {
-    const made = document.createElement("button");
-    made.type = "button";
-    made.textContent = label;
-    made.setAttribute("aria-label", `${label} ${name}`);
-    made.dataset.key = key;
+    const made = html("button", { type: "button", "aria-label": `${label} ${name}`, "data-key": key }, label);
     made.addEventListener("click", () => {
       act(made);
       this.look();
@@ -79,8 +76,9 @@ export class People {
   }
 
   // The second click revokes a link, because nothing brings it back.
+  /** @param {Api.ConnectedPerson} person @param {HTMLButtonElement} button */
   kick({ person, name }, button) {
-    const { value } = byId("kick-for");
+    const { value } = this.select;
     if (value !== "revoke") this.say({ do: "kick", person, seconds: Number(value) });
     else if (button.dataset.sure) this.say({ do: "kick", person, revoke: true });
     else {
@@ -90,41 +88,38 @@ export class People {
     }
   }
 
-  row(each) {
-    const { person, name, you, kept_out: out } = each;
-    const item = document.createElement("li");
-    const title = document.createElement("b");
-    title.textContent = you ? `${name} (you)` : name;
-    const line = document.createElement("span");
-    line.textContent = about(each);
-    const acts = document.createElement("div");
+  /** @param {Api.ConnectedPerson} member */
+  row(member) {
+    const { person, name, you, kept_out: out } = member;
+    const acts = html("div");
+    /** @param {string} key @param {string} label @param {(button: HTMLButtonElement) => void} act */
     const add = (key, label, act) => acts.append(this.button(`${key} ${person}`, label, name, act));
     if (out !== null) add("kick", "Let in", () => this.say({ do: "kick", person, seconds: 0 }));
-    else if (!you) add("kick", "Disconnect", (button) => this.kick(each, button));
-    item.append(title, acts, line);
-    return item;
+    else if (!you) add("kick", "Disconnect", (button) => this.kick(member, button));
+    return html("li", {}, html("b", {}, you ? `${name} (you)` : name), acts, html("span", {}, about(member)));
   }
 
+  /** @param {Api.People} answer */
   heard({ people }) {
-    const parts = (each) => [each.person, each.name, each.role, each.kept_out === null];
+    /** @param {Api.ConnectedPerson} member */
+    const parts = ({ person, name, role, kept_out: out }) => [person, name, role, out === null];
     const key = JSON.stringify(people.map(parts));
     // Buttons are not replaced while they may be pressed.
     if (key === this.drawn) {
-      const lines = byId("people-list").querySelectorAll("span");
-      people.forEach((each, number) => (lines[number].textContent = about(each)));
+      const lines = this.list.querySelectorAll("span");
+      people.forEach((member, number) => (lines[number].textContent = about(member)));
       return;
     }
     this.drawn = key;
-    /** @type {HTMLElement | null} */
+    /** @type {HTMLElement | null | undefined} */
     const focused = document.activeElement?.closest("#people-list button");
     const kept = focused?.dataset.key;
-    byId("people-list").replaceChildren(...people.map((each) => this.row(each)));
-    byId("people-for").hidden = people.length < 2;
-    byId("kick-for").options[3].hidden = people.every(({ link }) => link === null);
-    byId("people-note").hidden = people.every(({ role }) => role === "admin");
+    this.list.replaceChildren(...people.map((member) => this.row(member)));
+    element("people-for", HTMLElement).hidden = people.length < 2;
+    this.select.options[3].hidden = people.every(({ link }) => link === null);
+    element("people-note", HTMLElement).hidden = people.every(({ role }) => role === "admin");
     // The focus stays on its button, although the list is drawn again.
-    /** @type {HTMLElement[]} */
-    const buttons = [...byId("people-list").querySelectorAll("button")];
-    if (kept) (buttons.find((each) => each.dataset.key === kept) ?? this.dialog.querySelector("button")).focus();
+    const buttons = [...this.list.querySelectorAll("button")];
+    if (kept) (buttons.find((button) => button.dataset.key === kept) ?? this.dialog.querySelector("button"))?.focus();
   }
 }

@@ -1,6 +1,9 @@
 // The branches in the picture: the arm on the branch whose row in the panel is under the pointer, for this
 // window alone, with a name and the time of the change.
-import { html, write } from "../instruments/shape.js";
+import { sceneIn, sceneOf, write } from "../dom.js";
+import { html } from "../instruments/shape.js";
+import { readState } from "../server.js";
+import { isMesh } from "./glow.js";
 
 const ROW = "tr[data-branch]";
 const EVERY = 250; // ms between two places of the name
@@ -10,106 +13,127 @@ const ELBOW = 2; // number of the joint whose link carries the name
 
 export class Branches {
   #scene;
-  #status;
-  #arm = null; // description of the arm
+  #store;
+  #arm; // description of the arm
+  /** @type {Map<string, { words: string, q: number[], refusal: string }>} */
   #options = new Map(); // name of a branch to its words and joint angles
+  /** @type {string | null} */
   #row = null; // name of the branch under the pointer
+  /** @type {{ object: Three.Object3D, elbow: Three.Object3D | null, material: Three.Material | null } | null} */
   #ghost = null; // {object, elbow, material} of that branch
   #label = html("p", { id: "branch-label", class: "scene-label", hidden: "" });
   #asked = 0; // number of the last question
 
-  // status: returns the state of the page, which has the speed.
-  constructor(stage, scene, arm, status) {
+  // store: that of the page, whose status has the speed.
+  /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Api.Arm} arm @param {Page.Store} store */
+  constructor(stage, scene, arm, store) {
     this.#scene = scene;
     this.#arm = arm;
-    this.#status = status;
+    this.#store = store;
     stage.append(this.#label);
     this.#read();
     setInterval(() => document.hidden || this.#name(), EVERY);
   }
 
+  /** @param {Window} inner */
   listen(inner) {
-    const row = ({ target }) => target.closest?.(ROW);
+    /** @param {Event} event @returns {HTMLElement | null} */
+    const row = ({ target }) => (target instanceof inner.window.Element ? target.closest(ROW) : null);
     inner.addEventListener("pointerover", (event) => event.pointerType !== "touch" && this.#over(row(event)));
     // A finger shows a branch by a tap, and hides it by another anywhere.
     inner.addEventListener("click", (event) => event.pointerType === "touch" && this.#over(row(event)));
     inner.document.addEventListener("pointerleave", () => this.#over(null));
   }
 
+  /** @param {HTMLElement | null} row */
   #over(row) {
     const name = row?.ariaCurrent ? null : row?.dataset.branch ?? null;
     if (name === this.#row) return;
     this.#row = name;
     this.#remove();
-    if (name) this.#show(name, getComputedStyle(row.querySelector("i")).backgroundColor);
+    const sign = row?.querySelector("i");
+    if (name && sign) this.#show(name, getComputedStyle(sign).backgroundColor);
     else this.#name();
   }
 
+  /** @param {string} name @param {string} colour */
   async #show(name, colour) {
     const state = await this.#read();
     const option = this.#options.get(name);
-    if (!state || this.#row !== name || this.#ghost || option.refusal) return;
-    const { viewer, node } = this.#inner;
+    if (!state || !option || this.#row !== name || this.#ghost || option.refusal) return;
+    const { drawing, node } = sceneIn(this.#scene);
     const links = this.#arm.links.map(({ path }) => node(`/arm/${path.join("/")}`));
     const [first] = links;
-    if (!first) return;
-    let material = null;
-    let elbow = null;
-    const copy = (object) => {
-      const made = object.clone(false);
-      const joint = links.indexOf(object);
-      if (joint >= 0) {
-        const axis = made.position.clone().set(...this.#arm.links[joint].axis);
-        made.quaternion.multiply(made.quaternion.clone().setFromAxisAngle(axis, option.q[joint] - state.q[joint]));
-        made.updateMatrix();
-      }
-      if (joint === ELBOW) elbow = made;
-      if (made.isMesh) {
-        material ??= Object.assign(made.material.clone(), { map: null, transparent: true, opacity: OPACITY, depthWrite: false });
-        made.material = material;
-        made.castShadow = made.receiveShadow = false;
-      }
-      // The conduit has bent shapes of its own.
-      for (const child of object.children) if (!child.isMesh || child.type === "Mesh") made.add(copy(child));
-      return made;
-    };
-    const object = copy(first);
-    material?.color.set(colour);
+    if (!first?.parent) return;
+    const turns = option.q.map((angle, joint) => angle - state.q[joint]);
+    const copy = this.#copy(first, links, turns);
+    copy.material?.color.set(colour);
     // Outside of the arm, of which it is no part.
     const frame = first.parent.clone(false);
     first.parent.updateWorldMatrix(true, false);
     frame.name = "branch";
     frame.matrixAutoUpdate = false;
     frame.matrix.copy(first.parent.matrixWorld);
-    frame.add(object);
-    viewer().scene.add(frame);
-    this.#ghost = { object: frame, elbow, material };
+    frame.add(copy.object);
+    drawing().scene.add(frame);
+    this.#ghost = { ...copy, object: frame };
     this.#name();
-    viewer().requestRender();
+    drawing().requestRender();
+  }
+
+  // Return a translucent copy of an object with its `links`, each turned by its angle [rad].
+  /** @param {Three.Object3D} source @param {(Three.Object3D | undefined)[]} links @param {number[]} turns */
+  #copy(source, links, turns) {
+    /** @type {Three.Material | null} */
+    let material = null;
+    /** @type {Three.Object3D | null} */
+    let elbow = null;
+    /** @param {Three.Object3D} object */
+    const copy = (object) => {
+      const made = object.clone(false);
+      const joint = links.indexOf(object);
+      if (joint >= 0) {
+        const [x, y, z] = this.#arm.links[joint].axis;
+        const axis = made.position.clone().set(x, y, z);
+        made.quaternion.multiply(made.quaternion.clone().setFromAxisAngle(axis, turns[joint]));
+        made.updateMatrix();
+      }
+      if (joint === ELBOW) elbow = made;
+      if (isMesh(made)) {
+        material ??= Object.assign(made.material.clone(), { map: null, transparent: true, opacity: OPACITY, depthWrite: false });
+        made.material = material;
+        made.castShadow = made.receiveShadow = false;
+      }
+      // The conduit has bent shapes of its own.
+      for (const child of object.children) if (!isMesh(child) || child.type === "Mesh") made.add(copy(child));
+      return made;
+    };
+    const object = copy(source);
+    return { object, elbow: /** @type {Three.Object3D | null} */ (elbow), material: /** @type {Three.Material | null} */ (material) };
   }
 
   #remove() {
     this.#ghost?.object.removeFromParent();
     this.#ghost?.material?.dispose();
     this.#ghost = null;
-    this.#inner?.viewer()?.requestRender();
+    sceneOf(this.#scene)?.viewer()?.requestRender();
   }
 
-  // Read the options and return the state to which they belong; null without an answer.
+  /** Read the options and return the state to which they belong; null without an answer. @returns {Promise<Api.State | null>} */
   async #read() {
     const asked = (this.#asked += 1);
-    const questions = ["branches", "state"].map((at) => fetch(`api/v1/${at}`).catch(() => null));
-    const answers = await Promise.all(questions);
-    if (answers.some((each) => !each?.ok) || asked !== this.#asked) return null;
-    const [{ choices }, state] = await Promise.all(answers.map((each) => each.json()));
+    const [answer, state] = await Promise.all([fetch("api/v1/branches").catch(() => null), readState()]);
+    if (!answer?.ok || !state || asked !== this.#asked) return null;
+    /** @type {Api.Branches} */
+    const { choices } = await answer.json();
     const now = state.branch ?? [];
     this.#options = new Map(
-      choices.map((each) => {
-        const parts = each.name.split("-");
+      choices.map(({ name, time, q, refusal }) => {
+        const parts = name.split("-");
         const differs = parts.map((word, k) => (word === now[k] ? "" : `${PARTS[k]} ${word}`));
-        const time = each.time / (this.#status()?.speed ?? 1);
-        const words = [...differs.filter(Boolean), `${time.toFixed(1)} s`].join(", ");
-        return [each.name, { words, q: each.q, refusal: each.refusal }];
+        const seconds = time / (this.#store.live?.speed ?? 1);
+        const words = [...differs.filter(Boolean), `${seconds.toFixed(1)} s`].join(", ");
+        return [name, { words, q, refusal }];
       }),
     );
     return state;
@@ -117,19 +141,17 @@ export class Branches {
 
   // Write the name of the ghost at its elbow.
   #name() {
-    const { node, pixelOf } = this.#inner ?? {};
+    const { node, pixelOf } = sceneOf(this.#scene) ?? {};
+    const world = node?.("");
     const elbow = this.#ghost?.elbow;
     const place = elbow?.getWorldPosition(elbow.position.clone());
-    const pixel = place && pixelOf(place.applyMatrix4(node("").matrixWorld.clone().invert()).toArray());
-    this.#label.hidden = !pixel;
-    if (!pixel) return;
+    const pixel = world && place && pixelOf?.(place.applyMatrix4(world.matrixWorld.clone().invert()).toArray());
+    const option = this.#options.get(this.#row ?? "");
+    this.#label.hidden = !pixel || !option;
+    if (!pixel || !option) return;
     const [x, y] = pixel;
-    write(this.#label, this.#options.get(this.#row).words);
+    write(this.#label, option.words);
     this.#label.style.left = `${this.#scene.offsetLeft + x}px`;
     this.#label.style.top = `${this.#scene.offsetTop + y}px`;
-  }
-
-  get #inner() {
-    return this.#scene.contentWindow?.katanaScene;
   }
 }

@@ -2,17 +2,25 @@
 const COLOUR = 0x2477d4;
 const STRENGTH = 0.3;
 
+/** @param {Three.Object3D} object @returns {object is Three.Mesh} */
+export const isMesh = (object) => "isMesh" in object;
+
 // Return the shapes of an object of three.js, but not those of the objects `without`.
-export function shapesOf(object, without = [], found = new Set()) {
-  if (object?.isMesh && object.material.emissive) found.add(object);
-  for (const child of object?.children ?? []) if (!without.includes(child)) shapesOf(child, without, found);
-  return found;
+/**
+ * @param {Three.Object3D | null | undefined} object @param {(Three.Object3D | undefined)[]} without
+ * @param {Set<Three.Mesh>} shapes
+ */
+export function shapesOf(object, without = [], shapes = new Set()) {
+  if (object && isMesh(object) && object.material.emissive) shapes.add(object);
+  for (const child of object?.children ?? []) if (!without.includes(child)) shapesOf(child, without, shapes);
+  return shapes;
 }
 
 export class Glow {
+  /** @type {Map<Three.Mesh, [own: Three.Material, former: Three.Material]>} */
   #lit = new Map(); // own and former material of each highlighted shape
 
-  // Highlight these shapes and no others.
+  /** Highlight these shapes and no others. @param {Set<Three.Mesh>} shapes */
   show(shapes) {
     for (const [shape, [mine, before]] of this.#lit)
       if (!shapes.has(shape)) {
@@ -23,7 +31,7 @@ export class Glow {
     for (const shape of shapes) {
       if (this.#lit.has(shape)) continue;
       const mine = shape.material.clone();
-      mine.emissive.set(COLOUR);
+      mine.emissive?.set(COLOUR);
       mine.emissiveIntensity = STRENGTH;
       this.#lit.set(shape, [mine, shape.material]);
       shape.material = mine;

@@ -12,18 +12,24 @@ export class Grab {
   #value; // [rad or m] of the joint at the press
   #centre; // point on the axis
   #axis; // its direction
+  /** @type {Page.Pixel | null} */
   #across = null; // [px per rad or m] motion of the point in the picture; null if the pointer's angle counts
+  /** @type {{ direction: Three.Vector3, lever: number } | null} */
   #last = null; // {direction, lever} of the pointer from the axis, seen last
   #turned = 0; // rad
 
   // viewer: three's camera and canvas. link: the link's object. point: where the ray met it. joint: {axis,
   // slides}, the axis in the frame of the link, whose origin is on it. value: [rad or m] of the joint.
+  /**
+   * @param {ViserPage.Viewer} viewer @param {Three.Object3D} link @param {Three.Vector3} point
+   * @param {{ axis: number[], slides: boolean }} joint @param {Page.Pixel} pixel @param {number} value
+   */
   constructor(viewer, link, point, { axis, slides }, pixel, value) {
     this.#viewer = viewer;
     this.#start = pixel;
     this.#value = value;
     const origin = this.#vector().setFromMatrixPosition(link.matrixWorld);
-    this.#axis = this.#vector().set(...axis).transformDirection(link.matrixWorld);
+    this.#axis = this.#vector().set(axis[0], axis[1], axis[2]).transformDirection(link.matrixWorld);
     this.#centre = origin.addScaledVector(this.#axis, point.clone().sub(origin).dot(this.#axis));
     if (slides) {
       this.#across = this.#motion(point, this.#axis);
@@ -34,7 +40,7 @@ export class Grab {
     else this.#across = this.#lever(point, ray);
   }
 
-  // Return the value [rad or m] of the joint for the pointer at a pixel.
+  /** Return the value [rad or m] of the joint for the pointer at a pixel. @param {Page.Pixel} pixel */
   at(pixel) {
     if (this.#across) {
       const [x, y] = this.#across;
@@ -53,6 +59,7 @@ export class Grab {
 
   // Return the motion [px/rad] in the picture of a point that turns about an axis seen edge-on. A point
   // that moves along the ray is replaced by one on the near side of the axis.
+  /** @param {Three.Vector3} point @param {Three.Vector3} ray @returns {Page.Pixel} */
   #lever(point, ray) {
     const radius = point.clone().sub(this.#centre);
     const own = this.#motion(point, this.#axis.clone().cross(radius));
@@ -67,6 +74,7 @@ export class Grab {
 
   // Return the unit direction from the axis to where the ray of a pixel meets the plane of the motion, and
   // the lever [px]; null without such a point.
+  /** @param {Page.Pixel} pixel */
   #direction(pixel) {
     const { position } = this.#viewer.camera;
     const ray = this.#ray(pixel);
@@ -78,18 +86,21 @@ export class Grab {
   }
 
   // Return the motion in the picture [px per unit] of a point that moves by `along` [m per unit].
+  /** @param {Three.Vector3} point @param {Three.Vector3} along @returns {Page.Pixel} */
   #motion(point, along) {
     const size = along.length() || 1;
-    const [a, b] = [point, point.clone().addScaledVector(along, STEP / size)].map((each) => this.#pixel(each));
-    return [0, 1].map((i) => ((b[i] - a[i]) * size) / STEP);
+    const [a, b] = [this.#pixel(point), this.#pixel(point.clone().addScaledVector(along, STEP / size))];
+    return [((b[0] - a[0]) * size) / STEP, ((b[1] - a[1]) * size) / STEP];
   }
 
+  /** @param {Three.Vector3} point @returns {Page.Pixel} */
   #pixel(point) {
     const { left, top, width, height } = this.#viewer.canvas.getBoundingClientRect();
     const { x, y } = point.clone().project(this.#viewer.camera);
     return [left + ((1 + x) / 2) * width, top + ((1 - y) / 2) * height];
   }
 
+  /** @param {Page.Pixel} pixel */
   #ray([x, y]) {
     const { camera, canvas } = this.#viewer;
     const { left, top, width, height } = canvas.getBoundingClientRect();

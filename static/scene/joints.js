@@ -1,6 +1,8 @@
 // The joints in the picture: which link is under the pointer, its highlight, and the bar of the selected
 // one. A link that is dragged turns its joint; the pointer's events come from `stage.js`.
-import { html, signed, write } from "../instruments/shape.js";
+import { element, sceneIn, write } from "../dom.js";
+import { html, signed } from "../instruments/shape.js";
+import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
 
@@ -12,24 +14,38 @@ const EDGE = 8; // px between the bar and the edge of the scene
 const DEGREES = 180 / Math.PI;
 const ID = "joint-drag"; // id of the commands of a drag
 
+/**
+ * @typedef {object} Drag
+ * @property {number} joint @property {number} pointer @property {boolean} touch @property {Page.Pixel} start
+ * @property {Page.Pixel} pixel @property {Grab | null} grab @property {number | null} value @property {boolean} moved
+ * @property {number} sent @property {number | null} timer @property {number} [revocations] @property {number} [last]
+ */
+
 export class Joints {
   #scene;
-  #page; // {say, toast, status}
+  #page; // {say, store}
+  /** @type {Api.Arm | null} */
   arm = null; // description of the arm, once it is there
+  /** @type {number | null} */
   #hovered = null; // number of a joint
+  /** @type {number | null} */
   #selected = null;
-  #drag = null; // {joint, pointer, pixel, grab, value, sent, timer, revocations}
+  /** @type {Drag | null} */
+  #drag = null;
   #glow = new Glow();
-  #timer = null;
+  #timer = 0;
   #label = html("p", { id: "joint-label", class: "scene-label", hidden: "" });
   #name = html("b");
   #angle = html("output");
+  /** @type {HTMLButtonElement[]} */
   #steps;
   #bar;
 
+  /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Pick<Page.Context, "say" | "store">} page */
   constructor(stage, scene, page) {
     this.#scene = scene;
     this.#page = page;
+    /** @param {number} sign */
     const step = (sign) => {
       const button = html("button", { type: "button" });
       button.addEventListener("click", () => this.#step(sign));
@@ -43,7 +59,7 @@ export class Joints {
       this.#name, this.#steps[0], this.#angle, this.#steps[1], clear,
     );
     stage.append(this.#label, this.#bar);
-    document.getElementById("jog").addEventListener("change", () => this.#selected !== null && this.#show());
+    element("jog", HTMLElement).addEventListener("change", () => this.#selected !== null && this.#show(this.#selected));
   }
 
   // Whether some pointer holds a joint.
@@ -51,22 +67,24 @@ export class Joints {
     return this.#drag !== null;
   }
 
-  // Whether this pointer holds one.
+  /** Whether this pointer holds one. @param {number} pointer */
   holds(pointer) {
     return this.#drag?.pointer === pointer;
   }
 
-  // Return the number of the joint that moves an object of three.js; null without one.
+  /** Return the number of the joint that moves an object of three.js; null without one. @param {Three.Object3D} object */
   of(object) {
     const links = this.arm?.links.map((_, joint) => this.#link(joint)) ?? [];
-    for (let each = object; each; each = each.parent) {
-      const joint = links.indexOf(each);
+    /** @type {Three.Object3D | null} */
+    let part = object;
+    for (; part; part = part.parent) {
+      const joint = links.indexOf(part);
       if (joint >= 0) return joint;
     }
     return null;
   }
 
-  // Show that the pointer can take hold of a joint; null for none.
+  /** Show that the pointer can take hold of a joint; null for none. @param {number | null} joint @param {Page.Pixel | null} pixel */
   hover(joint, pixel) {
     if (this.#drag) return;
     const shown = this.#mayDrive() ? joint : null;
@@ -75,27 +93,31 @@ export class Joints {
       this.#light();
       this.#viewer.canvas.style.cursor = shown === null ? "" : "pointer";
     }
-    this.#tell(shown === null ? null : this.arm.links[shown].label, pixel);
+    this.#tell(shown === null ? null : this.#known.links[shown].label, pixel);
   }
 
   // Whether a press on a joint takes hold of it. A finger, which may turn the camera, takes hold only of
   // the selected one, and so does a person who does not drive: the refusal then has a reason to be shown.
+  /** @param {number | null} joint @param {boolean} touch @returns {joint is number} */
   takes(joint, touch) {
     return joint !== null && !this.#drag && (joint === this.#selected || (!touch && this.#mayDrive()));
   }
 
   // Take hold of a joint at a hit {point} of the ray from a pixel.
+  /** @param {number} joint @param {{ point: Three.Vector3 }} hit @param {Page.Pixel} pixel @param {number} pointer @param {boolean} touch */
   async take(joint, { point }, pixel, pointer, touch) {
+    /** @type {Drag} */
     const drag = { joint, pointer, touch, start: pixel, pixel, grab: null, value: null, moved: false, sent: 0, timer: null };
     this.#drag = drag;
     const viewer = this.#viewer;
-    const { axis } = this.arm.links[joint];
-    const slides = this.arm.slides[joint];
+    const { axis } = this.#known.links[joint];
+    const slides = this.#known.slides[joint];
     const link = this.#link(joint);
+    if (!link) return this.drop();
     link.updateWorldMatrix(true, false);
-    // The geometry at the press, before the answer comes.
+    /** The geometry at the press, before the answer comes. @param {number} value */
     const made = (value) => new Grab(viewer, link, point, { axis, slides }, pixel, value);
-    const state = await this.#state();
+    const state = await readState();
     if (this.#drag !== drag) return;
     if (!state) return this.drop();
     drag.revocations = state.revocations;
@@ -103,9 +125,10 @@ export class Joints {
     this.#follow();
   }
 
-  // The pointer that holds a joint is at another pixel.
+  /** The pointer that holds a joint is at another pixel. @param {Page.Pixel} pixel */
   move(pixel) {
     const drag = this.#drag;
+    if (!drag) return;
     drag.pixel = pixel;
     drag.moved ||= Math.hypot(pixel[0] - drag.start[0], pixel[1] - drag.start[1]) >= STILL;
     this.#bar.classList.toggle("away", drag.moved);
@@ -115,9 +138,9 @@ export class Joints {
   // Release the joint, which stays there. Return whether it was moved; otherwise it was a click.
   release() {
     const drag = this.#drag;
-    if (drag.moved && drag.grab) this.#send();
+    if (drag?.moved && drag.grab) this.#send();
     this.drop();
-    return drag.moved;
+    return Boolean(drag?.moved);
   }
 
   // End the drag because the pointer is lost: the arm comes to rest.
@@ -126,7 +149,7 @@ export class Joints {
     this.drop();
   }
 
-  // Give up a drag whose command was refused.
+  /** Give up a drag whose command was refused. @param {Api.Refused} answer */
   refused({ id }) {
     if (id === ID) this.drop();
   }
@@ -134,7 +157,7 @@ export class Joints {
   // End the drag, and send nothing.
   drop() {
     if (!this.#drag) return;
-    clearTimeout(this.#drag.timer);
+    clearTimeout(this.#drag.timer ?? undefined);
     this.#drag = null;
     this.#bar.classList.remove("away");
     this.#hovered = null;
@@ -144,56 +167,60 @@ export class Joints {
   }
 
   #follow() {
-    const { joint, grab, pixel, moved, timer, sent } = this.#drag;
-    if (!moved) return;
-    const { lower, upper, links } = this.arm;
+    const drag = this.#drag;
+    if (!drag?.moved || !drag.grab) return;
+    const { joint, grab, pixel, timer, sent } = drag;
+    const { lower, upper, links } = this.#known;
     const value = Math.min(upper[joint], Math.max(lower[joint], grab.at(pixel)));
-    this.#drag.value = value;
+    drag.value = value;
     this.#light();
     this.#viewer.canvas.style.cursor = "grabbing";
     this.#tell(`${links[joint].label} ${this.#words(joint, value)}`, pixel);
-    if (!timer) this.#drag.timer = setTimeout(() => this.#send(), Math.max(0, sent + EVERY - performance.now()));
+    if (!timer) drag.timer = setTimeout(() => this.#send(), Math.max(0, sent + EVERY - performance.now()));
   }
 
   #send() {
-    const { joint, value, timer, revocations } = this.#drag;
-    clearTimeout(timer);
-    this.#drag.timer = null;
-    if (value === null || value === this.#drag.last) return;
-    Object.assign(this.#drag, { sent: performance.now(), last: value });
+    const drag = this.#drag;
+    if (!drag) return;
+    const { joint, value, timer, revocations } = drag;
+    clearTimeout(timer ?? undefined);
+    drag.timer = null;
+    if (value === null || value === drag.last) return;
+    Object.assign(drag, { sent: performance.now(), last: value });
     this.#page.say({ do: "joint", axis: joint + 1, value, revocations, id: ID });
   }
 
-  // Select a joint, whose bar is shown near a pixel; null for none.
-  select(joint, pixel) {
+  /** Select a joint, whose bar is shown near a pixel; null for none. @param {number | null} joint @param {Page.Pixel} pixel */
+  select(joint, pixel = [0, 0]) {
     this.#selected = joint;
     clearInterval(this.#timer);
     this.#bar.hidden = joint === null;
     this.#light();
     if (joint === null) return;
     this.#angle.textContent = "";
-    this.#show();
+    this.#show(joint);
     this.#place(pixel);
     this.#read();
     this.#timer = setInterval(() => document.hidden || this.#read(), READ);
   }
 
-  #show() {
-    const joint = this.#selected;
-    const { links, slides } = this.arm;
+  /** @param {number} joint */
+  #show(joint) {
+    const { links, slides } = this.#known;
     const unit = slides[joint] ? " mm" : "°";
     write(this.#name, links[joint].label);
     const size = this.#size();
-    for (const [button, sign, word] of [[this.#steps[0], "−", "minus"], [this.#steps[1], "+", "plus"]]) {
+    this.#steps.forEach((button, i) => {
+      const [sign, word] = i ? ["+", "plus"] : ["−", "minus"];
       write(button, `${sign}${size}${unit}`);
       button.setAttribute("aria-label", `${links[joint].label} ${word} ${size}${unit}`);
-      button.hidden = this.#page.status()?.role === "viewer";
-    }
+      button.hidden = this.#page.store.live?.role === "viewer";
+    });
   }
 
   async #read() {
     const joint = this.#selected;
-    const state = await this.#state();
+    const state = await readState();
     // viser makes the link again after a lost connection.
     this.#light();
     if (state && joint === this.#selected && joint !== null) write(this.#angle, this.#words(joint, state.q[joint]));
@@ -206,27 +233,30 @@ export class Joints {
     return Number(chosen?.value) || 1;
   }
 
+  /** @param {number} sign */
   #step(sign) {
     const joint = this.#selected;
-    const by = (sign * this.#size()) / (this.arm.slides[joint] ? 1000 : DEGREES);
+    if (joint === null) return;
+    const by = (sign * this.#size()) / (this.#known.slides[joint] ? 1000 : DEGREES);
     this.#page.say({ do: "nudge", axis: joint + 1, by });
   }
 
-  // Put the bar above a pixel, inside the scene. It stays there, so that its buttons can be pressed again.
+  /** Put the bar above a pixel, inside the scene. It stays there, so that its buttons can be pressed again. @param {Page.Pixel} pixel */
   #place([x, y]) {
     const { offsetLeft, offsetTop } = this.#scene;
     const { left, top, width } = this.#viewer.canvas.getBoundingClientRect();
-    const inside = (at, size, from, room) => Math.max(from + EDGE, Math.min(at, from + room - size - EDGE));
+    /** @param {number} start @param {number} size @param {number} from @param {number} room */
+    const inside = (start, size, from, room) => Math.max(from + EDGE, Math.min(start, from + room - size - EDGE));
     const { offsetWidth, offsetHeight } = this.#bar;
     const above = y - ABOVE - offsetHeight;
     this.#bar.style.left = `${offsetLeft + inside(x - offsetWidth / 2, offsetWidth, left, width)}px`;
     this.#bar.style.top = `${offsetTop + (above < top + EDGE ? y + ABOVE : above)}px`;
   }
 
-  // Show words beside a pixel; null for none.
-  #tell(words, pixel) {
+  /** Show words beside a pixel; null for none. @param {string | null} words @param {Page.Pixel | null} pixel */
+  #tell(words, pixel = null) {
     this.#label.hidden = words === null;
-    if (words === null) return;
+    if (words === null || !pixel) return;
     write(this.#label, words);
     const { offsetLeft, offsetTop } = this.#scene;
     const { width } = this.#viewer.canvas.getBoundingClientRect();
@@ -239,33 +269,35 @@ export class Joints {
   // Highlight the link of the joint that is dragged, under the pointer, or selected.
   #light() {
     const joint = this.#drag?.moved ? this.#drag.joint : this.#hovered ?? this.#selected;
-    const links = this.arm?.links.map((_, each) => this.#link(each)) ?? [];
+    const links = this.arm?.links.map((_, i) => this.#link(i)) ?? [];
     this.#glow.show(joint === null ? new Set() : shapesOf(links[joint], links));
-    this.#viewer?.requestRender();
+    sceneIn(this.#scene).viewer()?.requestRender();
   }
 
+  /** @param {number} joint */
   #link(joint) {
-    const path = this.arm.links[joint].path.map(encodeURIComponent).join("/");
-    return this.#scene.contentWindow.katanaScene.node(`/arm/${path}`);
+    const path = this.#known.links[joint].path.map(encodeURIComponent).join("/");
+    return sceneIn(this.#scene).node(`/arm/${path}`);
   }
 
+  /** @param {number} joint @param {number} value */
   #words(joint, value) {
-    const [number, unit] = this.arm.slides[joint] ? [1000 * value, " mm"] : [DEGREES * value, "°"];
-    return signed(number) + unit;
+    return this.#known.slides[joint] ? `${signed(1000 * value)} mm` : `${signed(DEGREES * value)}°`;
   }
 
   // Whether a drag of this person would be accepted if the arm is not stopped.
   #mayDrive() {
-    const status = this.#page.status();
+    const status = this.#page.store.live;
     return Boolean(status && status.role !== "viewer" && (status.mine || status.holder === null));
   }
 
-  async #state() {
-    const answer = await fetch("api/v1/state").catch(() => null);
-    return answer?.ok ? answer.json() : null;
+  // The description of the arm, which is there when a joint is under the pointer.
+  get #known() {
+    if (!this.arm) throw new Error("The arm is not known yet.");
+    return this.arm;
   }
 
   get #viewer() {
-    return this.#scene.contentWindow.katanaScene.viewer();
+    return sceneIn(this.#scene).drawing();
   }
 }

@@ -1,6 +1,7 @@
 // The pointer in the scene: a click selects a link or an object, a drag of a link turns its joint, and a
 // double-click looks at a point. Everything else turns the camera.
-import { html } from "../instruments/shape.js";
+import { matches, sceneIn, styled } from "../dom.js";
+import { readArm } from "../server.js";
 import { Branches } from "./branches.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Joints } from "./joints.js";
@@ -12,54 +13,59 @@ const TABLE = "/table";
 const SOLID = ["/arm", "/cup", "/basin", "/objects", TABLE]; // nodes that a ray can meet
 const OBJECTS = ["/cup", "/basin"]; // nodes of objects; the others are below the next one
 const MORE = "/objects";
-const STYLE = new URL("scene.css", import.meta.url).href;
 
 export class Stage {
   #stage;
   #scene;
-  #page; // {say, toast, status, edit}
+  #page;
   #joints;
   #views;
   #steps;
+  /** @type {Branches | null} */
   #branches = null; // only for an arm that has some
+  /** @type {import("../selection/selection.js").Selection | null} */
   #selection = null; // the selected object, loaded with the first click beside the arm
+  /** @type {Page.Pixel | null} */
   #press = null; // [x, y] of a press that may become a click
+  /** @type {{ pixel: Page.Pixel | null } | null} */
   #over = null; // pixel of the pointer, to be looked up in the next frame
+  /** @type {Three.Object3D | null} */
   #pointed = null; // node of the object under the pointer
   #glow = new Glow();
 
-  constructor(stage, scene, page) {
+  /** `page.edit` opens a script, by its name, as text. @param {Page.Context & { edit: (name: string) => void }} page */
+  constructor(page) {
+    const { stage, scene } = page;
     this.#stage = stage;
     this.#scene = scene;
     this.#page = page;
-    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    styled("scene.css", import.meta.url);
     this.#joints = new Joints(stage, scene, page);
     this.#load();
     this.#views = new Views(stage, scene);
     this.#steps = new Steps(page.say, page.edit);
     this.#listen();
-    window.katana.turned = () => this.#views.turned();
+    if (window.katana) window.katana.turned = () => this.#views.turned();
     scene.addEventListener("load", () => this.#listen());
     // What is held at a stop, or when another person drives, moves nothing afterwards.
     let stopped = false;
-    window.addEventListener("status", ({ detail }) => {
+    page.store.follow((status) => {
       // While the arm is stopped, a new drag is refused with the reason.
-      const stops = detail.stopped && !stopped;
-      stopped = Boolean(detail.stopped);
-      if (stops || (!detail.mine && detail.holder !== null)) this.drop();
+      const stops = status.stopped && !stopped;
+      stopped = Boolean(status.stopped);
+      if (stops || (!status.mine && status.holder !== null)) this.drop();
     });
     document.addEventListener("visibilitychange", () => document.hidden && this.#joints.lose());
     window.addEventListener("blur", () => this.#blur());
   }
 
   async #load() {
-    const answer = await fetch("api/v1/arm").catch(() => null);
-    if (!answer?.ok) return;
-    const arm = await answer.json();
+    const arm = await readArm().catch(() => null);
+    if (!arm) return;
     this.#joints.arm = arm;
     if (arm.joints_only) return;
-    this.#branches = new Branches(this.#stage, this.#scene, arm, this.#page.status);
-    this.#branches.listen(this.#scene.contentWindow);
+    this.#branches = new Branches(this.#stage, this.#scene, arm, this.#page.store);
+    if (this.#scene.contentWindow) this.#branches.listen(this.#scene.contentWindow);
   }
 
   // Names of the joints, such as "2 shoulder"; empty before the arm is known.
@@ -83,12 +89,15 @@ export class Stage {
     this.#joints.drop();
   }
 
+  /** @param {Api.Refused} answer */
   refused(answer) {
     this.#joints.refused(answer);
   }
 
   #listen() {
     const inner = this.#scene.contentWindow;
+    if (!inner) return;
+    /** @type {<K extends keyof WindowEventMap>(kind: K, act: (event: WindowEventMap[K]) => void) => void} */
     const on = (kind, act) => inner.addEventListener(kind, act.bind(this), { capture: true });
     on("pointerdown", this.#down);
     on("pointermove", this.#move);
@@ -106,10 +115,12 @@ export class Stage {
     setTimeout(() => document.hasFocus() || this.#joints.lose());
   }
 
+  /** @param {PointerEvent} event */
   #down(event) {
     const { target, pointerId, pointerType, button, isPrimary } = event;
     this.#press = null;
-    if (button || !isPrimary || this.#joints.dragging || !target.matches?.("canvas")) return;
+    if (button || !isPrimary || this.#joints.dragging || !matches(target, "canvas")) return;
+    /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     this.#press = pixel;
     const hit = this.#pick(pixel);
@@ -121,43 +132,48 @@ export class Stage {
     this.#joints.take(joint, hit, pixel, pointerId, pointerType === "touch");
   }
 
+  /** @param {PointerEvent} event */
   #move(event) {
+    /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     if (this.#joints.holds(event.pointerId)) {
       event.stopImmediatePropagation();
       this.#joints.move(pixel);
-    } else if (event.pointerType !== "touch") this.#hover(event.buttons || !event.target.matches?.("canvas") ? null : pixel);
+    } else if (event.pointerType !== "touch") this.#hover(event.buttons || !matches(event.target, "canvas") ? null : pixel);
   }
 
-  // Look up the link under the pointer once per frame.
+  /** Look up the link under the pointer once per frame. @param {Page.Pixel | null} pixel */
   #hover(pixel) {
     const waits = this.#over !== null;
     this.#over = { pixel };
     if (waits) return;
     requestAnimationFrame(() => {
-      const { pixel } = this.#over;
+      const pixel = this.#over?.pixel ?? null;
       this.#over = null;
       const hit = pixel && this.#pick(pixel);
       const joint = hit ? this.#joints.of(hit.object) : null;
       this.#joints.hover(joint, pixel);
-      if (!this.#joints.dragging) this.#point(hit?.object, joint);
+      if (!this.#joints.dragging) this.#point(hit?.object ?? null, joint);
     });
   }
 
   // Show that a click selects the object of which `shape` is a part; `joint` is under the pointer otherwise.
+  /** @param {Three.Object3D | null} shape @param {number | null} joint */
   #point(shape, joint) {
-    const { node, viewer } = this.#scene.contentWindow.katanaScene;
+    const { node, drawing } = sceneIn(this.#scene);
     const [objects, more] = [OBJECTS.map(node), node(MORE)];
-    let each = joint === null ? shape : null;
-    while (each && !objects.includes(each) && !(more && each.parent === more)) each = each.parent;
-    if ((each ?? null) === this.#pointed) return;
-    this.#pointed = each ?? null;
+    let object = joint === null ? shape : null;
+    while (object && !objects.includes(object) && !(more && object.parent === more)) object = object.parent;
+    if (object === this.#pointed) return;
+    this.#pointed = object;
     this.#glow.show(shapesOf(this.#pointed));
-    if (this.#pointed || joint === null) viewer().canvas.style.cursor = this.#pointed ? "pointer" : "";
-    viewer().requestRender();
+    if (this.#pointed || joint === null) drawing().canvas.style.cursor = this.#pointed ? "pointer" : "";
+    drawing().requestRender();
   }
 
+  /** @param {PointerEvent} event */
   #up(event) {
+    /** @type {Page.Pixel} */
     const pixel = [event.clientX, event.clientY];
     if (this.#joints.holds(event.pointerId) && this.#joints.release()) this.#press = null;
     const press = this.#press;
@@ -165,7 +181,7 @@ export class Stage {
     if (press && !event.button && Math.hypot(pixel[0] - press[0], pixel[1] - press[1]) < CLICK) this.#click(pixel);
   }
 
-  // Select the link or the object at a pixel; nothing beside both.
+  /** Select the link or the object at a pixel; nothing beside both. @param {Page.Pixel} pixel */
   async #click(pixel) {
     const hit = this.#pick(pixel);
     const joint = hit && this.#joints.of(hit.object);
@@ -178,25 +194,28 @@ export class Stage {
     this.#selection.pick(...pixel);
   }
 
-  // Look at the point of a part or an object under the pointer.
+  /** Look at the point of a part or an object under the pointer. @param {MouseEvent} event */
   #focus({ target, clientX, clientY }) {
-    const hit = target.matches?.("canvas") && this.#pick([clientX, clientY]);
+    const hit = matches(target, "canvas") && this.#pick([clientX, clientY]);
     if (hit) this.#views.focus(hit.point);
   }
 
   // Return the point [x, y] of the table at a pixel, in m in the base frame; null if something else is there.
+  /** @param {Page.Pixel} pixel @returns {Page.Pixel | null} */
   tableAt(pixel) {
-    const { node } = this.#scene.contentWindow.katanaScene;
+    const { node, world } = sceneIn(this.#scene);
     const [hit, table] = [this.#pick(pixel), node(TABLE)];
-    for (let each = hit?.object; each; each = each.parent) {
-      if (each !== table) continue;
-      const { x, y } = node("").worldToLocal(hit.point.clone());
-      return [x, y];
-    }
-    return null;
+    if (!hit) return null;
+    /** @type {Three.Object3D | null} */
+    let part = hit.object;
+    while (part && part !== table) part = part.parent;
+    if (!part) return null;
+    const { x, y } = world().worldToLocal(hit.point.clone());
+    return [x, y];
   }
 
+  /** @param {Page.Pixel} pixel */
   #pick(pixel) {
-    return this.#scene.contentWindow.katanaScene.pick(pixel, SOLID);
+    return sceneIn(this.#scene).pick(pixel, SOLID);
   }
 }

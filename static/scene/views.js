@@ -1,11 +1,13 @@
 // The view cube: it turns as the scene does, and its faces turn the camera. Below it are the views that are
 // no face, and Fit. For fingers, to which some faces are too narrow, a list replaces it.
+import { sceneIn, sceneOf } from "../dom.js";
 import { html } from "../instruments/shape.js";
+import { NARROW, PANEL } from "../viser/names.js";
 
 const NEAR = 0.6; // m, maximum distance to a point that is looked at
 const MOVING = 500; // ms for which the camera counts as moving after its last message
 const EDGE = 12; // px from the cube to the edges of the scene
-/** @typedef {[number, number, number]} Direction */
+/** @typedef {Page.Vector} Direction */
 // Name, view of the server, outward direction, and the direction that is up on the face; in the base frame.
 /** @type {[string, string, Direction, Direction][]} */
 const FACES = [
@@ -24,11 +26,12 @@ const MORE = [
 
 /** @type {(a: Direction, b: Direction) => Direction} */
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
-// The y axis of CSS points down. A direction of the base frame as one of the cube's box:
+/** The y axis of CSS points down. A direction of the base frame as one of the cube's box: @type {(direction: Direction) => Direction} */
 const boxed = ([x, y, z]) => [x, -y, z];
-const matrix = (...columns) => `matrix3d(${columns.map((each) => each.map((x) => x.toFixed(5)).join()).join()})`;
+/** @param {number[][]} columns */
+const matrix = (...columns) => `matrix3d(${columns.map((column) => column.map((x) => x.toFixed(5)).join()).join()})`;
 
-// Return the transform of a face at half the cube's edge from its centre.
+/** Return the transform of a face at half the cube's edge from its centre. @param {Direction} out @param {Direction} up */
 function facing(out, up) {
   const right = boxed(cross(up, out));
   const down = boxed(up).map((x) => -x);
@@ -42,13 +45,17 @@ export class Views {
   #riding = false; // the camera follows the tool
   #shown = ""; // transform of the cube
   #placed = "";
+  /** @type {Element | null} */
   #canvas = null;
+  /** @type {Element | null} */
   #sheet = null;
   #until = 0; // ms, when the camera counts as still again
   #sized = new ResizeObserver(() => this.turned());
 
+  /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene */
   constructor(stage, scene) {
     this.#scene = scene;
+    /** @param {string} label @param {string} view @param {string} name */
     const button = (label, view, name) => {
       const made = html("button", { type: "button", "aria-label": name, title: name }, label);
       made.addEventListener("click", () => this.#choose(view));
@@ -90,37 +97,39 @@ export class Views {
     requestAnimationFrame(turn);
   }
 
-  // Look at a point of three.js's world from nearer, in the same direction.
+  /** Look at a point of three.js's world from nearer, in the same direction. @param {Three.Vector3} point */
   focus(point) {
-    const { viewer, node, seen, look } = this.#inner;
-    const at = point.clone().applyMatrix4(node("").matrixWorld.clone().invert()).toArray();
+    const { drawing, world, seen, look } = sceneIn(this.#scene);
+    const at = point.clone().applyMatrix4(world().matrixWorld.clone().invert()).toArray();
     const { position, look_at } = seen();
     const away = position.map((x, i) => x - look_at[i]);
     const nearer = Math.min(1, NEAR / Math.hypot(...away));
     look({ position: at.map((x, i) => x + nearer * away[i]), look_at: at });
-    viewer().requestRender();
+    drawing().requestRender();
   }
 
+  /** @param {string} view */
   #choose(view) {
     this.#riding = view === "Tool";
-    this.#inner.press("View", view);
+    sceneIn(this.#scene).press("View", view);
   }
 
   #fit() {
     // The camera on the tool would return at the next step.
     if (this.#riding) this.#choose("3D");
-    else this.#inner.fit();
+    else sceneIn(this.#scene).fit();
   }
 
   // Turn the cube as the camera sees the base frame, and keep it in the corner of the picture.
   #follow() {
-    const viewer = this.#inner?.viewer();
-    const world = viewer?.cameraControl && this.#inner.node("");
+    const { viewer, node } = sceneOf(this.#scene) ?? {};
+    const state = viewer?.();
+    const world = state?.cameraControl && node?.("");
     if (!world) return;
-    const { camera, canvas } = viewer;
+    const { camera, canvas } = state;
     // The panel of a phone, whose upper half lies over the picture at full height.
-    const { NARROW, PANEL } = this.#inner;
-    const sheet = this.#scene.contentWindow.matchMedia(NARROW).matches && canvas.ownerDocument.querySelector(PANEL);
+    const narrow = this.#scene.contentWindow?.matchMedia(NARROW).matches;
+    const sheet = narrow ? canvas.ownerDocument.querySelector(PANEL) : null;
     if (canvas !== this.#canvas || sheet !== this.#sheet) {
       this.#sized.disconnect();
       this.#sized.observe((this.#canvas = canvas));
@@ -141,9 +150,5 @@ export class Views {
     if (placed === this.#placed) return;
     this.#placed = placed;
     this.#group.style.translate = placed;
-  }
-
-  get #inner() {
-    return this.#scene.contentWindow?.katanaScene;
   }
 }

@@ -1,36 +1,41 @@
 // The selected object: a frame round it in the picture, with its name and a button to remove it, and the
 // arrows that move it, in this window alone.
-import { html, write } from "../instruments/shape.js";
+import { sceneOf, styled, write } from "../dom.js";
+import { html } from "../instruments/shape.js";
 
 const EVERY = 100; // ms between two updates of the frame
 const MARGIN = 6; // px
 const EDGE = 4; // px between the bar and the edge of the scene
-const STYLE = new URL("selection.css", import.meta.url).href;
+
+/** @typedef {{ left: number, right: number, top: number, bottom: number }} Box */
 
 // Return the corners [m], in the base frame, of the box round an object. Its own frame is in the
 // middle of its underside.
+/** @param {Api.SceneObject} object */
 function corners({ shape, size, scale, T }) {
-  const [a, b, c] = size.map((each) => each * scale);
-  const wide = { cylinder: [2 * a, 2 * a, b], sphere: [2 * a, 2 * a, 2 * a] }[shape] ?? [a, b, c];
+  const [a, b, c] = size.map((length) => length * scale);
+  const wide = shape === "cylinder" ? [2 * a, 2 * a, b] : shape === "sphere" ? [2 * a, 2 * a, 2 * a] : [a, b, c];
   return [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
-    const at = wide.map((length, i) => length * (((corner >> i) & 1) - (i < 2 ? 0.5 : 0)));
-    return [0, 1, 2].map((row) => T[row][3] + at.reduce((sum, value, i) => sum + T[row][i] * value, 0));
+    const point = wide.map((length, i) => length * (((corner >> i) & 1) - (i < 2 ? 0.5 : 0)));
+    return [0, 1, 2].map((row) => T[row][3] + point.reduce((sum, value, i) => sum + T[row][i] * value, 0));
   });
 }
 
 export class Selection {
   #scene;
-  #page; // {say, status}
+  #page; // {say, store}
+  /** @type {Api.SceneObject | null} */
   #object = null;
-  #timer = null;
+  #timer = 0;
   #name = html("b");
   #frame;
   #bar;
 
+  /** @param {HTMLElement} stage @param {HTMLIFrameElement} scene @param {Pick<Page.Context, "say" | "store">} page */
   constructor(stage, scene, page) {
     this.#scene = scene;
     this.#page = page;
-    document.head.append(html("link", { rel: "stylesheet", href: STYLE }));
+    styled("selection.css", import.meta.url);
     const remove = html("button", { type: "button" }, "Remove ", html("kbd", {}, "Del"));
     const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
     remove.addEventListener("click", () => this.remove());
@@ -42,14 +47,17 @@ export class Selection {
 
   // Select the object in the picture at a pixel of viser's document; the smallest one if several are
   // there. Without one, select nothing.
+  /** @param {number} x @param {number} y */
   async pick(x, y) {
     const objects = await this.#objects();
     const hit = objects
       .filter(({ held, hidden }) => !held && !hidden)
-      .map((object) => [object, this.#bounds(object)])
-      .filter(([, box]) => box && x >= box.left && x <= box.right && y >= box.top && y <= box.bottom)
-      .sort(([, a], [, b]) => area(a) - area(b))[0];
-    this.#show(hit?.[0] ?? null);
+      .flatMap((object) => {
+        const box = this.#bounds(object);
+        return box && x >= box.left && x <= box.right && y >= box.top && y <= box.bottom ? [{ object, box }] : [];
+      })
+      .sort((a, b) => area(a.box) - area(b.box))[0];
+    this.#show(hit?.object ?? null);
   }
 
   // Remove the selected object. Return whether there is one.
@@ -65,11 +73,13 @@ export class Selection {
     this.#show(null);
   }
 
+  /** @returns {Promise<Api.SceneObject[]>} */
   async #objects() {
     const answer = await fetch("api/v1/objects").catch(() => null);
     return answer?.ok ? (await answer.json()).objects : [];
   }
 
+  /** @param {Api.SceneObject | null} object */
   #show(object) {
     if (this.#object && this.#object.name !== object?.name) this.#arrows(false);
     this.#object = object;
@@ -89,23 +99,24 @@ export class Selection {
 
   async #refresh() {
     const name = this.#object?.name;
-    const found = (await this.#objects()).find((each) => each.name === name && !each.held);
+    const object = (await this.#objects()).find((other) => other.name === name && !other.held);
     if (this.#object?.name !== name) return;
-    if (!found) return this.#show(null);
-    this.#object = found;
+    if (!object) return this.#show(null);
+    this.#object = object;
     // viser hides them again after a lost connection.
     this.#arrows(true);
   }
 
-  // Show the arrows of the object, or show them as the server does. What the arm carries has none.
+  /** Show the arrows of the object, or show them as the server does. What the arm carries has none. @param {boolean} own */
   #arrows(own) {
+    if (!this.#object) return;
     const { name, held, fixed } = this.#object;
-    const mine = own && !held && !fixed && this.#page.status()?.role !== "viewer";
-    this.#scene.contentWindow.katanaScene?.reveal(`/handles/${encodeURIComponent(name)}`, mine || undefined);
+    const mine = own && !held && !fixed && this.#page.store.live?.role !== "viewer";
+    sceneOf(this.#scene)?.reveal(`/handles/${encodeURIComponent(name)}`, mine || undefined);
   }
 
   #place() {
-    const box = this.#bounds(this.#object);
+    const box = this.#object && this.#bounds(this.#object);
     this.#frame.style.visibility = box ? "" : "hidden";
     if (!box) return;
     const { offsetLeft, offsetTop } = this.#scene;
@@ -121,16 +132,22 @@ export class Selection {
     const view = this.#scene.getBoundingClientRect();
     this.#bar.style.translate = "";
     const bar = this.#bar.getBoundingClientRect();
+    /** @param {number} start @param {number} end @param {number} from @param {number} to */
     const shift = (start, end, from, to) => Math.max(from + EDGE - start, Math.min(0, to - EDGE - end));
     const [x, y] = [shift(bar.left, bar.right, view.left, view.right), shift(bar.top, bar.bottom, view.top, view.bottom)];
     this.#bar.style.translate = `${x}px ${y}px`;
   }
 
   // Return the rectangle round an object in viser's document; null behind the camera.
+  /** @param {Api.SceneObject} object @returns {Box | null} */
   #bounds(object) {
-    const pixels = corners(object).map((corner) => this.#scene.contentWindow.katanaScene?.pixelOf(corner));
-    if (pixels.some((each) => !each)) return null;
-    const [xs, ys] = [0, 1].map((i) => pixels.map((each) => each[i]));
+    const points = corners(object);
+    const pixels = points.flatMap((corner) => {
+      const pixel = sceneOf(this.#scene)?.pixelOf(corner);
+      return pixel ? [pixel] : [];
+    });
+    if (pixels.length < points.length) return null;
+    const [xs, ys] = [0, 1].map((i) => pixels.map((pixel) => pixel[i]));
     return {
       left: Math.min(...xs) - MARGIN,
       right: Math.max(...xs) + MARGIN,
@@ -140,4 +157,5 @@ export class Selection {
   }
 }
 
+/** @param {Box} box */
 const area = ({ left, right, top, bottom }) => (right - left) * (bottom - top);

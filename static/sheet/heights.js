@@ -1,5 +1,6 @@
 // The heights of the sheet on a phone: its handle is dragged, tapped, or moved by the arrow keys. Sideways
 // the handle and the row of tabs change the tab. Loaded by sheet.js into viser's page.
+import { PANEL, PANEL_HANDLE, TAB, TABS } from "../viser/names.js";
 
 // Name and height of each; the scene leaves at most half of the page. Above the sheet at full height
 // there is room for the buttons and messages that the surrounding page lays over the scene.
@@ -9,12 +10,15 @@ const TAP = 6; // px, movement up to which a touch is a tap
 const COAST = 120; // ms for which the finger's speed counts as if it moved on
 const QUICK = 150; // ms
 const SWIPE = 40; // px sideways that change the tab
+/** @type {Record<string, number>} */
 const STEPS = { ArrowUp: 1, ArrowDown: -1 };
+/** @type {Record<string, number>} */
 const ASIDE = { ArrowRight: 1, ArrowLeft: -1 };
 
 const outer = window.parent === window ? null : window.parent;
 const { style, dataset } = document.documentElement;
-const panel = () => /** @type {HTMLElement} */ (document.querySelector(Viser.PANEL));
+/** @returns {HTMLElement | null} */
+const panel = () => document.querySelector(PANEL);
 const button = document.createElement("button");
 button.id = "k450-sheet";
 button.type = "button";
@@ -30,23 +34,27 @@ look.replaceSync(`
     content: ""; position: absolute; top: 0.5em; left: 50%; width: 2.8em; height: 0.3em; margin-left: -1.4em; border-radius: 0.2em;
     background: currentcolor; opacity: 0.35;
   }
-  ${Viser.TABS} { touch-action: pan-y; }
+  ${TABS} { touch-action: pan-y; }
   #k450-sheet:focus-visible { outline: 3px solid #4b96ea; outline-offset: -3px; }
 `);
 document.adoptedStyleSheets.push(look);
 
 let height = 0; // index of the present one
+/** @type {{ id: number, y: number, from: number, at: number, speed: number, tall: number } | null} */
 let drag = null; // of the finger that moves the handle
+/** @type {{ id: number, x: number, y: number, aside: boolean | null } | null} */
 let swipe = null; // {id, x, y, aside} of the finger on the handle or the tabs
 let dragged = false; // whether the last touch was more than a tap
 
+/** @param {string} sheet @param {string} room */
 function size(sheet, room) {
   style.setProperty("--sheet", sheet);
   style.setProperty("--room", room);
 }
 
+/** @param {number} next */
 function choose(next) {
-  const before = panel()?.offsetHeight;
+  const before = panel()?.offsetHeight ?? 0;
   height = Math.max(0, Math.min(HEIGHTS.length - 1, next));
   const [name, tall] = HEIGHTS[height];
   if (height) dataset.sheet = name;
@@ -56,35 +64,36 @@ function choose(next) {
   button.setAttribute("aria-expanded", String(height > 0));
   const change = (panel()?.offsetHeight ?? 0) - before;
   if (!change || matchMedia("(prefers-reduced-motion: reduce)").matches) return;
-  panel().animate([{ translate: `0 ${change}px` }, { translate: "none" }], { duration: QUICK, easing: "ease-out" });
+  panel()?.animate([{ translate: `0 ${change}px` }, { translate: "none" }], { duration: QUICK, easing: "ease-out" });
 }
 
 const highest = () => Math.max(HALF * innerHeight, innerHeight - ABOVE);
 
-// Return the index of the height that is nearest to `tall` px.
+/** Return the index of the height that is nearest to `tall` px. @param {number} tall */
 function nearest(tall) {
   const heights = [button.offsetHeight, HALF * innerHeight, highest()];
   const away = heights.map((each) => Math.abs(each - tall));
   return away.indexOf(Math.min(...away));
 }
 
-// One sheet at a time: raising this one closes those of the surrounding page.
+/** One sheet at a time: raising this one closes those of the surrounding page. @param {number} next */
 function raise(next) {
   if (next > 0) outer?.katana?.closeSheets();
   choose(next);
 }
 
-// Choose the tab `by` places further, if the tabs can be seen.
+/** Choose the tab `by` places further, if the tabs can be seen. @param {number} by */
 function turn(by) {
   /** @type {NodeListOf<HTMLElement>} */
-  const tabs = document.querySelectorAll(Viser.TAB);
+  const tabs = document.querySelectorAll(TAB);
   const at = [...tabs].findIndex((each) => each.ariaSelected === "true");
   if (height) tabs[at + by]?.click();
 }
 
+/** @type {(kind: "pointerdown" | "pointermove" | "pointerup" | "pointercancel", listen: (event: PointerEvent) => void) => void} */
 const onWindow = (kind, listen) => window.addEventListener(kind, listen, { capture: true });
 onWindow("pointerdown", ({ target, pointerId: id, pointerType, clientX: x, clientY: y }) => {
-  const on = target === button || (pointerType === "touch" && target.closest?.(Viser.TABS));
+  const on = target === button || (pointerType === "touch" && target instanceof Element && target.closest(TABS));
   if (on && !swipe) swipe = { id, x, y, aside: null };
 });
 onWindow("pointermove", ({ pointerId, clientX, clientY }) => {
@@ -92,7 +101,7 @@ onWindow("pointermove", ({ pointerId, clientX, clientY }) => {
   const [across, along] = [Math.abs(clientX - swipe.x), Math.abs(clientY - swipe.y)];
   if (Math.max(across, along) >= TAP) swipe.aside ??= across > along;
 });
-for (const kind of ["pointerup", "pointercancel"])
+for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
   onWindow(kind, ({ pointerId, clientX, type }) => {
     if (pointerId !== swipe?.id) return;
     const [by, { aside }] = [clientX - swipe.x, swipe];
@@ -104,7 +113,7 @@ button.addEventListener("pointerdown", (event) => {
   if (drag || event.button) return;
   button.setPointerCapture(event.pointerId);
   dragged = false;
-  drag = { id: event.pointerId, y: event.clientY, from: panel().offsetHeight, at: event.timeStamp, speed: 0, tall: 0 };
+  drag = { id: event.pointerId, y: event.clientY, from: panel()?.offsetHeight ?? 0, at: event.timeStamp, speed: 0, tall: 0 };
 });
 button.addEventListener("pointermove", (event) => {
   if (event.pointerId !== drag?.id) return;
@@ -152,7 +161,7 @@ button.addEventListener("keydown", (event) => {
 
 // viser makes another panel whenever the page becomes narrow.
 function place() {
-  const handle = document.querySelector(Viser.PANEL_HANDLE);
+  const handle = document.querySelector(PANEL_HANDLE);
   if (handle && button.parentElement !== handle) handle.prepend(button);
 }
 choose(0);

@@ -1,6 +1,8 @@
 // The content of the sheet with its changes, which can be undone; kept in the browser for each arm.
 import { kept, restored } from "./poses.js";
 
+/** @typedef {import("./poses.js").Kept} Kept */
+/** @typedef {import("./poses.js").Pose} Pose */
 const KEY = "katana450.teach";
 const MAX_CHANGES = 100;
 
@@ -8,12 +10,16 @@ export class Content {
   #storage;
   #key;
   #listener;
+  /** @type {Kept[]} */
   #past = [];
+  /** @type {Kept[]} */
   #future = [];
+  /** @type {Kept} */
   now = { name: "My script", times: 1, poses: [], text: null };
   broken = false; // whether something else was kept
 
   // storage: of the browser, or null; arm: the answer `arm`. `listener` is called after each change.
+  /** @param {Storage | null} storage @param {Api.Arm} arm @param {() => void} listener */
   constructor(storage, arm, listener) {
     this.#storage = storage;
     this.#key = `${KEY} ${arm.name}`;
@@ -36,34 +42,43 @@ export class Content {
     return this.#future.length > 0;
   }
 
+  /** The index of a pose; -1 without one. @param {string | null} id */
+  indexOf(id) {
+    return this.now.poses.findIndex((pose) => pose.id === id);
+  }
+
+  /** @param {Partial<Kept>} fields */
   change(fields) {
     this.#past = [...this.#past, this.now].slice(-MAX_CHANGES);
     this.#future = [];
     this.#become({ ...this.now, ...fields });
   }
 
-  // Change one pose.
+  /** Change one pose. @param {string} id @param {Partial<Pose>} fields */
   changePose(id, fields) {
     this.change({ poses: this.now.poses.map((pose) => (pose.id === id ? { ...pose, ...fields } : pose)) });
   }
 
-  // Keep the text that is being edited, which has an undo of its own.
+  /** Keep the text that is being edited, which has an undo of its own. @param {string} text */
   keepText(text) {
     this.#become({ ...this.now, text });
   }
 
   undo() {
-    if (!this.undoable) return;
+    const before = this.#past.pop();
+    if (!before) return;
     this.#future.push(this.now);
-    this.#become(this.#past.pop());
+    this.#become(before);
   }
 
   redo() {
-    if (!this.redoable) return;
+    const after = this.#future.pop();
+    if (!after) return;
     this.#past.push(this.now);
-    this.#become(this.#future.pop());
+    this.#become(after);
   }
 
+  /** @param {Kept} now */
   #become(now) {
     this.now = now;
     try {

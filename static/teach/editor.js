@@ -1,6 +1,8 @@
 // The text of a script, with the numbers of its lines and what the server says about them.
 import { html } from "../instruments/shape.js";
 
+/** @typedef {{ line: number, text: string, file?: string }} Problem */
+/** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null }} Reading */
 const AFTER = 400; // ms without typing after which the text is checked
 const PLACE = /^(?:(.+), )?line (\d+), column \d+: (.*)$/;
 
@@ -12,10 +14,10 @@ export class Editor {
   });
   #numbers = html("pre", { "aria-hidden": "true" });
   #problems = html("ol", { id: "teach-problems", role: "status" });
-  #timer = null;
+  #timer = 0;
   #checked = 0;
 
-  // `typed` is called with the text after each change.
+  /** `typed` is called with the text after each change. @param {(text: string) => void} typed */
   constructor(typed) {
     this.element.append(html("div", {}, this.#numbers, this.#area), this.#problems);
     this.#area.addEventListener("input", () => {
@@ -41,20 +43,21 @@ export class Editor {
     this.#area.focus();
   }
 
-  // Return what the server reads in the text, and show its problems. Without an answer return null.
+  /** Return what the server reads in the text, and show its problems. Without an answer return null. @returns {Promise<Reading | null>} */
   async check() {
     clearTimeout(this.#timer);
     const number = (this.#checked += 1);
     const answer = await fetch("api/v1/scripts", { method: "POST", body: this.text }).catch(() => null);
-    const found = answer?.ok ? await answer.json() : null;
-    if (number === this.#checked && found) this.explain(found.problems);
-    return found;
+    /** @type {Reading | null} */
+    const reading = answer?.ok ? await answer.json() : null;
+    if (number === this.#checked && reading) this.explain(reading.problems);
+    return reading;
   }
 
-  // Show `problems`: {line, text, file} each; `file` names the scene file of the script.
+  /** Show `problems`: {line, text, file} each; `file` names the scene file of the script. @param {Problem[]} problems */
   explain(problems) {
     const lines = new Set(problems.filter(({ file }) => !file).map(({ line }) => line));
-    [...this.#numbers.children].forEach((each, i) => each.classList.toggle("bad", lines.has(i + 1)));
+    [...this.#numbers.children].forEach((row, i) => row.classList.toggle("bad", lines.has(i + 1)));
     this.#problems.replaceChildren(
       ...problems.map(({ line, text, file }) => {
         if (file) return html("li", {}, html("b", {}, `${file}, line ${line}`), ` ${text}`);
@@ -65,9 +68,10 @@ export class Editor {
     );
   }
 
+  /** @param {number} line */
   #select(line) {
     const lines = this.text.split("\n");
-    const start = lines.slice(0, line - 1).reduce((sum, each) => sum + each.length + 1, 0);
+    const start = lines.slice(0, line - 1).reduce((sum, row) => sum + row.length + 1, 0);
     this.#area.focus();
     this.#area.setSelectionRange(start, start + (lines[line - 1] ?? "").length);
   }
@@ -79,13 +83,13 @@ export class Editor {
   }
 }
 
-// Return the problems that an error of a program names, with file and line, and its other lines.
+/** Return the problems that an error of a program names, with file and line. @param {string} why */
 export function problemsOf(why) {
-  const found = { problems: [], rest: [] };
-  for (const each of why.split("\n")) {
-    const place = PLACE.exec(each);
-    if (place) found.problems.push({ file: place[1] ?? "", line: Number(place[2]), text: place[3] });
-    else if (each) found.rest.push(each);
+  /** @type {Problem[]} */
+  const problems = [];
+  for (const row of why.split("\n")) {
+    const place = PLACE.exec(row);
+    if (place) problems.push({ file: place[1] ?? "", line: Number(place[2]), text: place[3] });
   }
-  return found;
+  return problems;
 }

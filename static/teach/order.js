@@ -3,18 +3,22 @@ const EDGE = 36; // px from the ends of the scrolled box within which it scrolls
 const PACE = 8; // px
 
 // `drop` is called with the row and the index among the other rows at which it was released.
+/** @param {HTMLElement} row @param {HTMLElement} handle @param {(row: HTMLElement, to: number) => void} drop */
 export function draggable(row, handle, drop) {
+  /** @type {{ y: number, scroll: number, list: Element, box: Element } | null} */
   let start = null; // {y, scroll, list, box} of the press
   let target = 0;
 
+  /** @param {Element} list @param {number} to */
   const mark = (list, to) => {
-    const others = [...list.children].filter((each) => each !== row);
-    others.forEach((each, i) => {
-      each.classList.toggle("before", i === to);
-      each.classList.toggle("after", to === others.length && i === to - 1);
+    const others = [...list.children].filter((other) => other !== row);
+    others.forEach((other, i) => {
+      other.classList.toggle("before", i === to);
+      other.classList.toggle("after", to === others.length && i === to - 1);
     });
   };
 
+  /** @param {boolean} kept */
   const end = (kept) => {
     if (!start) return;
     const { list } = start;
@@ -30,8 +34,9 @@ export function draggable(row, handle, drop) {
     event.preventDefault();
     handle.setPointerCapture(event.pointerId);
     const list = row.parentElement;
-    const near = list.closest(".scrolled");
-    const box = getComputedStyle(near).overflowY === "auto" ? near : near.closest(".sheet");
+    const near = list?.closest(".scrolled");
+    const box = near && getComputedStyle(near).overflowY === "auto" ? near : near?.closest(".sheet");
+    if (!list || !box) return;
     start = { y: event.clientY, scroll: box.scrollTop, list, box };
     target = [...list.children].indexOf(row);
     row.classList.add("dragged");
@@ -43,10 +48,10 @@ export function draggable(row, handle, drop) {
     if (clientY < top + EDGE) box.scrollTop -= PACE;
     else if (clientY > bottom - EDGE) box.scrollTop += PACE;
     row.style.translate = `0 ${clientY - start.y + box.scrollTop - start.scroll}px`;
-    const others = [...list.children].filter((each) => each !== row);
-    target = others.filter((each) => {
-      const box = each.getBoundingClientRect();
-      return clientY > box.top + box.height / 2;
+    const others = [...list.children].filter((other) => other !== row);
+    target = others.filter((other) => {
+      const { top, height } = other.getBoundingClientRect();
+      return clientY > top + height / 2;
     }).length;
     mark(list, target);
   });

@@ -2,6 +2,14 @@
 // A pose is {id, joints, gripper, grips, wait, speed, blend, picture}: joint angles [deg], where the
 // fingers were [deg, or mm if they slide; null without fingers] and whether they move there, the time
 // to wait there [s], the speed to it [%], whether it is passed without a rest, and a data URL.
+/**
+ * @typedef {object} Pose
+ * @property {string} id @property {number[]} joints @property {number | null} gripper @property {boolean} grips
+ * @property {number} wait @property {number} speed @property {boolean} blend @property {string} picture
+ */
+/** @typedef {{ name: string, times: number, poses: Pose[], text: string | null }} Kept */
+/** @typedef {{ joints: number[], gripper: number | null, wait: number, speed: number, blend: boolean }} TaughtPose */
+/** @typedef {{ name: string, times: number, poses: TaughtPose[] }} Taught */
 export const MAX_POSES = 100;
 export const MAX_TIMES = 100;
 export const MAX_WAIT = 3600; // s
@@ -13,13 +21,14 @@ const MAX_KEPT = 1_500_000; // characters of all poses: a browser keeps 5 millio
 export const FORMAT = 1;
 
 // Return the pose for the joints and the fingers of a state; arm: the answer `arm`.
+/** @param {Api.State} state @param {Api.Arm} arm @param {string} picture */
 export function poseOf(state, arm, picture) {
   const degrees = 180 / Math.PI;
   const joints = state.goal.map((q, i) => within(q * degrees, arm.lower[i] * degrees, arm.upper[i] * degrees));
   return made({ joints, gripper: fingersOf(state, arm), grips: Boolean(arm.gripper), picture });
 }
 
-// Return where the fingers of a state are [deg or mm]; null without fingers.
+/** Return where the fingers of a state are [deg or mm]; null without fingers. @param {Api.State} state @param {Api.Arm} arm */
 export function fingersOf(state, arm) {
   if (!arm.gripper) return null;
   const unit = arm.gripper_slides ? 1000 : 180 / Math.PI;
@@ -27,15 +36,16 @@ export function fingersOf(state, arm) {
   return within(state.gripper_goal * unit, closed * unit, open * unit);
 }
 
+/** @param {Partial<Pose> & { joints: number[] }} fields @returns {Pose} */
 export const made = (fields) => ({
   id: Math.random().toString(36).slice(2), gripper: null, grips: false, wait: 0, speed: 100, blend: false, picture: "", ...fields,
 });
 
-// Return the pose that the server has read from a script.
+/** Return the pose that the server has read from a script. @param {TaughtPose} pose */
 export const read = ({ joints, gripper, wait, speed, blend }) =>
   made({ joints, gripper, grips: gripper !== null, wait, speed: Math.round(speed * 100), blend });
 
-// Round to a thousandth, but not beyond a limit.
+/** Round to a thousandth, but not beyond a limit. @param {number} value @param {number} low @param {number} high */
 function within(value, low, high) {
   const rounded = Math.round(value * 1000) / 1000;
   if (rounded > high) return Math.floor(high * 1000) / 1000;
@@ -43,6 +53,7 @@ function within(value, low, high) {
 }
 
 // Return why the arm has to rest at the pose `i`; empty if it can pass it with a rounded corner.
+/** @param {Pose[]} poses @param {number} i */
 export function restsBecause(poses, i) {
   const next = poses[i + 1];
   if (!next) return "The arm rests at the last pose.";
@@ -53,9 +64,12 @@ export function restsBecause(poses, i) {
 
 // Return {text, poseAt}: the script, and a function that returns the index of the pose of a line
 // that counts from 1; null for a line of no pose.
+/** @param {Omit<Kept, "text">} script */
 export function scriptOf({ name, times, poses }) {
   const lines = [`name: ${JSON.stringify(name)}`, "steps:"];
+  /** @type {(number | null)[]} */
   const owners = [null, null];
+  /** @param {string} line @param {number | null} owner */
   const put = (line, owner = null) => {
     lines.push((times > 1 && owner !== null ? "        - " : "  - ") + line);
     owners.push(owner);
@@ -72,18 +86,22 @@ export function scriptOf({ name, times, poses }) {
     const first = i;
     while (poses[i].blend && !restsBecause(poses, i) && i - first < MAX_VIAS - 1) i++;
     const angles = poses.slice(first, i + 1).map(({ joints }) => `[${joints.join(", ")}]`);
-    put(first === i ? `joints: ${angles}` : `via: {through: [${angles.map((each) => `{joints: ${each}}`).join(", ")}]}`, first);
+    put(first === i ? `joints: ${angles}` : `via: {through: [${angles.map((joints) => `{joints: ${joints}}`).join(", ")}]}`, first);
     if (poses[i].grips) put(`gripper: ${poses[i].gripper}`, i);
     if (poses[i].wait) put(`wait: ${poses[i].wait}`, i);
   }
-  return { text: `${lines.join("\n")}\n`, poseAt: (line) => owners[line - 1] ?? null };
+  return { text: `${lines.join("\n")}\n`, poseAt: (/** @type {number} */ line) => owners[line - 1] ?? null };
 }
 
+/** @param {number} value @param {number} low @param {number} high */
 const isNumber = (value, low, high) => Number.isFinite(value) && value >= low && value <= high;
 
 // Return the content that is kept as `json`, for an arm of so many joints. Throws an error if it is anything else.
+/** @param {string} json @param {number} joints @returns {Kept} */
 export function restored(json, joints) {
+  /** @type {Kept & { format: number }} */
   const { format, name, times, poses, text } = JSON.parse(json);
+  /** @param {Pose} pose */
   const good = (pose) =>
     pose.joints.length === joints && pose.joints.every((angle) => isNumber(angle, -720, 720)) &&
     (pose.gripper === null ? pose.grips === false : isNumber(pose.gripper, -180, 180) && typeof pose.grips === "boolean") &&
@@ -95,14 +113,16 @@ export function restored(json, joints) {
     !(text === null || (typeof text === "string" && text.length <= MAX_TEXT))
   )
     throw new Error("This is not what the page keeps.");
-  return { name, times, poses: poses.map((pose) => made({ ...pose })), text };
+  return { name, times, poses: poses.map((/** @type {Pose} */ pose) => made({ ...pose })), text };
 }
 
-// Return `content` as a text to keep, without pictures if they take too much room.
+/** Return `content` as a text to keep, without pictures if they take too much room. @param {Kept} content */
 export function kept({ name, times, poses, text }) {
+  /** @param {Pose[]} some */
   const json = (some) => JSON.stringify({ format: FORMAT, name, times, poses: some, text });
   const whole = json(poses);
   return whole.length <= MAX_KEPT ? whole : json(poses.map((pose) => ({ ...pose, picture: "" })));
 }
 
+/** @param {string} url */
 export const isPicture = (url) => url.startsWith("data:image/") && url.length <= MAX_PICTURE;

@@ -1,7 +1,17 @@
 // One pose in the list: its picture, which is also its handle, its numbers and its buttons.
-import { html, set, svg, write } from "../instruments/shape.js";
+import { write } from "../dom.js";
+import { html, set, svg } from "../instruments/shape.js";
 import { MAX_WAIT, restsBecause } from "./poses.js";
 
+/** @typedef {import("./poses.js").Pose} Pose */
+/** @typedef {"go" | "up" | "down" | "remove" | "grip" | "blend"} Name */
+/**
+ * @typedef {object} Acts
+ * @property {(id: string, fields: Partial<Pose>) => void} put @property {(id: string) => void} go
+ * @property {(id: string, by: number) => void} move @property {(id: string) => void} remove
+ * @property {(id: string) => void} toggleGrip
+ */
+/** @type {Record<Name, string>} */
 const SHAPES = {
   go: "M3 10h12M10 4.5 15.5 10 10 15.5",
   up: "M10 16V4M4.5 9.5 10 4l5.5 5.5",
@@ -11,6 +21,7 @@ const SHAPES = {
   blend: "M3 16c9 0 3-12 14-12",
 };
 
+/** @param {Name} name @param {string} label @param {() => void} act */
 function button(name, label, act, text = "") {
   const icon = svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] }));
   const made = html("button", { type: "button", class: name, title: label, "aria-label": label }, icon);
@@ -19,13 +30,17 @@ function button(name, label, act, text = "") {
   return made;
 }
 
+/**
+ * @param {string} label @param {string} unit @param {number} low @param {number} high @param {number} step
+ * @param {(value: number | null) => void} put
+ */
 function number(label, unit, low, high, step, put) {
   const input = html("input", { type: "number", min: low, max: high, step, inputmode: "decimal", "aria-label": label });
   input.addEventListener("change", () => {
     const value = input.valueAsNumber;
     put(Number.isFinite(value) ? Math.round(Math.min(Math.max(value, low), high) * 100) / 100 : null);
   });
-  return [input, html("label", {}, html("span", {}, label), input, html("span", {}, unit))];
+  return { input, label: html("label", {}, html("span", {}, label), input, html("span", {}, unit)) };
 }
 
 export class Row {
@@ -34,20 +49,26 @@ export class Row {
   #number = html("b");
   #picture = html("img", { alt: "", draggable: "false", width: "96", height: "72" });
   #buttons;
+  /** @type {HTMLInputElement} */
   #wait;
+  /** @type {HTMLInputElement} */
   #speed;
+  /** @type {Pose | null} */
   #pose = null;
 
   // acts: {put(id, fields), go(id), move(id, by), remove(id), toggleGrip(id)}; fingers: whether there are any.
+  /** @param {string} id @param {Acts} acts @param {boolean} fingers */
   constructor(id, acts, fingers) {
     this.element.dataset.id = id;
-    const put = (name) => (value) => acts.put(id, { [name]: value ?? this.#pose[name] });
-    const [speed, speedLabel] = number("Speed", "%", 1, 100, 5, put("speed"));
-    const [wait, waitLabel] = number("Wait", "s", 0, MAX_WAIT, 0.5, put("wait"));
-    [this.#speed, this.#wait] = [speed, wait];
+    /** @param {"speed" | "wait"} name */
+    const put = (name) => (/** @type {number | null} */ value) => acts.put(id, { [name]: value ?? this.#pose?.[name] });
+    const speed = number("Speed", "%", 1, 100, 5, put("speed"));
+    const wait = number("Wait", "s", 0, MAX_WAIT, 0.5, put("wait"));
+    [this.#speed, this.#wait] = [speed.input, wait.input];
+    /** @type {Record<Name, HTMLButtonElement>} */
     this.#buttons = {
       grip: button("grip", "", () => acts.toggleGrip(id)),
-      blend: button("blend", "", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose.blend })),
+      blend: button("blend", "", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose?.blend })),
       go: button("go", "", () => acts.go(id), "Go"),
       up: button("up", "", () => !this.#isOff("up") && acts.move(id, -1)),
       down: button("down", "", () => !this.#isOff("down") && acts.move(id, 1)),
@@ -56,14 +77,16 @@ export class Row {
     if (!fingers) this.#buttons.grip.hidden = true;
     this.handle.append(this.#picture, this.#number);
     const row = html("div", { class: "acts" }, ...Object.values(this.#buttons));
-    this.element.append(this.handle, html("div", { class: "numbers" }, speedLabel, waitLabel), row);
+    this.element.append(this.handle, html("div", { class: "numbers" }, speed.label, wait.label), row);
   }
 
+  /** @param {Name} name */
   #isOff(name) {
     return this.#buttons[name].getAttribute("aria-disabled") === "true";
   }
 
   // Show the pose `i` of all; `current`: whether the arm moves to it, `next`: whether Step does.
+  /** @param {Pose[]} poses @param {number} i @param {boolean} current @param {boolean} next */
   show(poses, i, current, next) {
     const pose = (this.#pose = poses[i]);
     const name = `pose ${i + 1}`;
@@ -76,8 +99,8 @@ export class Row {
       if (pose.picture) this.#picture.src = pose.picture;
       this.#picture.style.visibility = pose.picture ? "" : "hidden";
     }
-    for (const [input, value, words] of [[this.#speed, pose.speed, "Speed to"], [this.#wait, pose.wait, "Wait after"]]) {
-      if (input !== document.activeElement || input.value === "" || input.valueAsNumber !== value) input.value = value;
+    for (const { input, value, words } of [{ input: this.#speed, value: pose.speed, words: "Speed to" }, { input: this.#wait, value: pose.wait, words: "Wait after" }]) {
+      if (input !== document.activeElement || input.value === "" || input.valueAsNumber !== value) input.value = String(value);
       set(input, "aria-label", `${words} ${name}`);
     }
     const rests = restsBecause(poses, i);
@@ -89,6 +112,7 @@ export class Row {
     this.#label("remove", `Remove ${name}`);
   }
 
+  /** @param {Name} name @param {string} label @param {boolean | null} pressed */
   #label(name, label, off = false, pressed = null) {
     const button = this.#buttons[name];
     set(button, "aria-label", label);

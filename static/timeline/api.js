@@ -1,25 +1,33 @@
 // Requests to the server about recordings.
+import { queryOf, request } from "../server.js";
+
+/** @typedef {[start: number, end: number]} Span */
+/** @typedef {[t: number, kind: string, words: string]} Mark */
+/** @typedef {{ t: number[], joints: number[], slides: number[], tool: number[] }} Difference */
 const API = "api/v1/playback";
 
-async function answered(url, options) {
-  const answer = await fetch(url, options).catch(() => null);
-  if (!answer) throw new Error("The server does not answer.");
-  if (!answer.ok) throw new Error(await answer.text());
+// Return the answer, or null if it has no content. Throws an error with the reason for a refusal.
+/** @param {string} url @param {RequestInit} [options] */
+export async function answered(url, options) {
+  const answer = await request(url, options);
   return answer.status === 204 ? null : answer.json();
 }
 
+/** @param {string} url @param {BodyInit | null} body */
 const post = (url, body = null) => answered(url, { method: "POST", body });
 
-// Return {spans, marks} of a recording.
+/** Return {spans, marks} of a recording. @param {string} of @returns {Promise<{ spans: Span[], marks: Mark[] }>} */
 export const timeline = (of) => answered(`${API}/${encodeURIComponent(of)}`);
 
 // Show a moment in the window `page`, and one of a second recording if there is one.
-export const show = (query) => post(`${API}/show?${new URLSearchParams(query)}`);
+/** @param {Record<string, string | number>} query @returns {Promise<{ moving: string[] }>} */
+export const show = (query) => post(`${API}/show?${queryOf(query)}`);
 
+/** @param {string} page @returns {Promise<void>} */
 export const hide = (page) => post(`${API}/hide?page=${page}`);
 
-// Return {t, joints, slides, tool} of two recordings.
-export const difference = (query) => answered(`${API}/difference?${new URLSearchParams(query)}`);
+/** Return {t, joints, slides, tool} of two recordings. @param {Record<string, string | number>} query @returns {Promise<Difference>} */
+export const difference = (query) => answered(`${API}/difference?${queryOf(query)}`);
 
-// Send a file and return {name, note} of its recording.
+/** Send a file and return {name, note} of its recording. @param {File} file @returns {Promise<{ name: string, note: string }>} */
 export const open = (file) => post(API, file);

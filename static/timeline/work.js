@@ -1,25 +1,25 @@
 // Long work of the server on a recording, an export or a verification: its progress, and the result.
 import { html } from "../instruments/shape.js";
+import { messageOf, queryOf } from "../server.js";
+import { answered } from "./api.js";
 
 const JOBS = "api/v1/recording/jobs";
 const LOOK = 400; // ms between two looks at the progress
 
-async function answered(url, options) {
-  const answer = await fetch(url, options).catch(() => null);
-  if (!answer) throw new Error("The server does not answer.");
-  if (!answer.ok) throw new Error(await answer.text());
-  return answer.status === 204 ? null : answer.json();
-}
+/** @typedef {{ status: string, fraction: number | null, words: string }} JobStatus */
 
 export class Work {
   #box;
+  /** @type {Promise<{ job: string }> | null} */
   #begun = null; // promise of the job that is shown
+  /** @type {Promise<void>} */
   #closed = Promise.resolve(); // until the last one that was closed is cancelled
   #doing = ""; // what it does, in words
   #words = html("p", { role: "status" });
   #bar = html("progress", { max: "1" });
   #end = html("button", { type: "button" });
 
+  /** @param {HTMLElement} box */
   constructor(box) {
     this.#box = box;
     box.replaceChildren(this.#words, this.#bar, this.#end);
@@ -27,21 +27,25 @@ export class Work {
   }
 
   // Begin the work `what`, a format or "verify", on the part `selection`. `doing` says it in words.
+  /** @param {string} what @param {import("./selection.js").Part} selection @param {string} doing */
   async start(what, selection, doing) {
     this.#close();
-    const query = new URLSearchParams({ ...selection, do: what });
+    const query = queryOf({ ...selection, do: what });
+    /** @type {Promise<{ job: string }>} */
     const begun = this.#closed.then(() => answered(`${JOBS}?${query}`, { method: "POST" }));
     [this.#begun, this.#doing] = [begun, doing];
     this.#show(doing, null);
     try {
       await this.#follow(begun, (await begun).job);
     } catch (error) {
-      if (this.#begun === begun) this.#show(`${doing}: ${error.message}`);
+      if (this.#begun === begun) this.#show(`${doing}: ${messageOf(error)}`);
     }
   }
 
+  /** @param {Promise<{ job: string }>} begun @param {string} job */
   async #follow(begun, job) {
     while (this.#begun === begun) {
+      /** @type {JobStatus} */
       const { status, fraction, words } = await answered(`${JOBS}/${job}`);
       if (this.#begun !== begun) return;
       if (status !== "working") return this.#finish(job, status, words);
@@ -50,6 +54,7 @@ export class Work {
     }
   }
 
+  /** @param {string} job @param {string} status @param {string} words */
   #finish(job, status, words) {
     if (status === "done" && this.#doing.startsWith("Export")) {
       html("a", { href: `${JOBS}/${job}/file`, download: "" }).click();
@@ -58,6 +63,7 @@ export class Work {
   }
 
   // Show `words`, and the fraction that is done: null for an unknown one, undefined at the end.
+  /** @param {string} words @param {number | null} [fraction] */
   #show(words, fraction) {
     const percent = fraction ? ` ${Math.round(100 * fraction)} %` : "";
     const text = fraction === undefined ? words : `${words} …${percent}`;
@@ -76,6 +82,7 @@ export class Work {
     this.#begun = null;
     this.#box.hidden = true;
     if (!begun) return;
+    /** @param {{ job: string }} begun */
     const cancel = ({ job }) => answered(`${JOBS}/${job}/cancel`, { method: "POST" });
     this.#closed = begun.then(cancel).catch(() => {});
   }

@@ -1,5 +1,6 @@
 // The pressure on both pads of the gripper, with the forces and the centres of pressure.
-import { clamp, html, set, signed, write } from "../instruments/shape.js";
+import { styled, write } from "../dom.js";
+import { clamp, html, set, signed } from "../instruments/shape.js";
 
 const ROWS = 16; // taxels along a finger, from the palm to the tip
 const COLUMNS = 8;
@@ -9,10 +10,18 @@ const MM = 1000;
 // Colours of hardly any pressure, a third, two thirds and the full one, as on the fingers in the scene.
 const COLOURS = [[46, 94, 200], [20, 164, 156], [246, 196, 40], [226, 52, 40]];
 
-document.head.append(html("link", { rel: "stylesheet", href: new URL("maps.css", import.meta.url).href }));
+/**
+ * @typedef {object} Drawn
+ * @property {string} finger @property {string} name @property {CanvasRenderingContext2D | null} canvas
+ * @property {HTMLElement} centre @property {HTMLElement} force @property {HTMLElement} map
+ */
+
+styled("maps.css", import.meta.url);
 
 export class PressureMaps {
+  /** @type {Drawn[]} */
   #pads = [];
+  /** @type {string | null} */
   #shown = null; // forces and squeeze that are drawn
   #note = html("p", { class: "note" });
 
@@ -27,22 +36,27 @@ export class PressureMaps {
       this.#pads.push({ finger, name, canvas: canvas.getContext("2d"), centre, force, map });
     }
     const scale = html("i");
-    scale.style.background = `linear-gradient(to right, ${COLOURS.map((each) => `rgb(${each})`)})`;
+    scale.style.background = `linear-gradient(to right, ${COLOURS.map((rgb) => `rgb(${rgb})`)})`;
     const legend = html("p", { class: "scale" }, "0", scale, `${FULL / 1000} kPa`, html("span", {}, "palm → tip"));
     this.element = html("div", { class: "pressure" }, maps, legend, this.#note);
   }
 
-  // Show the value `touch` of a state; null for a gripper whose pads are not known.
+  /** Show the value `touch` of a state; null for a gripper whose pads are not known. @param {Page.Touch | null} touch */
   show(touch) {
     set(this.element, "data-known", touch !== null);
     if (!touch) return write(this.#note, "The pads of this gripper are not known.");
     const shown = [touch.squeeze, ...touch.pads.map(({ force }) => force)].join();
     if (shown === this.#shown) return;
     this.#shown = shown;
-    for (const pad of this.#pads) this.#draw(pad, touch.pads.find(({ finger }) => finger === pad.finger));
+    for (const drawn of this.#pads) {
+      const pad = touch.pads.find(({ finger }) => finger === drawn.finger);
+      if (pad) this.#draw(drawn, pad);
+    }
   }
 
-  #draw({ name, canvas, centre, force, map }, { force: newtons, centre: at, pressure }) {
+  /** @param {Drawn} drawn @param {Page.Pad} pad */
+  #draw({ name, canvas, centre, force, map }, { force: newtons, centre: middle, pressure }) {
+    if (!canvas) return;
     const image = canvas.createImageData(ROWS, COLUMNS);
     pressure.forEach((value, i) => {
       if (value <= 0) return;
@@ -52,10 +66,10 @@ export class PressureMaps {
     });
     canvas.putImageData(image, 0, 0);
     write(force, `${signed(newtons, 1)} N`);
-    centre.hidden = at === null;
+    centre.hidden = middle === null;
     let words = `${name} pad: ${signed(newtons, 1)} N`;
-    if (at) {
-      const [along, across] = at.map((value) => value * MM);
+    if (middle) {
+      const [along, across] = middle.map((value) => value * MM);
       centre.style.left = `${((100 * along) / LENGTH).toFixed(1)}%`;
       centre.style.top = `${(50 + (100 * across) / WIDTH).toFixed(1)}%`;
       words += `, centre of pressure ${signed(along, 0)} mm from the palm and ${signed(across, 0)} mm across`;
@@ -65,6 +79,7 @@ export class PressureMaps {
   }
 }
 
+/** @param {number} fraction */
 function colour(fraction) {
   const place = clamp(fraction, 0, 1) * (COLOURS.length - 1);
   const low = Math.min(Math.floor(place), COLOURS.length - 2);

@@ -1,5 +1,6 @@
 // What the gripper feels, as vibration of gamepads and of the phone. Loaded when a person turns it on.
 
+/** @typedef {{ duration: number, weak: number, strong: number }} Pulse */
 const NEAR = 0.012; // m of clearance from which a moving arm is near a contact
 const MIN_CLEARANCE = 0.005; // m at which it stops
 const NEAR_LIMIT = 0.05; // rad from a joint limit
@@ -12,11 +13,12 @@ const SQUEEZE = 140; // ms for which a new force is felt
 const STEP = 0.04; // fraction of the greatest force that is felt
 
 export class Rumble {
+  /** @type {Api.State | null} */
   #last = null;
   #force = 0; // fraction of the greatest force that was felt last
   #pulsed = -Infinity;
 
-  // Take a state, and play what is new in it on all devices.
+  /** Take a state, and play what is new in it on all devices. @param {Api.State} state */
   take(state, now = performance.now()) {
     const force = strength(state);
     // Small steps of a force add up until they are felt.
@@ -31,8 +33,10 @@ export class Rumble {
 
 // Return the pulse {duration, weak, strong} between two states; null if nothing is felt. The weak motor
 // tells of contacts and limits, the strong one of a grip whose force was `old` when it was felt last.
+/** @param {Api.State} before @param {Api.State} state @param {number} old @returns {Pulse | null} */
 function felt(before, state, old) {
-  const has = ({ findings }, reason) => findings.some((each) => each.reason === reason);
+  /** @param {Api.State} state @param {string} reason */
+  const has = ({ findings }, reason) => findings.some((finding) => finding.reason === reason);
   if (["sliding", "slipped"].some((reason) => has(state, reason) && !has(before, reason))) return SLIP;
   const force = strength(state);
   if (force > old + STEP) return { duration: SQUEEZE, weak: 0.2, strong: Math.min(1, 0.2 + 0.8 * force) };
@@ -41,12 +45,12 @@ function felt(before, state, old) {
   return weak > FAINT ? { ...TICK, weak } : null;
 }
 
-// Return the force of the grip as a fraction of the greatest one.
+/** Return the force of the grip as a fraction of the greatest one. @param {Api.State} state */
 function strength({ touch }) {
   return touch ? Math.max(...touch.pads.map(({ force }) => force)) / touch.force_limit : 0;
 }
 
-// Return how near a contact or a joint limit is, from 0 to 1, while the arm moves or is blocked by it.
+/** Return how near a contact or a joint limit is, from 0 to 1, while the arm moves or is blocked by it. @param {Api.State} state */
 function nearness({ moving, findings, margins }) {
   if (findings.some(({ reason }) => reason === "contact")) return 1;
   if (!moving || !margins) return 0;
@@ -54,8 +58,9 @@ function nearness({ moving, findings, margins }) {
   return Math.min(1, Math.max(0, contact, 1 - margins.limit / NEAR_LIMIT));
 }
 
+/** @param {Pulse} pulse */
 function play({ duration, weak, strong }) {
-  /** @type {any[]} */
+  /** @type {(Page.VibratingGamepad | null)[]} */
   const pads = navigator.getGamepads?.() ?? [];
   for (const pad of pads) {
     if (!pad?.connected) continue;

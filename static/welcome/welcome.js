@@ -1,10 +1,11 @@
 // The first steps: a card over the scene with three things to try, each with one click.
-import { html, write } from "../instruments/shape.js";
+import { element, sceneOf, styled, write } from "../dom.js";
+import { html } from "../instruments/shape.js";
+import { messageOf, readArm, readState, request } from "../server.js";
 import { parts } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
 const DONE = "katana450.welcome.done"; // the names of the steps that were done
-const STYLE = new URL("welcome.css", import.meta.url).href;
 const SCRIPT = "api/v1/scripts/Pour";
 const LOOK_EVERY = 400; // ms
 const PULSE_EVERY = 50; // ms
@@ -17,8 +18,7 @@ const SWING = 20; // degrees to either side, at most
 const RADIANS = Math.PI / 180;
 const ENDS = ["done", "stopped", "failed", "cancelled", "refused", "blocked"];
 const HANDLE = "/target/move";
-/** @type {(id: string) => any} */
-const byId = (id) => document.getElementById(id);
+/** @param {number} ms */
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Welcome {
@@ -28,30 +28,30 @@ export class Welcome {
   #bar = html("progress", { max: "1", "aria-label": "Progress of the program", hidden: "" });
   #pulse = html("i", { id: "pulse", hidden: "" });
   #arm;
+  /** @type {number | null} */
   #dragging = null; // timer, while the handle pulses
+  /** @type {typeof POUR | null} */
   #program = null; // what the program of the card is, of an arm that can do it
   #isRunning = false;
   #accepted = false; // whether the server has taken the script
   #refusal = ""; // why it has refused the script or the run
+  /** @type {Record<string, { button: HTMLButtonElement, mark: HTMLElement }>} */
   #steps = {};
 
-  // Return the card, which is shown, for the arm of the server. page: {say, kept, scene, status}; `status` returns
-  // the newest status of the server.
+  /** Return the card, which is shown, for the arm of the server. @param {Page.Context} page */
   static async on(page) {
-    const style = html("link", { rel: "stylesheet", href: STYLE });
-    const styled = new Promise((resolve) => ["load", "error"].forEach((kind) => style.addEventListener(kind, resolve)));
-    document.head.append(style);
-    const answer = await fetch("api/v1/arm");
-    if (!answer.ok) throw new Error(await answer.text());
-    const arm = await answer.json();
-    await styled;
+    const style = styled("welcome.css", import.meta.url);
+    const arm = await readArm();
+    await style;
     return new Welcome(page, arm);
   }
 
+  /** @param {Page.Context} page @param {Api.Arm} arm */
   constructor(page, arm) {
     this.#page = page;
     this.#arm = arm;
-    if (page.status()?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
+    const { status } = page.store;
+    if (status?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
     const close = html("button", { type: "button", "aria-label": "Close for good" }, "×");
     close.addEventListener("click", () => this.#dismiss());
     const list = html("ol", {});
@@ -60,25 +60,26 @@ export class Welcome {
     if (this.#program) list.append(this.#step(this.#program.name, this.#program.title, this.#program.about, () => this.#run()));
     list.append(this.#step("part", "Bring your own part", "Choose a file, or drop it on the scene", () => this.#part()));
     this.#card.append(html("h2", {}, "First steps"), close, list, this.#says, this.#bar);
-    byId("toast").before(this.#card, this.#pulse);
-    window.addEventListener("status", ({ detail }) => this.#note(detail));
+    element("toast", HTMLElement).before(this.#card, this.#pulse);
+    page.store.follow((news) => this.#note(news));
     window.addEventListener("placed", () => this.#done("part"));
     for (const name of (page.kept?.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
-    if (page.status()) this.#note(page.status());
+    if (status) this.#note(status);
   }
 
+  /** @param {Api.Progress | null | undefined} program @returns {program is Api.Progress} */
   #isOwn(program) {
-    return program?.name === this.#program?.name && program.by === this.#page.status()?.name;
+    return program?.name === this.#program?.name && program?.by === this.#page.store.status?.name;
   }
 
   show() {
     this.#card.hidden = false;
   }
 
-  // A browser may refuse to store anything; then the card returns as new with the next visit.
-  #keep(key, value) {
+  /** A browser may refuse to store anything; then the card returns as new with the next visit. @param {string} key @param {string} entry */
+  #keep(key, entry) {
     try {
-      this.#page.kept?.setItem(key, value);
+      this.#page.kept?.setItem(key, entry);
     } catch {
       // Nothing to do.
     }
@@ -88,9 +89,10 @@ export class Welcome {
     this.#keep(KEPT, "done");
     this.#still();
     this.#card.hidden = true;
-    byId("help-button").focus();
+    element("help-button", HTMLElement).focus();
   }
 
+  /** @param {string} name @param {string} title @param {string} about @param {() => void} act */
   #step(name, title, about, act) {
     const mark = html("span", { class: "mark" });
     const button = html("button", { type: "button" }, mark, html("b", {}, title), html("small", {}, about));
@@ -99,6 +101,7 @@ export class Welcome {
     return html("li", {}, button);
   }
 
+  /** @param {string} name */
   #done(name) {
     const done = (this.#page.kept?.getItem(DONE) ?? "").split(",").filter(Boolean);
     if (!done.includes(name)) this.#keep(DONE, [...done, name].join());
@@ -109,7 +112,7 @@ export class Welcome {
   #drag() {
     write(this.#says, "Drag one of the pulsing arrows in the scene.");
     this.#pulse.hidden = false;
-    clearInterval(this.#dragging);
+    clearInterval(this.#dragging ?? undefined);
     this.#dragging = setInterval(() => this.#place(), PULSE_EVERY);
     this.#place();
   }
@@ -121,7 +124,7 @@ export class Welcome {
   // Put the ring where the camera shows the handle.
   #place() {
     const { scene } = this.#page;
-    const pixel = scene.contentDocument?.defaultView.katanaScene?.pixelOf(HANDLE);
+    const pixel = sceneOf(scene)?.pixelOf(HANDLE);
     this.#pulse.hidden = !pixel;
     if (!pixel) return;
     this.#pulse.style.left = `${scene.offsetLeft + pixel[0]}px`;
@@ -129,12 +132,12 @@ export class Welcome {
   }
 
   #still() {
-    clearInterval(this.#dragging);
+    clearInterval(this.#dragging ?? undefined);
     this.#dragging = null;
     this.#pulse.hidden = true;
   }
 
-  // A drag is the newest change that this person can undo, or was asked for and moves the arm.
+  /** A drag is the newest change that this person can undo, or was asked for and moves the arm. @param {Page.Status} status */
   #note(status) {
     // The program runs, also after a reload or a stop, for its owner, who alone may end it.
     const runs = status.orders.includes("end") && !status.planning;
@@ -159,7 +162,7 @@ export class Welcome {
       for (const part of began ? [] : parts(text)) this.#page.say(part.more ? part : { ...part, id: ID });
       await this.#watch(began);
     } catch (error) {
-      write(this.#says, `The program cannot be run: ${error.message}`);
+      write(this.#says, `The program cannot be run: ${messageOf(error)}`);
     }
     this.#bar.hidden = true;
     this.#isRunning = false;
@@ -167,24 +170,23 @@ export class Welcome {
 
   // Return the text of the program.
   async #script() {
-    if (this.#program === WAVE) return this.#wave((await this.#look())?.q);
-    const answer = await fetch(SCRIPT);
-    if (!answer.ok) throw new Error(await answer.text());
-    return answer.text();
+    if (this.#program === WAVE) return this.#wave((await readState())?.q ?? []);
+    return (await request(SCRIPT)).text();
   }
 
-  // Turn the first joint that can turn to both sides of the posture q.
+  /** Turn the first joint that can turn to both sides of the posture q. @param {number[]} q */
   #wave(q) {
     const { lower, upper, slides } = this.#arm;
-    const room = (q ?? []).map((at, i) => (slides[i] ? 0 : Math.min(SWING, (upper[i] - at) / RADIANS - 1, (at - lower[i]) / RADIANS - 1)));
+    const room = q.map((angle, i) => (slides[i] ? 0 : Math.min(SWING, (upper[i] - angle) / RADIANS - 1, (angle - lower[i]) / RADIANS - 1)));
     const axis = room.findIndex((angle) => angle >= 5);
     if (axis < 0) throw new Error("No joint has room to turn. Press Home first.");
+    /** @param {number} angle */
     const by = (angle) => `  - nudge: {axis: ${axis + 1}, by: ${angle}}\n`;
     const angle = Math.floor(room[axis]);
     return `name: ${WAVE.name}\nsteps:\n${by(angle)}${by(-2 * angle)}${by(angle)}`;
   }
 
-  // Take an answer; return whether it was for the card.
+  /** Take an answer; return whether it was for the card. @param {Page.Answer} answer */
   hear(answer) {
     if (answer.id !== ID) return false;
     if (answer.is === "refused") this.#refusal = answer.why;
@@ -192,17 +194,8 @@ export class Welcome {
     return true;
   }
 
-  // The state; null if it could not be fetched.
-  async #look() {
-    try {
-      const answer = await fetch("api/v1/state");
-      return answer.ok ? await answer.json() : null;
-    } catch {
-      return null;
-    }
-  }
-
   // Run the program, which alone is our own, once it is planned, and follow it to its end.
+  /** @param {boolean} resumed whether it runs already */
   async #watch(resumed) {
     write(this.#says, "Planning …");
     const began = performance.now();
@@ -210,36 +203,41 @@ export class Welcome {
     let ran = resumed;
     for (; ; await pause(LOOK_EVERY)) {
       const accepted = this.#accepted;
-      const state = await this.#look();
+      const state = await readState();
       if (!state && !this.#refusal) continue;
-      const { program, stopped } = state ?? {};
-      const own = accepted && this.#isOwn(program);
-      waits = own && program.status === "ready" ? waits + 1 : 0;
-      const over = !own || stopped || waits > READY_LOOKS || ENDS.includes(program.status);
+      const { program, stopped } = state ?? { program: null, stopped: null };
+      const own = accepted && this.#isOwn(program) ? program : null;
+      waits = own?.status === "ready" ? waits + 1 : 0;
+      const over = !own || stopped || waits > READY_LOOKS || ENDS.includes(own.status);
       if (over && !ran && !stopped && !this.#refusal && performance.now() - began < BEGINS) continue;
-      if (over || this.#refusal) {
-        const worked = ran && own && program.status === "done";
-        if (worked) this.#done(this.#program.name);
-        // In the words of the page a person who pressed STOP is "You".
-        const reason = this.#refusal || (stopped && (this.#page.status()?.stopped || stopped)) || (own && (program.why || program.status)) || "";
-        return write(this.#says, worked ? this.#program.did : `${this.#program.not} ${reason}`);
-      }
-      const planning = program.status === "planning";
-      if (!ran && (planning || program.status === "ready")) {
+      if (over || this.#refusal) return this.#end(ran ? own : null, stopped, own);
+      const planning = own.status === "planning";
+      if (!ran && (planning || own.status === "ready")) {
         ran = true;
         this.#page.say({ do: "steer", order: "run", id: ID });
       }
       const words = planning
-        ? `Planning ${Math.round(100 * program.fraction)} %`
-        : `Step ${program.step} of ${program.steps}: ${program.task || program.status}`;
+        ? `Planning ${Math.round(100 * own.fraction)} %`
+        : `Step ${own.step} of ${own.steps}: ${own.task || own.status}`;
       write(this.#says, words);
       this.#bar.hidden = false;
-      this.#bar.value = planning ? program.fraction : program.step / Math.max(program.steps, 1);
+      this.#bar.value = planning ? own.fraction : own.step / Math.max(own.steps, 1);
     }
+  }
+
+  // Say how the program has ended. `ran`: its progress, if it was run; `stopped`: why the arm is stopped.
+  /** @param {Api.Progress | null} ran @param {string | null} stopped @param {Api.Progress | null} own */
+  #end(ran, stopped, own) {
+    if (!this.#program) return;
+    const worked = ran?.status === "done";
+    if (worked) this.#done(this.#program.name);
+    // In the words of the page a person who pressed STOP is "You".
+    const reason = this.#refusal || (stopped && (this.#page.store.status?.stopped || stopped)) || own?.why || own?.status || "";
+    write(this.#says, worked ? this.#program.did : `${this.#program.not} ${reason}`);
   }
 
   #part() {
     this.#still();
-    byId("object-file").click();
+    element("object-file", HTMLElement).click();
   }
 }

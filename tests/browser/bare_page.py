@@ -49,10 +49,12 @@ def bare_page(browser: Browser, *, arm: dict[str, Any] | None = None) -> Iterato
         context.close()
 
 
-def load(page: Page, *scripts: str) -> None:
-    """Run scripts of static/ in the document, in this order."""
-    for script in scripts:
-        page.add_script_tag(url=f"{ORIGIN}/static/{script}")
+def load(page: Page, name: str, path: str) -> None:
+    """Load a module of static/; the document calls its exports by ``name``."""
+    page.evaluate(
+        "async ([name, path]) => { window[name] = await import(path) }",
+        [name, f"{ORIGIN}/static/{path}"],
+    )
 
 
 def module(page: Page, path: str, function: str, *values: Any) -> Any:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from katana450.resources import STATIC
+from katana450.assembly.page_files import put_together
+from katana450.server.web.static_files import contents
 
 TAPPED = """
+import * as Names from "./viser/names.js";
+import * as Pictures from "./viser/pictures.js";
+import * as Structure from "./viser.js";
+    const Viser = { ...Names, ...Pictures, ...Structure };
     Viser.forgoCode();
     const style = new CSSStyleSheet();
     style.replaceSync(Viser.STEADY);
     document.adoptedStyleSheets.push(style);
     window.tapped = { sends: [], views: [], choices: [], sets: [], connected: 0, replayed: 0,
                       panels: 0, painted: new Map(), controls: new Map(), withheld: null };
-    Viser.tap({
+    Viser.interceptMessages({
         server(address, line) {
             Object.assign(tapped, { address, line });
             return address;
@@ -23,7 +28,7 @@ TAPPED = """
             return message.type !== tapped.withheld;
         },
         connected: () => (tapped.connected += 1),
-        hears(messages) {
+        receives(messages) {
             Viser.keepControls(tapped.controls, messages);
             tapped.replayed += Viser.replayed(messages);
             tapped.panels += Viser.controlsIn(messages);
@@ -38,5 +43,6 @@ TAPPED = """
 
 
 def script(more: str = "") -> str:
-    """Return static/viser.js with its tap, and ``more`` after it."""
-    return f"{(STATIC / 'viser.js').read_text(encoding='utf-8')}\n{TAPPED}\n{more}"
+    """Return what records the messages of static/viser.js, and ``more`` after it."""
+    entry = {"recorded.js": f"{TAPPED}\n{more}".encode()}
+    return put_together("recorded.js", contents() | entry).decode()

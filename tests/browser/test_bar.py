@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from katana450.arm.control.lease import Role
-from katana450.assembly import page_routes
+from katana450.assembly import page_files
 from katana450.client import connect
 from katana450.resources import STATIC
 from katana450.server.api import requests
@@ -186,18 +186,24 @@ def test_scripts_are_sent_without_comments_at_the_same_lines() -> None:
     written = (STATIC / "viser.js").read_text(encoding="utf-8")
     sent = static_files.contents()["viser.js"].decode()
     assert written.count("\n") == sent.count("\n")
-    code = [line for line in written.splitlines() if line and not line.lstrip().startswith("//")]
-    assert [line for line in sent.splitlines() if line] == code
-    assert len(code) < len(written.splitlines())
+    code = [line for line in sent.splitlines() if line]
+    assert not [line for line in code if line.lstrip().startswith(("//", "/*", "*"))]
+    rows = zip(written.splitlines(), sent.splitlines(), strict=True)
+    assert all(line.startswith(rest) for line, rest in rows)
+    for words in ("viser's socket is in a worker", "labels of the rows of buttons", "@type {Map"):
+        assert words in written
+        assert words not in sent
 
 
 def test_the_page_is_small() -> None:
-    sent = {name: len(file.packed) for name, file in page_routes.page_files().items()}
+    sent = {name: len(file.packed) for name, file in page_files.load().items()}
     # The scripts of each document are sent in one file. Those in folders are loaded on first use.
-    first = ("index.html", "page.css", page_routes.PAGE_SCRIPTS, SCRIPTS, "link.js", "icon.svg")
-    assert sum(sent[name] for name in first) < 42_000
-    # Each of them is also there alone, for people.
-    sent = {name: size for name, size in sent.items() if "/" in name or name in first}
+    ours = ("index.html", "page.css", page_files.PAGE_SCRIPTS, "link.js", "icon.svg")
+    assert sum(sent[name] for name in ours) < 29_800
+    assert sum(sent[name] for name in (*ours, SCRIPTS)) < 39_300
+    # The modules in these scripts are also there alone, for people.
+    together = re.compile(r"[^/]*|(page|viser)/.*")
+    sent = {name: size for name, size in sent.items() if not together.fullmatch(name)}
     # The timeline and Teach are only for those who open them, files of objects for those who add
     # one, episodes for servers that record, touch for those who open the instruments or let a
     # device vibrate, and the arm for those who have one.
@@ -206,22 +212,37 @@ def test_the_page_is_small() -> None:
         folder = name.partition("/")[0]
         if folder in folders:
             folders[folder] += size
-    assert max(folders.values()) < 15_000
-    assert sum(sent.values()) - sum(folders.values()) < 100_000
-    assert sum(path.stat().st_size for path in (STATIC / "instruments").iterdir()) < 70_000
+    assert max(folders.values()) < 16_000
+    assert sum(sent.values()) - sum(folders.values()) < 51_000
+    assert sum(size for name, size in sent.items() if name.startswith("instruments/")) < 20_000
 
 
-def test_scripts_of_each_document_are_sent_in_one_file_in_their_order() -> None:
-    written, sent = static_files.contents(), page_routes.page_files()
-    names = re.findall(r'<script src="static/([^"]+)" defer>', written["index.html"].decode())
-    assert names[0] == "viser.js"
-    assert names[-1] == "page.js"
+def test_modules_of_each_document_are_sent_in_one_script_after_those_they_import() -> None:
+    sent = page_files.load()
     page = sent["index.html"].content.decode()
-    assert re.findall(r'<script src="([^"]+)"', page) == [f"static/{page_routes.PAGE_SCRIPTS}"]
-    assert sent[page_routes.PAGE_SCRIPTS].content == b"\n".join(written[each] for each in names)
-    assert sent[SCRIPTS].content.endswith(written["frame.js"])
-    inline = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
-    assert [each.encode() for each in inline] == [written["theme.js"]]
+    assert re.findall(r'<script[^>]* src="([^"]+)"', page) == [f"static/{page_files.PAGE_SCRIPTS}"]
+    scripts = sent[page_files.PAGE_SCRIPTS].content.decode()
+    assert scripts.index("function element(") < scripts.index("new Worker(")
+    assert "interceptMessages" in sent[SCRIPTS].content.decode()
+    assert len(re.findall(r"<script>.*?</script>", page, re.DOTALL)) == 1
+
+
+def test_modules_are_put_together_once_each_and_files_that_load_later_keep_their_paths() -> None:
+    imports = b'import { a as one } from "./in/a.js";\nimport * as b from "./b.js";\n'
+    files = {
+        "page.js": imports + b"say(one, b);\n",
+        "b.js": b'import "./in/a.js";\nexport const later = () => import("./in/later.js");\n',
+        "in/a.js": b'export function a() {}\nexport const load = () => import("../b.js");\n',
+    }
+    script = page_files.put_together("page.js", files).decode()
+    assert script.count("function a()") == 1
+    assert script.index("function a()") < script.index("later") < script.index("say(one, b)")
+    assert 'import("./in/later.js")' in script
+    assert 'import("./b.js")' in script
+    assert "const { a: one } = m0;" in script
+    files["b.js"] = b"export default 1;\n"
+    with pytest.raises(ValueError, match=r"b\.js cannot be put together: export default 1;"):
+        page_files.put_together("page.js", files)
 
 
 @pytest.mark.long

@@ -212,6 +212,16 @@ def test_clicked_object_gets_arrows_that_move_it_in_this_window_alone(
     page.wait_until(lambda: not page.shows(arrows), "no arrows")
 
 
+FIND_LINK = """() => {
+    const { postMessage } = Worker.prototype;
+    Worker.prototype.postMessage = function (...message) {
+        window.link = this;
+        postMessage.apply(this, message);
+    };
+}"""
+"""Script that keeps the worker of the page, once the page sends it a message."""
+
+
 @pytest.mark.long
 def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth) -> None:
     """An undo that waits on its way while the arm is stopped and cleared is refused."""
@@ -219,6 +229,7 @@ def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth)
     truth.wait(mood="stopped")
     clear_stop(page, truth)
     start = np.array(truth.status()["goal"])
+    page.page.evaluate(FIND_LINK)
     page.drag_arrow(MOVE, "y", 0.1)
     truth.wait(10.0, moving=False)
     moved = np.array(truth.status()["q"])
@@ -226,7 +237,8 @@ def test_undo_names_the_stops_that_its_page_knows(page: ViserPage, truth: Truth)
     # The key is pressed at once, before the next status arrives.
     page.page.evaluate(
         """(old) => {
-            window.dispatchEvent(new CustomEvent("status", {detail: old}));
+            const heard = {is: "status", ...old};
+            link.dispatchEvent(new MessageEvent("message", {data: {heard}}));
             document.body.dispatchEvent(new KeyboardEvent(
                 "keydown", {code: "KeyZ", key: "z", ctrlKey: true, bubbles: true}));
         }""",

@@ -25,7 +25,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 
 def test_pause_goes_to_whatever_moves_and_one_press_counts_once(page: Page) -> None:
-    load(page, "pace.js")
+    load(page, "Pace", "pace.js")
     page.evaluate(
         """() => {
             Object.assign(window, { said: [], told: [] });
@@ -109,7 +109,7 @@ HELD = "() => { window.held = setInterval(() => device.push(-350), 16) }"
 def jog(page: Page) -> Page:
     """Return a document with the Jog sheet open, which notes the rates that are sent."""
     page.evaluate(DEVICES)
-    load(page, "jog.js")
+    load(page, "Jog", "jog.js")
     page.evaluate(BEGIN)
     return page
 

@@ -275,23 +275,6 @@ def test_selection_is_saved_opened_and_compared(
 
 
 @pytest.mark.long
-def test_copied_link_opens_the_same_moment(server: AppServer, open_page: OpenPage) -> None:
-    allowed = ["clipboard-read", "clipboard-write"]
-    page = open_page(server.url, nodes=("/arm",), permissions=allowed)
-    opened(page)
-    place(page, 1.0)
-    page.wait_until(lambda: page.shows(GHOST), "the recorded arm")
-    turn = shown_turn(page)
-    page.page.get_by_role("button", name="Copy link to this moment").click()
-    page.page.locator("#toast", has_text="The link is copied").wait_for()
-    link = page.page.evaluate("navigator.clipboard.readText()")
-    assert link.startswith(f"{server.url}/?moment=ring@")
-    other = open_page(f"{link}&x=", nodes=("/arm",))
-    other.wait_until(lambda: other.shows(GHOST), "the recorded arm")
-    other.wait_until(lambda: abs(shown_turn(other) - turn) < 5e-3, "the same posture")
-
-
-@pytest.mark.long
 @in_sizes_and_schemes(("wide", "portrait", "landscape"))
 def test_timeline_covers_nothing(
     server: AppServer, open_page: OpenPage, artefacts: Path, size: str, scheme: str

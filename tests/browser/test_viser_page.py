@@ -152,7 +152,7 @@ def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:
         assert ask(page, "typeof Viser.viewer().requestRender") == "function"
 
 
-def test_page_speaks_to_its_worker_as_the_tap_expects(page: ViserPage, server: AppServer) -> None:
+def test_page_speaks_to_its_worker_as_expected(page: ViserPage, server: AppServer) -> None:
     with part("tap"):
         assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
         assert ask(page, "tapped.connected") == 1
@@ -219,10 +219,10 @@ def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
 def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
     with part("veil"):
         for hides, shown in (("(name) => name === '/box'", False), ("null", True)):
-            ask(page, f"Viser.veil({hides})")
+            ask(page, f"Viser.hideNodes({hides})")
             page.wait_until(lambda wanted=shown: page.shows("/box") is wanted, "the node")  # type: ignore[misc]
             with part("isVeiled"):
-                assert ask(page, "Viser.isVeiled()") is not shown
+                assert ask(page, "Viser.hasHidden()") is not shown
     with part("handles"):
         sent = {each["type"] for each in ask(page, "harness.sent")}
         assert not any(ask(page, f"Viser.handles({{ type: '{each}' }})") for each in sent)

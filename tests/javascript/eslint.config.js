@@ -1,27 +1,24 @@
 import js from "@eslint/js";
 import globals from "globals";
 
-// Defined at the top of one script of a document and used by the others.
-const shared = {
-  Edit: "readonly", Fields: "readonly", Fit: "readonly", Jog: "readonly", More: "readonly", Objects: "readonly", Pace: "readonly", Theme: "readonly", Viser: "readonly",
-};
-
 export default [
   js.configs.recommended,
   {
     files: ["static/**/*.js"],
     languageOptions: {
       ecmaVersion: 2024,
-      sourceType: "script",
-      globals: { ...globals.browser, ...shared },
+      sourceType: "module",
+      globals: globals.browser,
     },
     rules: {
       eqeqeq: ["error", "always", { null: "ignore" }],
       "no-redeclare": ["error", { builtinGlobals: false }],
-      "no-unused-vars": ["error", { vars: "local" }],
+      "max-lines": ["error", 400],
+      "max-lines-per-function": ["error", 80],
       "no-var": "error",
       "prefer-const": "error",
     },
   },
-  { files: ["static/{arm,episodes,instruments,jog,more,objects,people,scene,selection,sheet,teach,timeline,touch,welcome}/*.js"], languageOptions: { sourceType: "module" } },
+  // The worker.
+  { files: ["static/link.js"], languageOptions: { sourceType: "script" } },
 ];

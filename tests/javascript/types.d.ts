@@ -150,7 +150,7 @@ declare namespace Api {
   interface State { is: "state"; id?: number | string | null; t: number; sent: number; ticket: number; q: number[];
     setpoint: number[]; qd: number[]; goal: number[]; gripper: number; gripper_goal: number; tool: string | null;
     T: number[][] | null; pitch: number | null; roll: number | null; tool_speed: number | null;
-    holding: number[] | null; margins: Margins | null; touching: string[]; touch: Record<string, unknown> | null;
+    holding: number[] | null; margins: Margins | null; touching: string[]; touch: Page.Touch | null;
     held: string | null; branch: string[] | null; priority: string | null; status: string; moving: boolean; why: string;
     findings: Finding[]; detour: number | null; speed: number; holder: string | null; stopped: string | null;
     stop: string | null; stopped_at: number | null; clearable: boolean; revocations: number; silence_profile: string;

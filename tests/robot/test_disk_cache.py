@@ -19,7 +19,7 @@ from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.creases import Drawn
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.surfaces import shapes_of
-from katana450.assembly import page_routes
+from katana450.assembly import page_files
 from katana450.disk_cache import kept
 from katana450.extensions.bodies.pieces import pieces
 from katana450.extensions.conduit.rings import Floats, poses
@@ -276,7 +276,7 @@ def test_every_kind_of_value_is_found_again(folder: Path) -> None:
         partial(surface, visual),
         partial(visual.kept, lambda: _merged(visual), Drawn),
         partial(kept, lambda: poses(stretch, 9), Floats),
-        page_routes.page_files,
+        page_files.load,
         viser_page.load,
     ):
         read()

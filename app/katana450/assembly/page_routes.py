@@ -5,13 +5,9 @@ Their imports are light, because a new server answers them before its libraries 
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import logging
-import re
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import msgspec
 from starlette.exceptions import HTTPException
@@ -20,19 +16,17 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.disk_cache import kept
+from katana450.assembly import page_files
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import actor_of
 from katana450.server.service.recorder import ACCEPTED, REFUSED, Recorder, stranger
 from katana450.server.service.stop_path import StopPath
 from katana450.server.viser_bridge import viser_page
-from katana450.server.viser_bridge.viser_page import OUR_SCRIPTS, SCRIPTS
 from katana450.server.web import security
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import Authenticator
 from katana450.server.web.bodies import body_of
 from katana450.server.web.limits import TokenBucket
-from katana450.server.web.static_files import TYPES, File, contents
 
 log = logging.getLogger(__name__)
 
@@ -46,19 +40,6 @@ STOP_PORT = "X-Stop-Port"
 """Header that names the port to which the page also sends STOP."""
 
 
-INDEX, THEME = "index.html", "theme.js"
-"""Our page, and its first script, which sets the theme before anything is drawn."""
-
-THEME_ELEMENT = b'<script src="static/theme.js"></script>'
-"""Element of that script in the page, which contains the script when it is sent."""
-
-DEFERRED_SCRIPT = re.compile(rb'<script src="static/([^"]+)" defer></script>\n')
-"""Pattern of the element of a script that runs when the page is read."""
-
-PAGE_SCRIPTS = "page-scripts.js"
-"""Name of the file with all of these."""
-
-
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
     token: str
 
@@ -67,9 +48,9 @@ def page_routes(
     authenticator: Authenticator, stop_path: StopPath, recorder: Recorder
 ) -> list[Route]:
     """Return the routes that need no arm."""
-    static = page_files()
-    index = static.pop(INDEX)
-    inline = _source(static[THEME])
+    static = page_files.load()
+    index = static.pop("index.html")
+    inline = page_files.source(index)
     policy = security.page_policy(inline)
     bad_links = TokenBucket(BAD_LINKS_PER_SECOND, BAD_LINKS_BURST, time.monotonic())
 
@@ -150,24 +131,3 @@ def signed_in(
     if identity is None:
         raise HTTPException(401, "Sign in at the start page first.")
     return replace(identity, address=address_of(request))
-
-
-def page_files() -> dict[str, File]:
-    """Return every file of the page by its path, with those of its scripts."""
-    files = contents()
-    bundle = f'<script src="static/{PAGE_SCRIPTS}" defer></script>\n'.encode()
-    index = files[INDEX].replace(THEME_ELEMENT, b"<script>%s</script>" % files[THEME])
-    head, *names, rest = DEFERRED_SCRIPT.split(index)
-    files[INDEX] = head + bundle + rest
-    files[PAGE_SCRIPTS] = b"\n".join(files[name.decode()] for name in names if name)
-    files[SCRIPTS] = b"\n".join(files[f"{name}.js"] for name in OUR_SCRIPTS)
-
-    def packed() -> dict[str, File]:
-        return {name: File.of(content, TYPES[Path(name).suffix]) for name, content in files.items()}
-
-    return kept(packed, dict[str, File], *files, *files.values())
-
-
-def _source(script: File) -> str:
-    """Return the source that allows ``script`` within a page, for its content security policy."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(script.content).digest()).decode()}'"

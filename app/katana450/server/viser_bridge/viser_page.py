@@ -46,12 +46,8 @@ LOADING = f"""<link rel="modulepreload" href="{PROGRAM}">
 <link rel="preload" href="{DECODER_FILE}" as="fetch" crossorigin>"""
 """Elements that load the files before ``static/viser.js`` needs them."""
 
-
-OUR_SCRIPTS = ("theme", "viser", "fields", "fit", "sheet", "names", "frame")
-"""Names of our files in the order in which they run."""
-
 SCRIPTS = "viser-scripts.js"
-"""Name of the file with all of these. Its element gets the themes."""
+"""Name of the file with our modules for viser's page. Its element gets the themes."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,74 @@
+// Elements of the document, of a known kind.
+
+const SAVED_AFTER = 1000; // ms
+
+// Return the element with an id. Throws an error if it is missing or of another kind.
+/** @template {Element} T @param {string} id @param {new () => T} kind @returns {T} */
+export function element(id, kind) {
+  const match = document.getElementById(id);
+  if (!(match instanceof kind)) throw new Error(`The page has no ${kind.name} with the id ${id}.`);
+  return match;
+}
+
+/** Return a button. @param {string} label @param {() => void} act */
+export function button(label, act, main = false) {
+  const control = document.createElement("button");
+  control.type = "button";
+  control.textContent = control.title = label;
+  control.classList.toggle("main", main);
+  control.addEventListener("click", act);
+  return control;
+}
+
+/** Call `act` for each click on the element with an id. @param {string} id @param {() => void} act */
+export const onClick = (id, act) => element(id, HTMLElement).addEventListener("click", act);
+
+// Return the first element in `root` that a selector matches. Throws an error if it is missing or of another kind.
+/** @template {Element} T @param {string} selector @param {new () => T} kind @param {ParentNode} root @returns {T} */
+export function first(selector, kind, root = document) {
+  const match = root.querySelector(selector);
+  if (!(match instanceof kind)) throw new Error(`The page has no ${kind.name} at ${selector}.`);
+  return match;
+}
+
+/** Write only changes: a text that is written again is read aloud again. @param {Element} target @param {string} words */
+export function write(target, words) {
+  if (target.textContent !== words) target.textContent = words;
+}
+
+// Return what viser's page in `frame` offers: nothing before its scripts have run, or if it could not be loaded.
+/** @param {HTMLIFrameElement} frame */
+export const sceneOf = (frame) => (frame.contentDocument ? frame.contentWindow?.katanaScene : undefined);
+
+/** The same for a page whose scene is drawn. Throws an error for another. @param {HTMLIFrameElement} frame */
+export function sceneIn(frame) {
+  const scene = sceneOf(frame);
+  if (!scene) throw new Error("The scene is not loaded.");
+  return scene;
+}
+
+/** Let the person save a file of this name. @param {Blob} content @param {string} name */
+export function save(content, name) {
+  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(content), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), SAVED_AFTER);
+}
+
+// The present second, as a part of the name of a file.
+export const timestamp = () => new Date().toISOString().slice(0, 19).replaceAll(":", "-");
+
+// Load the style beside a module, whose address is `url`; resolved when it is there or cannot be loaded.
+/** @param {string} name @param {string} url */
+export function styled(name, url) {
+  const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href: new URL(name, url).href });
+  document.head.append(link);
+  return new Promise((done) => ["load", "error"].forEach((kind) => link.addEventListener(kind, done)));
+}
+
+// Whether the target of an event, of this document or of viser's, matches a selector.
+/** @param {EventTarget | null} target @param {string} selector @returns {target is HTMLElement} */
+export const matches = (target, selector) => Boolean(/** @type {Partial<Element> | null} */ (target)?.matches?.(selector));
+
+// Return the element round the target of an event that matches a selector; null without one.
+/** @param {EventTarget | null} target @param {string} selector */
+export const closest = (target, selector) => /** @type {Partial<Element> | null} */ (target)?.closest?.(selector) ?? null;

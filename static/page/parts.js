@@ -1,0 +1,188 @@
+// The parts of the page that are loaded when they are first used.
+import { element, onClick } from "../dom.js";
+import { OFFLINE } from "./connection.js";
+
+const OPEN = "katana450.instruments.open";
+const WELCOMED = "katana450.welcome";
+const PAST = "katana450.timeline.open";
+const RUMBLE = "katana450.rumble";
+const RUMBLE_RATE = 20; // Hz
+export const QUIETLY = "quietly"; // id of requests that are repeated and whose refusals are not shown
+
+/** @param {string} id @param {string} name @param {boolean} on */
+const mark = (id, name, on) => element(id, HTMLButtonElement).setAttribute(name, String(on));
+
+export class Parts {
+  #page;
+  #frame;
+  #sheets;
+  #watch;
+  /** @type {import("../scene/stage.js").Stage | null} */
+  stage = null; // what a pointer does in the scene
+  /** @type {import("../episodes/episodes.js").Episodes | null} */
+  episodes = null;
+  /** @type {import("../teach/teach.js").Teach | null} */
+  teach = null;
+  /** @type {import("../timeline/timeline.js").Timeline | null} */
+  timeline = null;
+  /** @type {import("../people/people.js").People | null} */
+  people = null;
+  /** @type {import("../touch/rumble.js").Rumble | null} */
+  rumble = null;
+  /** @type {import("../instruments/panel.js").Panel | null} */
+  panel = null;
+  /** @type {import("../welcome/welcome.js").Welcome | null} */
+  welcome = null;
+  /** @type {import("../arm/arm.js").Arm | null} */
+  #arm = null;
+  #hasPast = false; // whether the timeline is shown when the scene is drawn
+  /** @type {Promise<import("../teach/teach.js").Teach> | null} */
+  #teachLoads = null; // one sheet, also after two clicks
+  /** @type {Promise<import("../welcome/welcome.js").Welcome> | null} */
+  #welcomeLoads = null; // one card, also after two requests
+  /** @type {Record<string, number>} */
+  #rates = {}; // at which parts of the page want states [Hz]
+
+  // sheets: returns those of the page; `watch` asks for states at a rate [Hz].
+  /**
+   * @param {Page.Context} page @param {import("./first_frame.js").FirstFrame} frame
+   * @param {() => import("./sheets.js").Sheets} sheets @param {(hz: number) => void} watch
+   */
+  constructor(page, frame, sheets, watch) {
+    this.#page = page;
+    this.#frame = frame;
+    this.#sheets = sheets;
+    this.#watch = watch;
+    page.store.follow((status) => this.#drawEpisodes(status));
+    page.store.follow((status) => this.#drawArm(status));
+    onClick("timeline-button", () => {
+      element("more", HTMLDialogElement).close();
+      this.showTimeline(!this.timeline?.shown);
+    });
+    const help = element("help", HTMLDialogElement);
+    onClick("people-button", () => {
+      help.close();
+      this.#showPeople();
+    });
+    onClick("rumble-button", () => this.#vibrate(!this.rumble));
+    onClick("welcome-button", () => {
+      help.close();
+      this.#showWelcome();
+    });
+    const instruments = element("instruments-button", HTMLButtonElement);
+    onClick("instruments-button", () => this.#showInstruments(instruments.ariaExpanded !== "true"));
+    if (page.kept?.getItem(RUMBLE) === "yes") this.#vibrate(true);
+  }
+
+  // Show what was open when the person was here last, now that they have signed in.
+  begin() {
+    const { kept, store } = this.#page;
+    if (kept?.getItem(OPEN) === "yes") this.#showInstruments(true);
+    this.#hasPast = kept?.getItem(PAST) === "yes";
+    let isFirst = true;
+    store.follow(async ({ role }) => {
+      if (!isFirst) return;
+      isFirst = false;
+      await this.#frame.rest;
+      if (this.#frame.canDraw && role !== "viewer" && !kept?.getItem(WELCOMED)) this.#showWelcome();
+    });
+  }
+
+  // The scene is drawn.
+  async enterScene() {
+    if (this.#hasPast) this.showTimeline(true);
+    this.#hasPast = false;
+    await this.#frame.rest;
+    const { Stage } = await import("../scene/stage.js");
+    this.stage ??= new Stage({ ...this.#page, edit: (name) => this.#editScript(name) });
+  }
+
+  async loadTeach() {
+    this.#teachLoads ??= import("../teach/teach.js").then(({ Teach }) => Teach.in(this.#page));
+    return (this.teach = await this.#teachLoads);
+  }
+
+  /** Open a script, by its name, as text in the sheet of taught poses. @param {string} name */
+  async #editScript(name) {
+    const { store, toast } = this.#page;
+    if (store.status?.role === "viewer") return toast("You may watch, not drive.");
+    if (element("teach-button", HTMLButtonElement).hidden) return toast(OFFLINE);
+    const teach = await this.loadTeach();
+    this.#sheets().open("teach");
+    teach.open(name, true);
+  }
+
+  /** REC and the episodes, when the server records. @param {Page.Status} status */
+  async #drawEpisodes(status) {
+    if (!this.episodes && !status.episodes) return;
+    await this.#frame.rest;
+    const { Episodes } = await import("../episodes/episodes.js");
+    this.episodes ??= new Episodes(this.#page);
+    this.episodes.draw(this.#page.store.status ?? status);
+  }
+
+  /** The real arm, when a driver reports on it. @param {Page.Status} status */
+  async #drawArm(status) {
+    if (!this.#arm && !status.arm) return;
+    const { Arm } = await import("../arm/arm.js");
+    this.#arm ??= new Arm(this.#page.stage, this.#page);
+    this.#arm.draw(this.#page.store.status ?? status);
+  }
+
+  /** Show what was recorded, or fold it away. @param {boolean} shown */
+  async showTimeline(shown) {
+    mark("timeline-button", "aria-expanded", shown);
+    this.#page.kept?.setItem(PAST, shown ? "yes" : "no");
+    const { Timeline } = await import("../timeline/timeline.js");
+    this.timeline ??= new Timeline(element("timeline", HTMLElement), this.#page, () => this.showTimeline(false));
+    await this.timeline.show(shown);
+  }
+
+  /** Open the file of a recording in the timeline. @param {File} file */
+  async replay(file) {
+    await this.showTimeline(true);
+    this.timeline?.open(file);
+  }
+
+  // Who is connected, for admins.
+  async #showPeople() {
+    const { People } = await import("../people/people.js");
+    this.people ??= new People(this.#page.say);
+    this.people.show();
+  }
+
+  /** Ask for states as often as the part that wants most. @param {string} part @param {number} hz */
+  #see(part, hz) {
+    this.#rates[part] = hz;
+    this.#watch(Math.max(...Object.values(this.#rates)));
+  }
+
+  /** The vibration of gamepad and phone. @param {boolean} on */
+  async #vibrate(on) {
+    mark("rumble-button", "aria-pressed", on);
+    this.#page.kept?.setItem(RUMBLE, on ? "yes" : "no");
+    this.rumble = on ? new (await import("../touch/rumble.js")).Rumble() : null;
+    this.#see("rumble", on ? RUMBLE_RATE : 0);
+  }
+
+  // The first steps: at each visit until they are dismissed, and from the help.
+  async #showWelcome() {
+    this.#welcomeLoads ??= import("../welcome/welcome.js").then(({ Welcome }) => Welcome.on(this.#page));
+    this.welcome = await this.#welcomeLoads.catch(() => null);
+    if (this.welcome) this.welcome.show();
+    else this.#welcomeLoads = null; // The server did not answer: asked again, they load again.
+  }
+
+  /** @param {boolean} shown */
+  async #showInstruments(shown) {
+    const { say, kept } = this.#page;
+    const button = element("instruments-button", HTMLButtonElement);
+    button.ariaExpanded = String(shown);
+    kept?.setItem(OPEN, shown ? "yes" : "no");
+    if (shown && !this.panel) {
+      const { Panel } = await import("../instruments/panel.js");
+      this.panel ??= new Panel(element("instruments", HTMLElement), { say, watch: (hz) => this.#see("panel", hz), kept, quietly: QUIETLY });
+    }
+    this.panel?.show(button.ariaExpanded === "true");
+  }
+}

@@ -1,0 +1,83 @@
+// The elements of the timeline: its track, its buttons and its lists.
+import { html, svg } from "../instruments/shape.js";
+
+const SPEEDS = [0.25, 0.5, 1, 2, 4];
+const EXPORTS = [["csv", "CSV table"], ["parquet", "Parquet table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
+const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
+
+/** @param {keyof typeof ICONS} name */
+const icon = (name) => svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: ICONS[name] }));
+
+/** @param {string | number} value @param {string} words */
+export const option = (value, words) => html("option", { value }, words);
+
+/** @param {string} name @param {string} label */
+const range = (name, label) => html("input", { type: "range", class: name, min: "0", max: "1", step: "any", "aria-label": label });
+
+/** @param {string} label @param {() => void} act @param {(Node | string)[]} content */
+function button(label, act, ...content) {
+  const control = html("button", { type: "button", title: label, "aria-label": label }, ...(content.length ? content : [label]));
+  control.addEventListener("click", act);
+  return control;
+}
+
+/**
+ * What the buttons do.
+ * @typedef {Record<"play" | "again" | "live" | "fold" | "save" | "verify", () => void>} Acts
+ */
+
+export class Controls {
+  plot = html("div", { class: "plot", hidden: "" });
+  work = html("div", { class: "work", hidden: "" });
+  exports = html("select", { "aria-label": "Export the selection" }, option("", "Export…"), ...EXPORTS.map(([name, words]) => option(name, words)));
+  clock = html("output", { class: "clock" }, "Live");
+  marks = html("div", { class: "marks" });
+  begin = range("end", "Start of the selection");
+  end = range("end", "End of the selection");
+  now = range("now", "Moment that is shown");
+  speed = html("select", { "aria-label": "Speed of playing back" }, ...SPEEDS.map((speed) => option(speed, `${speed}×`)));
+  of = html("select", { "aria-label": "Recording" });
+  second = html("select", { "aria-label": "Second run" });
+  events = html("select", { "aria-label": "Events" });
+  file = html("input", { type: "file", accept: ".mcap", hidden: "", "aria-label": "File of a recording" });
+  moment = html("time", { "aria-live": "off" });
+  past = html("div", { id: "past", hidden: "" });
+
+  /** @param {HTMLElement} box @param {Acts} acts */
+  constructor(box, acts) {
+    this.play = button("Play", acts.play, icon("play"));
+    this.again = button("Run again the selected motion", acts.again, "Run again");
+    this.speed.value = "1";
+    const back = button("Back to live", acts.live);
+    back.className = "main";
+    this.past.append(html("p", { role: "status" }, "Playing back ", this.moment, ", arm is elsewhere"), back);
+    const fold = button("Fold the timeline away", acts.fold, "×");
+    fold.className = "fold";
+    const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);
+    box.replaceChildren(
+      this.plot,
+      this.work,
+      html("div", { class: "row" }, this.play, this.clock, track, this.speed, this.events, this.of, this.second,
+        button("Save selection", acts.save, "Save", html("span", {}, " selection")),
+        this.exports,
+        this.again,
+        button("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
+        fold, this.file),
+    );
+  }
+
+  /** Show whether the recording plays. @param {boolean} plays */
+  showPlaying(plays) {
+    this.play.replaceChildren(icon(plays ? "pause" : "play"));
+    for (const name of ["title", "aria-label"]) this.play.setAttribute(name, plays ? "Pause" : "Play");
+  }
+}
+
+/** Return a time [s since the epoch] in words, with the date if it is not today. @param {number} t */
+export function timeInWords(t) {
+  /** @type {Intl.DateTimeFormatOptions} */
+  const style = { hour: "2-digit", minute: "2-digit", second: "2-digit" };
+  const time = new Date(1000 * t);
+  const today = time.toDateString() === new Date().toDateString();
+  return today ? time.toLocaleTimeString([], style) : time.toLocaleString([], { day: "numeric", month: "short", ...style });
+}
