@@ -1,8 +1,9 @@
-"""The Teach sheet: poses are recorded, ordered and played, by mouse, keys and touch."""
+"""The Teach sheet: poses are recorded, ordered and played; their text is edited, run and saved."""
 
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.teach import taught
 from tests.browser.page import ViserPage
-from tests.browser.session import Truth, clear_stop, go_home
+from tests.browser.session import Truth, bar, clear_stop, go_home, mood, prepare
 from tests.browser.teach_sheet import (
     PLAYED,
     drag,
@@ -133,3 +134,187 @@ def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> N
         press(sheet, "Redo in Teach")
     sheet.page.wait_for_timeout(200)
     assert truth.status()["q"] == q
+
+
+def listed(page: ViserPage, script: str) -> bool:
+    """Return whether the list of the panel, which follows the folder, has a script."""
+    lists = page.messages("GuiUpdateMessage") + page.messages("GuiDropdownMessage")
+    options = [each.body.get("updates", each.body.get("props", {})) for each in lists]
+    return any(script in each.get("options", ()) for each in options)
+
+
+def test_chosen_script_of_the_panel_is_edited_as_text(
+    window: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    prepare(window, truth)
+    page = window.page
+    # It has only poses, and is shown as text nevertheless.
+    saved = page.evaluate(
+        "async (body) => (await fetch('api/v1/scripts/Taught', { method: 'POST', body })).status",
+        "steps:\n  - joints: [0, -68, 85, 8, 0]\n",
+    )
+    assert saved == 204
+    window.frame.get_by_role("tab", name="Programs").click()
+    # The list follows the folder.
+    window.wait_until(lambda: listed(window, "Taught"), "the script in the list")
+    window.choose("Script", "Taught")
+    window.wait_until(
+        lambda: window.frame.locator("[data-script=Taught]").count() == 1, "the button"
+    )
+    window.frame.get_by_role("button", name="Edit as text").click()
+    area = page.locator("#teach-text")
+    area.wait_for()
+    window.wait_until(lambda: "steps:" in area.input_value(), "the text")
+    chosen = window.frame.get_by_label("Script", exact=True).input_value()
+    assert area.input_value() == page.evaluate(
+        "async (name) => (await fetch(`api/v1/scripts/${name}`)).text()", chosen
+    )
+    assert page.locator("#teach-problems li").count() == 0
+    window.keep(artefacts / "panel-edit-as-text.png")
+    # What was in Teach before returns.
+    page.get_by_role("button", name="Undo in Teach").click()
+    area.wait_for(state="hidden")
+    assert window.errors == []
+
+
+@pytest.mark.long
+def test_text_is_edited_checked_and_run(sheet: ViserPage, truth: Truth, artefacts: Path) -> None:
+    teach(sheet, truth, (20.0, -25.0))
+    page = sheet.page
+    press(sheet, "Edit as text")
+    area = page.locator("#teach-text")
+    assert taught(parse(area.input_value())) is not None
+    area.press("Control+End")
+    area.type("  - wiat: 1\n")
+    assert area.input_value().endswith("\n  - wiat: 1\n")
+    assert truth.status()["stopped"] is None
+    problem = page.locator("#teach-problems button")
+    problem.wait_for()
+    line = area.input_value().count("\n")
+    assert re.match(rf"Line {line} .*did you mean 'wait'", problem.inner_text())
+    sheet.keep(artefacts / "teach-text-problem.png")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: "not run" in says(sheet), "the refusal")
+    problem.click()
+    selected = "(each) => each.value.slice(each.selectionStart, each.selectionEnd)"
+    assert area.evaluate(selected) == "  - wiat: 1"
+    page.keyboard.type("  - joints: [5, -68, 85, 8, 0]")
+    page.wait_for_selector("#teach-problems button", state="detached")
+    sheet = reload(sheet)
+    assert area.input_value().endswith("[5, -68, 85, 8, 0]\n")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: says(sheet) == "Done.", "the end", seconds=PLAYED)
+    assert np.degrees(truth.status()["q"][0]) == pytest.approx(5.0, abs=0.01)
+    press(sheet, "Edit as poses")
+    sheet.wait_until(lambda: turns(sheet) == [20, -25, 5], "the poses")
+    # A place that cannot be reached is found in planning, and named by its line.
+    press(sheet, "Edit as text")
+    area.fill("name: Far\nsteps:\n  - home\n  - move: {x: 1900, y: 0, z: 0}\n")
+    press(sheet, "Play")
+    sheet.wait_until(lambda: page.locator("#teach-problems li").count() == 1, "it", seconds=PLAYED)
+    assert page.inner_text("#teach-problems").startswith("Line 4 ")
+    press(sheet, "Edit as poses")
+    sheet.wait_until(lambda: "no poses" in says(sheet), "the refusal")
+    assert area.is_visible()
+    # A mistake in an attached file is named by that file, and marks no line of the script.
+    area.fill('scene: {"a.yaml": "# A file.\\nobjects: []"}\nsteps:\n  - home\n')
+    sheet.wait_until(
+        lambda: page.inner_text("#teach-problems").startswith("a.yaml, line 2 "), "the file"
+    )
+    assert page.locator("#teach-editor pre .bad").count() == 0
+
+
+@pytest.mark.long
+def test_space_is_typed_in_the_text_of_a_moving_arm_and_escape_stops_it(
+    sheet: ViserPage, truth: Truth, artefacts: Path
+) -> None:
+    press(sheet, "Edit as text")
+    area = sheet.page.locator("#teach-text")
+    text = "name: Slow\nspeed: 0.05\nsteps:\n  - joints: [60, -68, 85, 8, 0]\n"
+    area.fill(text)
+    press(sheet, "Play")
+    area.focus()
+    truth.wait(PLAYED, moving=True)
+    sheet.wait_until(lambda: mood(sheet.page) == "program", "the bar")
+    sheet.page.keyboard.press("Control+End")
+    sheet.page.keyboard.press("Space")
+    assert area.input_value() == f"{text} "
+    sheet.page.wait_for_timeout(200)
+    assert truth.status()["stopped"] is None
+    # The button says which key stops now.
+    key = "getComputedStyle(document.getElementById('stop'), '::after').content"
+    assert "Esc" in sheet.page.evaluate(key)
+    sheet.keep(artefacts / "teach-text-moving.png")
+    sheet.page.keyboard.press("Escape")
+    truth.wait(mood="stopped")
+    assert area.input_value() == f"{text} "
+    sheet.wait_until(lambda: bar(sheet, "headline") == "Stopped", "the bar")
+    clear_stop(sheet, truth)
+
+
+@pytest.mark.long
+def test_space_stops_the_arm_from_everything_but_a_text(sheet: ViserPage, truth: Truth) -> None:
+    page = sheet.page
+
+    def stops(what: str) -> None:
+        """Press Space, which must stop the arm, and clear the stop."""
+        page.keyboard.press("Space")
+        truth.wait(mood="stopped")
+        clear_stop(sheet, truth)
+        assert truth.status()["stopped"] is None, what
+
+    press(sheet, "Edit as text")
+    area = page.locator("#teach-text")
+    area.click()
+    # A press in the scene is the end of typing.
+    page.mouse.click(500.0, 250.0)
+    before = area.input_value()
+    stops("the scene")
+    assert area.input_value() == before
+    page.locator("#teach").get_by_label("Open a script").focus()
+    stops("a list of the page")
+    sheet.number_box("1 base turn").click()
+    stops("a number of the panel")
+    sheet.choose("Priority", sheet.chosen("Priority"))
+    stops("a list of the panel, which keeps the focus after a choice")
+    page.focus("#speed input")
+    stops("a slider")
+    page.focus("#jog-button")
+    stops("a button")
+    assert not page.locator("#jog").is_visible()
+    name = page.locator("#teach").get_by_label("Name", exact=True)
+    name.fill("")
+    name.type("Two words")
+    page.click("#more-button")
+    own = page.get_by_label("Your name")
+    own.fill("")
+    own.type("Anna B")
+    assert (name.input_value(), own.input_value()) == ("Two words", "Anna B")
+    assert truth.status()["stopped"] is None
+
+
+@pytest.mark.long
+def test_script_is_saved_in_the_folder_and_listed(
+    sheet: ViserPage, truth: Truth, scripts: Path
+) -> None:
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "no pose yet" in says(sheet), "the refusal")
+    teach(sheet, truth, (20.0,))
+    name = sheet.page.get_by_label("Name", exact=True)
+    name.fill("")
+    name.type("Two words")
+    name.press("Enter")
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "Saved as Two words" in says(sheet), "the answer")
+    assert taught(parse((scripts / "Two words.yaml").read_text(encoding="utf-8"))) is not None
+    press(sheet, "Save")
+    sheet.wait_until(lambda: "exists already" in says(sheet), "the refusal")
+    # The browser notes the refusal on its console.
+    sheet.errors.clear()
+    sheet.open_tab("Programs")
+    assert "Teach" not in sheet.panel_text()
+    sheet.choose("Script", "Two words")
+    # A script of the library has other steps, so it is shown as text.
+    sheet.page.locator("#teach").get_by_label("Open a script").select_option("Square")
+    sheet.wait_until(lambda: "shown as text" in says(sheet), "the text")
+    assert "repeat:" in sheet.page.locator("#teach-text").input_value()
