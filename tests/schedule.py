@@ -36,7 +36,7 @@ KINDS = {
     "tests/cli/test_serve.py": BROWSER,
     "tests/docs/test_code_blocks.py": SERVERS[0],
     "tests/examples": SERVERS[1],
-    "tests/leader/test_leader_on_a_server.py": SERVERS[1],
+    "tests/leader/test_leader_on_a_server.py": SERVERS[0],
     "tests/leader/test_leader_run.py": SERVERS[1],
     "tests/library/test_run.py": SERVERS[1],
     "tests/real_arm/test_arm_commands.py": SERVERS[0],

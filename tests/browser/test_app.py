@@ -16,7 +16,7 @@ from katana450.server.view.view import GHOST_COLOURS
 from tests.browser.page import ViserPage
 from tests.browser.session import AXES, Truth, bar, go_home, mood
 
-MOVE, PITCH, ROLL = "/target/move", "/target/move/pitch", "/target/move/roll"
+MOVE, PITCH = "/target/move", "/target/move/pitch"
 
 # A dragged handle is within a pixel of its target: 1 mm at this distance.
 PIXEL = 2e-3

@@ -252,10 +252,6 @@ def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
 
 
-SIZE, OMEGA = 0.4, math.tau / 3.0
-"""Amplitude [rad] and maximum speed [rad/s] of a sine."""
-
-
 def test_states_arrive_at_the_requested_rate(program: Client) -> None:
     times = []
     for state in program.states(hz=50.0):
