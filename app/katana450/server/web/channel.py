@@ -23,9 +23,12 @@ from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
 from katana450.server.service.heartbeats import ARRIVAL, PING, LastHeartbeat
 from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
 from katana450.server.service.pending_answer import PendingAnswer
+from katana450.server.service.people import Connection
 from katana450.server.web.admission import LIMIT_CLOSE_CODE
+from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.limits import TokenBucket
 
 log = logging.getLogger(__name__)
@@ -118,6 +121,28 @@ class Channel(ABC):
         self._news = asyncio.Event()
         self._urgent = False
         self._concluding: set[asyncio.Task[None]] = set()
+
+    def greet(self, participant: Participant) -> None:
+        """Take ``participant``, whose channel this is."""
+        self.participant = participant
+
+    async def serve(
+        self,
+        authenticator: Authenticator,
+        identity: Callable[[], Identity | None],
+        participant: Participant,
+        sender: Identity,
+    ) -> None:
+        """Serve ``participant`` until one side closes, or until it is no longer authorised.
+
+        ``identity``: returns its identity, None once that has expired. ``sender``: the identity
+        with the address, for the list of people.
+        """
+        connection = Connection(sender, sender.address, key=participant.person.key)
+        why = await authenticator.run_while_authorised(identity, self.run(participant), connection)
+        if why is not None:
+            self.hub.recorder.note("revocation", participant.actor, always=True, why=why)
+            await self._line.close(SIGN_IN_CLOSE_CODE, why)
 
     def notify(self, notice: Any) -> None:
         """Queue ``notice``, any JSON value; send it as soon as the connection allows."""

@@ -16,7 +16,6 @@ from katana450.server.service.budget import Budget, Budgets
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import Participant
-from katana450.server.service.people import Connection
 from katana450.server.web.admission import address_of
 from katana450.server.web.authenticator import SIGN_IN_CLOSE_CODE, Authenticator
 from katana450.server.web.channel import Channel, JsonChannel, WebSocketJsonChannel
@@ -75,14 +74,11 @@ async def serve(
     line = WebSocketJsonChannel(socket)
     control = ControlSocket(hub, line, budgets.of(identity.session))
     identity = replace(identity, address=address_of(socket))
-    control.participant = participant = hub.join(identity, page, control.notify, line.arrival)
-    connection = Connection(identity, address_of(socket), key=participant.person.key)
+    participant = hub.join(identity, page, control.notify, line.arrival)
+    control.greet(participant)
     try:
-        why = await authenticator.run_while_authorised(
-            lambda: authenticator.identity(socket.cookies), control.run(participant), connection
+        await control.serve(
+            authenticator, lambda: authenticator.identity(socket.cookies), participant, identity
         )
-        if why is not None:
-            hub.recorder.note("revocation", participant.actor, always=True, why=why)
-            await line.close(SIGN_IN_CLOSE_CODE, why)
     finally:
         hub.leave(participant)

@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import msgspec
 from starlette.websockets import WebSocket
@@ -27,7 +27,6 @@ from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant, actor_of
-from katana450.server.service.people import Connection
 from katana450.server.service.recorder import REFUSED, stranger
 from katana450.server.web.acceptor import Acceptor
 from katana450.server.web.admission import (
@@ -136,7 +135,8 @@ class ProgramChannel(Channel):
 
     def greet(self, participant: Participant) -> None:
         """Send the name, number and role of the program."""
-        self.participant, person = participant, participant.person
+        super().greet(participant)
+        person = participant.person
         self.notify(
             answers.Welcome(
                 name=person.name,
@@ -148,25 +148,12 @@ class ProgramChannel(Channel):
         )
 
 
-class Greets(Protocol):
-    """Interface of the channel of a program on a socket; ``ProgramChannel`` implements it."""
-
-    def greet(self, participant: Participant) -> None:
-        """Take ``participant``, which is the program."""
-
-    def notify(self, notice: Any) -> None:
-        """Queue ``notice``, any JSON value."""
-
-    async def run(self, participant: Participant) -> None:
-        """Receive and send until one side closes the connection."""
-
-
 async def serve_socket(
     hub: Hub,
     authenticator: Authenticator,
     budgets: Budgets,
     socket: WebSocket,
-    make: Callable[[Hub, JsonChannel, Budget], Greets] = ProgramChannel,
+    make: Callable[[Hub, JsonChannel, Budget], Channel] = ProgramChannel,
     line: Callable[[WebSocket], JsonChannel] = WebSocketJsonChannel,
 ) -> None:
     """Serve a websocket of a program until it closes.
@@ -291,7 +278,7 @@ async def _serve(
     budget: Budget,
     line: JsonChannel,
     client: ProgramClient,
-    make: Callable[[Hub, JsonChannel, Budget], Greets] = ProgramChannel,
+    make: Callable[[Hub, JsonChannel, Budget], Channel] = ProgramChannel,
 ) -> None:
     sender = client.identity()
     if sender is None:
@@ -304,14 +291,8 @@ async def _serve(
     sender = replace(sender, address=client.address)
     participant = hub.join(sender, page, program.notify, line.arrival, client.channel)
     program.greet(participant)
-    connection = Connection(sender, client.address, key=participant.person.key)
     try:
-        why = await authenticator.run_while_authorised(
-            client.identity, program.run(participant), connection
-        )
-        if why is not None:
-            hub.recorder.note("revocation", participant.actor, always=True, why=why)
-            await line.close(SIGN_IN_CLOSE_CODE, why)
+        await program.serve(authenticator, client.identity, participant, sender)
     finally:
         hub.leave(participant, for_good=True)
 
