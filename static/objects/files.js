@@ -1,7 +1,7 @@
 // Several files of one object: those that were dropped or chosen, as one .zip file without compression.
 
 // Suffixes of shapes, of files that shapes name, and of shapes that need no other file.
-const SHAPES = /\.(stl|obj|ply|glb|gltf|wrl|wrz|zip)$/i;
+const SHAPES = /\.(stl|obj|ply|glb|gltf|wrl|zip)$/i;
 const OTHERS = /\.(bin|mtl)$/i;
 const ALONE = /\.(stl|ply|glb|zip)$/i;
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import os
 import subprocess
 import sys
@@ -74,13 +73,12 @@ def laughs() -> bytes:
 @pytest.mark.parametrize(
     ("make", "format"),
     [
-        (lambda: gzip.compress(f"{HEADER}\n".encode() + bytes(50_000_000), 1), Format.WRL),
         (deeply, Format.WRL),
         (laughs, Format.WRL),
         (lambda: ply(faces=99_999_999_999), Format.PLY),
         (lambda: ply("9" * 1_000_000 + " 1" * 1_000_000, faces=0), Format.PLY),
     ],
-    ids=["bomb", "deep", "laughs", "faces", "wide"],
+    ids=["deep", "laughs", "faces", "wide"],
 )
 @pytest.mark.usefixtures("limited_time")
 def test_hostile_files_are_refused_in_time(make: Callable[[], bytes], format: Format) -> None:

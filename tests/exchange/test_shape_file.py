@@ -322,7 +322,7 @@ def test_gltf_of_2_m_is_placed_and_a_longer_one_with_a_scale() -> None:
 
 def test_formats_follow_from_the_suffix() -> None:
     assert [Format.of(f"a.{each.value.upper()}") for each in Format] == list(Format)
-    assert Format.of("a.b.WRZ") is Format.WRL
+    assert Format.of("a.b.WRL") is Format.WRL
     for name in ("wrl", "a.step", "a.x3dv", "a", ""):
         with pytest.raises(InputError, match=r"\.wrl, \.stl"):
             Format.of(name)

@@ -208,10 +208,9 @@ def test_materials_give_colour_and_opacity() -> None:
     }
 
 
-def test_compressed_files_and_byte_order_marks_are_read() -> None:
-    text = f"{HEADER} by hand\nShape {{ geometry Box {{ }} }}".encode()
-    for data in (gzip.compress(text), b"\xef\xbb\xbf" + text):
-        assert volume(read_shape(data, Format.WRL, "a.wrz")) == pytest.approx(8.0)
+def test_byte_order_mark_is_read() -> None:
+    text = f"\ufeff{HEADER} by hand\nShape {{ geometry Box {{ }} }}"
+    assert volume(read_shape(text.encode(), Format.WRL, "a.wrl")) == pytest.approx(8.0)
 
 
 def chain(links: int, fan: int, shape: str = "Shape { geometry Box { } }") -> str:
@@ -289,12 +288,7 @@ def test_invalid_worlds_are_refused(text: str, said: str) -> None:
         (b"#VRML V1.0 ascii\nCube { }", "is VRML 1.0 or X3D, which is not read. Export it"),
         (b'<?xml version="1.0"?><X3D/>', "is VRML 1.0 or X3D, which is not read. Export"),
         (b"#X3D V3.2 utf8\n", "is VRML 1.0 or X3D, which is not read. Export"),
-        (gzip.compress(bytes(10), mtime=0)[:-6], "ends too early"),  # without its time
-        (b"\x1f\x8b" + bytes(40), "corrupt"),
-        (
-            gzip.compress(b"#VRML V2.0 utf8\n" + bytes(30_000_000), mtime=0),
-            "more than 20 MB when unpacked",
-        ),
+        (gzip.compress(b"#VRML V2.0 utf8\n"), "is compressed by gzip. Unpack it"),
     ],
 )
 def test_invalid_vrml_is_refused(data: bytes, said: str) -> None:

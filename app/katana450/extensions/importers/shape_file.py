@@ -73,13 +73,9 @@ class Format(Enum):
 
     @classmethod
     def of(cls, file: str) -> Format:
-        """Return the format of a file by its name. Raises InputError.
-
-        .wrz is a compressed .wrl.
-        """
+        """Return the format of a file by its name. Raises InputError."""
         suffix = file.rpartition(".")[2].lower() if "." in file else ""
-        others = {"wrz": cls.WRL}
-        known = {member.value: member for member in cls} | others
+        known = {member.value: member for member in cls}
         if suffix not in known:
             raise InputError(
                 f"{label(file)} has an unknown format. Use a file that ends in "
@@ -88,7 +84,7 @@ class Format(Enum):
         return known[suffix]
 
 
-SHAPE_SUFFIXES = (*(member.value for member in Format if member is not Format.ZIP), "wrz")
+SHAPE_SUFFIXES = tuple(member.value for member in Format if member is not Format.ZIP)
 """Suffixes of files with a shape."""
 
 Y_UP = (Format.WRL, Format.GLB, Format.GLTF)
@@ -248,7 +244,7 @@ def check_file(data: bytes, file: str, unit: float | None, format: Format) -> No
 def _read(data: bytes, format: Format, file: str, companions: Companions) -> MeshReading:
     match format:
         case Format.WRL:
-            return read_wrl(data, file, MAX_FILE_BYTES, companions)
+            return read_wrl(data, file, companions)
         case Format.STL:
             return read_stl(data, file)
         case Format.OBJ:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import posixpath
 import re
-import zlib
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -338,8 +337,8 @@ GZIP = b"\x1f\x8b"
 OTHER_WORLDS = re.compile(r"\s*<|#VRML V1\.0|#X3D")
 """Beginning of X3D in XML, of VRML 1.0, and of X3D in the encoding of VRML97."""
 
-SUFFIXES = (".wrl", ".wrz")
-"""Suffixes of worlds."""
+SUFFIX = ".wrl"
+"""Suffix of worlds."""
 
 GROUPS = ("Group", "Anchor", "Billboard", "Collision")
 """Kinds of groups whose children are all shown at their place."""
@@ -356,21 +355,20 @@ Shown = Callable[[tuple[str, ...]], MeshSurface | None]
 """A function that returns the surface of the first of several addresses that is there."""
 
 
-def read_wrl(data: bytes, name: str, maximum: int, companions: Companions) -> MeshReading:
+def read_wrl(data: bytes, name: str, companions: Companions) -> MeshReading:
     """Return all surfaces that are shown at first, in the world frame with y up.
 
-    ``maximum`` [bytes] limits the unpacked size of a compressed file. Raises InputError with the
-    line of an error.
+    Raises InputError with the line of an error.
     """
-    worlds = _Worlds(name, maximum, companions)
+    worlds = _Worlds(name, companions)
     return MeshReading(worlds.read(data, ""), tuple(worlds.left_out))
 
 
 class _Worlds:
     """The worlds of one upload: each is read once, with the worlds that it shows."""
 
-    def __init__(self, name: str, maximum: int, companions: Companions) -> None:
-        self._name, self._maximum, self._companions = name, maximum, companions
+    def __init__(self, name: str, companions: Companions) -> None:
+        self._name, self._companions = name, companions
         self.left_out: Counter[str] = Counter()
         self._surfaces: dict[str, MeshSurface] = {}
         self._open: list[str] = []
@@ -397,7 +395,7 @@ class _Worlds:
         if path in self._open:
             self.left_out["worlds that show themselves"] += 1
             return None
-        if not path.lower().endswith(SUFFIXES):
+        if not path.lower().endswith(SUFFIX):
             self.left_out[f"{posixpath.basename(path)}, which is not VRML"] += 1
             return None
         if path not in self._surfaces:
@@ -406,7 +404,7 @@ class _Worlds:
 
     def _text(self, data: bytes, name: str) -> str:
         if data.startswith(GZIP):
-            data = _unpacked(data, name, self._maximum)
+            raise InputError(f"{name} is compressed by gzip. Unpack it, or export it as GLB.")
         text = data.decode("utf-8", "replace").removeprefix("\ufeff")
         if OTHER_WORLDS.match(text):
             raise InputError(
@@ -415,19 +413,6 @@ class _Worlds:
         if not text.startswith("#VRML V2.0"):
             raise InputError(f"{name} is not VRML: it must begin with {HEADER!r}.")
         return text
-
-
-def _unpacked(data: bytes, name: str, maximum: int) -> bytes:
-    unpacker = zlib.decompressobj(wbits=16 + zlib.MAX_WBITS)
-    try:
-        content = unpacker.decompress(data, maximum + 1)
-    except zlib.error as error:
-        raise InputError(f"{name} is corrupt: {error}.") from error
-    if len(content) > maximum:
-        raise InputError(f"{name} has more than {maximum // 1_000_000} MB when unpacked.")
-    if not unpacker.eof:
-        raise InputError(f"{name} is corrupt: it ends too early.")
-    return content
 
 
 class _Flattening:
