@@ -100,7 +100,7 @@ def test_lines_have_rounded_corners_and_end_at_rest(stage: Stage) -> None:
 
 def test_a_timeline_agrees_with_the_run(stage: Stage, program: Program) -> None:
     timeline = Timeline.of(program)
-    (first, _), *_, (last, fingers) = timeline.postures(5)
+    (first, _), (last, fingers) = timeline.at(0.0), timeline.at(timeline.span)
     assert np.array_equal(first, program.start)
     _, states = stage.play(program, stage.begin())
     assert last == pytest.approx(states[-1].q, abs=1e-12)

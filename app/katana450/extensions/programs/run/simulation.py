@@ -301,10 +301,6 @@ class Timeline:
         begin, speed, segment, fingers = self.pieces[number]
         return segment.at(segment.scaling.tau_after(t - begin, speed)).q, fingers
 
-    def postures(self, count: int) -> list[tuple[FloatArray, float]]:
-        """Return ``count`` postures (joints and fingers [rad]), evenly spaced in time."""
-        return [self.at(t) for t in np.linspace(0.0, self.span, count).tolist()]
-
     def time_of(self, state: State, run: Run) -> float:
         """Return the time [s] of ``state`` on it, in which the program is at a task of ``run``."""
         task, first = self.schedule[run.number], self.firsts.get(run.number)

@@ -148,8 +148,6 @@ class ProgramsPanel:
         self._sent = self._sent_name = ""
         # Held while a program is requested: viser runs callbacks in other threads.
         self._order_lock = threading.Lock()
-        # Whether the program was requested by Preview, which also shows ghosts.
-        self._with_ghosts = False
         self._preview = Preview(server, robot, session)
         gui = server.gui
         self._arm = robot.require_arm()
@@ -234,7 +232,6 @@ class ProgramsPanel:
         if program is not self._drawn:
             self._drawn = program
             self._draw(program)
-            self._with_ghosts = self._with_ghosts and program is None
 
     def _follow_steps(self, progress: Progress | None) -> None:
         look = 0.0 if self._look.disabled else self._look.value
@@ -248,7 +245,7 @@ class ProgramsPanel:
     def _draw(self, program: Program | None) -> None:
         """Show the preview and the steps of ``program``."""
         self._steps = () if program is None else step_list.steps_of(program)
-        span = self._preview.show(program, self._state(), ghosts=self._with_ghosts)
+        span = self._preview.show(program, self._state())
         self._look.value = 0.0  # type: ignore[misc]  # viser declares it read-only
         self._look.disabled = span <= 0.0
         if span > 0.0:
@@ -279,7 +276,6 @@ class ProgramsPanel:
             self._access.steer(ORDERS[button], actor)
             return
         with self._order_lock:
-            self._with_ghosts = button == "Preview"
             self._access.plan(text, ORDERS.get(button), actor)
             # If the plan of this script was kept, `follow` draws it again.
             self._drawn = None

@@ -28,9 +28,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.flow import Water
 from katana450.maths.water.motion import MotionWithWater
-from katana450.server.view.scene import Colour, GhostNodes, Window, surface
+from katana450.server.view.scene import Colour, GhostNodes, Window
 from katana450.server.view.scene_objects import ObjectShape
-from katana450.server.viser_bridge.posing import arrange
 
 ROOT = "/path"
 """Node above all ghosts of a preview."""
@@ -140,16 +139,10 @@ TIME_STEP = 0.1
 """[s] Step of the slider that chooses a time of the preview, and resolution of shown durations."""
 
 COLOUR: Colour = (64, 156, 255)
-"""Colour of the path and of the ghosts."""
+"""Colour of the path."""
 
 PATH_SAMPLES = 60
 """Number of line segments with which the tool's path of one plan is drawn."""
-
-GHOSTS = 7
-"""Number of ghost postures along the whole program."""
-
-FAINT, CLEAR = 0.06, 0.26
-"""Opacities of the first and of the last ghost."""
 
 LOOK: Colour = (255, 153, 0)
 """Colour of the ghost at the slider's time."""
@@ -158,11 +151,10 @@ LOOK_OPACITY = 0.5
 
 
 class Preview:
-    """The path line, kept until the arm is driven after the run, and ghosts, kept until it runs.
+    """The path line, kept until the arm is driven after the run, and a ghost, kept until it runs.
 
-    The ghosts are sent when they are first shown: their shapes take up to a sixth of the page's
-    data. Objects and water are simulated in a thread, which takes a second for a minute of motion.
-    Until then a time shows the arm alone.
+    The ghost is sent when it is first shown. Objects and water are simulated in a thread, which
+    takes a second for a minute of motion. Until then a time shows the arm alone.
     """
 
     def __init__(
@@ -179,17 +171,16 @@ class Preview:
             thickness=0.002,
             visible=False,
         )
-        self._sweep: GhostSweep | None = None
         self._ghost: GhostNodes | None = None
         self._ghost_scene: GhostScene | None = None
         self._shown: _Shown | None = None
         # The slider's callback runs in a thread of viser.
         self._lock = threading.Lock()
 
-    def show(self, program: Program | None, state: State, *, ghosts: bool) -> float:
+    def show(self, program: Program | None, state: State) -> float:
         """Draw ``program``, which begins in ``state``; return its duration [s], 0 for nothing."""
         with self._lock:
-            self._hide_ghosts()
+            self._hide_ghost()
             self._shown = None
             arm = self._robot.require_arm()
             paths = [] if program is None else _tool_paths(arm, program, state.tool)
@@ -201,11 +192,6 @@ class Preview:
             if program is None or timeline is None or not timeline.pieces or program.first:
                 return 0.0
             self._shown = _Shown(program, timeline, state)
-            if ghosts:
-                if self._sweep is None:
-                    self._sweep = GhostSweep(self._server, self._robot)
-                self._sweep.show(self._shown.timeline)
-                self._simulate(self._shown)
             return self._shown.timeline.span
 
     def look(self, t: float) -> None:
@@ -232,9 +218,9 @@ class Preview:
                 self._ghost_scene.hide()
 
     def begin(self) -> None:
-        """Hide the ghosts, because the program runs and the arm itself shows it."""
+        """Hide the ghost, because the program runs and the arm itself shows it."""
         with self._lock:
-            self._hide_ghosts()
+            self._hide_ghost()
             self._shown = None
 
     def end(self) -> None:
@@ -271,11 +257,6 @@ class Preview:
         if self._ghost_scene is None:
             self._ghost_scene = GhostScene(self._server, LOOK, LOOK_OPACITY)
         return self._ghost_scene
-
-    def _hide_ghosts(self) -> None:
-        if self._sweep is not None:
-            self._sweep.hide()
-        self._hide_ghost()
 
     def _hide_ghost(self) -> None:
         if self._ghost is not None:
@@ -322,53 +303,6 @@ class _Shown:
         if not 0 < number <= len(self.moments) or t > self.moments[-1].t + TIME_STEP:
             return None
         return self.moments[number - 1].state
-
-
-class GhostSweep:
-    """The arm in several postures at once. Each shape is sent once; opacity grows with time."""
-
-    def __init__(self, server: viser.ViserServer, robot: Robot) -> None:
-        """Add the hidden shapes of ``robot`` to the scene."""
-        self._robot = robot
-        self._root = server.scene.add_frame("/path/sweep", show_axes=False, visible=False)
-        identity_poses = np.tile((1.0, 0.0, 0.0, 0.0), (GHOSTS, 1)), np.zeros((GHOSTS, 3))
-        self._nodes: list[tuple[str, viser.BatchedMeshHandle]] = [
-            (
-                link.name,
-                server.scene.add_batched_meshes_simple(
-                    f"/path/sweep/{link.name}{number}",
-                    *surface(visual),
-                    *identity_poses,
-                    batched_colors=COLOUR,
-                    batched_opacities=np.linspace(FAINT, CLEAR, GHOSTS),
-                    # Levels of detail would take the browser long to compute.
-                    lod="off",
-                    opacity=1.0,
-                    cast_shadow=False,
-                    receive_shadow=False,
-                ),
-            )
-            for link in robot.links
-            for number, visual in enumerate(link.visuals)
-            if link.name in robot.moving
-        ]
-
-    def show(self, timeline: Timeline) -> None:
-        """Show postures of ``timeline``, evenly spaced in time from start to end."""
-        placed = [
-            self._robot.frames(self._robot.joint_values(*posture))
-            for posture in timeline.postures(GHOSTS)
-        ]
-        for name, node in self._nodes:
-            poses = np.array([posture[name] for posture in placed])
-            wxyzs = np.array([so3.to_quaternion(T[:3, :3]) for T in poses], dtype=np.float32)
-            arrange(node, wxyzs, np.ascontiguousarray(poses[:, :3, 3], dtype=np.float32))
-        self._root.visible = True
-
-    def hide(self) -> None:
-        """Hide all postures."""
-        if self._root.visible:
-            self._root.visible = False
 
 
 def _tool_paths(arm: MountedArm, program: Program, tool: str) -> list[FloatArray]:
