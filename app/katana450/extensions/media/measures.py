@@ -15,7 +15,6 @@ import numpy as np
 
 from katana450.arm.control.arm import ArmModel
 from katana450.extensions.programs.building.actions import FollowPlan, Task
-from katana450.extensions.programs.planning.curve_path import PosePath, ToolPath
 from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.script.measures import motion_measures, water_measures
@@ -24,7 +23,6 @@ from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import CurvePath, joint_derivatives, point_derivatives
 from katana450.maths.water.motion import MotionWithWater
@@ -99,7 +97,7 @@ def alongs(program: Program, trace: Trace) -> tuple[PathTrace, ...]:
             continue
         for segment in task.action.plan.segments:
             path = segment.path
-            if isinstance(path, ToolPath | PosePath) and id(path) not in traces:
+            if isinstance(path, CurvePath) and id(path) not in traces:
                 traces[id(path)] = _along(task.name, path)
     return tuple(traces.values())
 
@@ -170,27 +168,13 @@ def bounds(script: Script, values: dict[str, float | None]) -> tuple[Bound, ...]
     )
 
 
-def _along(name: str, path: ToolPath | PosePath) -> PathTrace:
+def _along(name: str, path: CurvePath) -> PathTrace:
     sigma = np.linspace(0.0, 1.0, PATH_SAMPLES + 1)
     q = joint_derivatives(path, sigma)[0]
     traced = np.array([_point(path, posture) for posture in q])
     return PathTrace(
-        name, sigma, point_derivatives(path, sigma)[0], traced, _turned(path, sigma, q)
+        name, sigma, point_derivatives(path, sigma)[0], traced, path.turned_off(sigma, q)
     )
-
-
-def _turned(path: ToolPath | PosePath, sigma: FloatArray, q: FloatArray) -> FloatArray:
-    """Return the errors (N,) [rad] of the orientation of the tool at joint angles `q` (N, n)."""
-    if isinstance(path, PosePath):
-        return path.turned_off(sigma, q)
-    tool = path.curve.at(Jet.variable(sigma))
-    pitch, roll = (np.broadcast_to(part.c0, sigma.shape) for part in tool[3:5])
-    targets = [ToolTarget.at(path.chain, posture) for posture in q]
-    off = [
-        (target.pitch - pitch[number], target.roll - roll[number])
-        for number, target in enumerate(targets)
-    ]
-    return np.array([max(abs(math.remainder(angle, math.tau)) for angle in pair) for pair in off])
 
 
 def path_at(program: Program, trace: Trace, tick: int) -> CurvePath | None:

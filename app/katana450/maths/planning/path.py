@@ -66,6 +66,10 @@ class CurvePath:
         """Return the joint angles [rad] at `sigma`, one place or many (N,)."""
         raise NotImplementedError
 
+    def turned_off(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the angles (N,) [rad] between the tool at `q` (N, n) and at ``sigma`` (N,)."""
+        raise NotImplementedError
+
     @cached_property
     def start(self) -> FloatArray:
         """The joint angles (n,) [rad] at the start."""

@@ -33,6 +33,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import nearest_posture
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import pitch_and_roll
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.maths.planning.jet import Coefficient, Jet
 from katana450.maths.planning.path import CurvePath, joint_derivatives
@@ -106,6 +107,15 @@ class ToolPath(CurvePath):
             joints.append(q + turns * math.tau if np.any(turns) else q)
         one, two, three, four, five = joints
         return one, two, three, four, five
+
+    def turned_off(self, sigma: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the largest errors (N,) [rad] of pitch and roll at `q` (N, n)."""
+        tool = self.curve.at(Jet.variable(sigma))
+        wanted = np.stack([np.broadcast_to(jet.c0, sigma.shape) for jet in tool[3:5]], axis=1)
+        reached = np.array([pitch_and_roll(self.chain, posture) for posture in q])
+        off = reached - wanted
+        errors: FloatArray = np.abs(off - math.tau * np.rint(off / math.tau)).max(axis=1)
+        return errors
 
     def _in_turn(self, q: FloatArray) -> FloatArray:
         """Return the angles `q` (5,) [rad], known up to whole turns, as the path starts at them."""
