@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +30,7 @@ from katana450.extensions.recording.files.simulation import (
     verify_recording,
 )
 from katana450.extensions.recording.messages import COMMANDS, STATE
-from katana450.extensions.recording.run_again.again_command import part_and_script, path_difference
+from katana450.extensions.recording.run_again.again_command import script_of_part
 from katana450.extensions.recording.run_again.again_script import (
     RecordedPart,
     again_script,
@@ -58,7 +57,20 @@ def dragged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def read(path: Path, start: float = 0.0, end: float = math.inf) -> tuple[RecordedPart, str]:
     with RecordingFile.open(path) as file:
-        return part_and_script(file, described(), start, end)
+        part = read_part(file, start, end)
+        return part, script_of_part(file, described(), start, end)
+
+
+def distance(part: RecordedPart, run_: FloatArray) -> float:
+    """Return the largest distance [rad] of a recorded setpoint from the path of a run (M, 5)."""
+    steps = np.diff(run_, axis=0)
+    squared = np.maximum((steps * steps).sum(axis=1), np.finfo(float).tiny)
+    largest = 0.0
+    for setpoint in part.setpoint:
+        fraction = np.clip(((setpoint - run_[:-1]) * steps).sum(axis=1) / squared, 0.0, 1.0)
+        nearest = run_[:-1] + fraction[:, None] * steps
+        largest = max(largest, float(np.abs(nearest - setpoint).max(axis=1).min()))
+    return largest
 
 
 def planned(text: str, begin: State | None = None) -> Planned:
@@ -69,34 +81,12 @@ def test_drag_runs_again_within_a_tenth_of_a_milliradian(dragged: Path) -> None:
     part, text = read(dragged)
     plan = planned(text)
     trace = run_by_clock(plan).trace
-    found = path_difference(part.setpoint, trace.t, trace.q)
-    assert 1e-7 < found.joints < TOLERANCE
-    # Limits and starts from rest make it slower, but not by much.
-    assert part.duration < found.duration < 2.0 * part.duration
+    assert 1e-7 < distance(part, trace.q) < TOLERANCE
+    # Limits, and the way to the start, make it slower, but not by much.
+    assert part.duration < trace.t[-1] < 2.5 * part.duration
     limits = plan.robot.require_arm().limits
     assert (np.abs(np.diff(trace.q, axis=0)) / 0.01 <= 1.001 * limits.speed).all()
     assert (np.abs(np.diff(trace.q, 2, axis=0)) / 1e-4 <= 1.001 * limits.acceleration).all()
-
-
-@pytest.mark.parametrize(("axis", "angle", "speed"), [(0, 0.6, 1.0), (2, 0.05, 1.0), (0, 0.5, 0.3)])
-def test_straight_motion_takes_its_recorded_time(
-    tmp_path: Path, axis: int, angle: float, speed: float
-) -> None:
-    goal = np.array(described().session.ready)
-    goal[axis] += angle
-
-    def commands(tick: int, _: State) -> Iterator[cmd.Command]:
-        if tick == 5:
-            yield cmd.Speed(speed)
-        elif tick == 10:
-            yield cmd.Joints(goal)
-
-    path = record_session(tmp_path / "straight.mcap", 600, commands)
-    part, text = read(path)
-    trace = run_by_clock(planned(text)).trace
-    found = path_difference(part.setpoint, trace.t, trace.q)
-    assert found.joints < 1e-7
-    assert 0.9 * part.duration < found.duration <= 1.1 * part.duration
 
 
 def test_rests_are_kept(dragged: Path) -> None:
@@ -108,21 +98,6 @@ def test_rests_are_kept(dragged: Path) -> None:
     assert waits[0] > 0.2
 
 
-def test_command_prints_the_difference(
-    dragged: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = tmp_path / "again.yaml"
-    options = ["--from", "0.5", "--to", "2", "--out", str(out)]
-    assert main(["record", "again", str(dragged), "--headless", *options]) == 0
-    printed = capsys.readouterr().out
-    assert "1.50 s of motion from 0.50 s to 2.00 s." in printed
-    match = re.search(r"recorded setpoints: (\S+) rad. It took (\S+) s, recorded 1.50 s.", printed)
-    assert match is not None, printed
-    assert 0.0 < float(match[1]) < TOLERANCE
-    assert "Limits of the joints and the tool make it slower" in printed
-    assert parse(out.read_text(encoding="utf-8")).name == "Again drag.mcap"
-
-
 def test_part_begins_at_the_recorded_posture(dragged: Path) -> None:
     part, _ = read(dragged, 1.0, 1.8)
     whole, _ = read(dragged)
@@ -132,12 +107,8 @@ def test_part_begins_at_the_recorded_posture(dragged: Path) -> None:
     assert part.t[-1] == pytest.approx(1.8, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("disturbance", "curved"), [pytest.param("pause", 2, marks=pytest.mark.long), ("stop", 1)]
-)
-def test_pause_or_stop_in_the_middle_is_left_out(
-    tmp_path: Path, disturbance: str, curved: int
-) -> None:
+@pytest.mark.parametrize("disturbance", [pytest.param("pause", marks=pytest.mark.long), "stop"])
+def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: str) -> None:
     """The arm brakes where it was disturbed, and continues at once."""
     begin: cmd.Command = cmd.Pause()
     end: cmd.Command = cmd.Resume()
@@ -146,24 +117,19 @@ def test_pause_or_stop_in_the_middle_is_left_out(
     at = {120: begin, 420: end, 430: cmd.Position(np.array((0.33, 0.05, 0.08)))}
     path = record_session(tmp_path / "disturbed.mcap", 700, drag(120, at))
     part, text = read(path)
-    assert part.waited > 1.5
     trace = run_by_clock(planned(text)).trace
-    found = path_difference(part.setpoint, trace.t, trace.q)
-    assert found.joints < TOLERANCE
+    assert distance(part, trace.q) < TOLERANCE
     assert sum(float(each) for each in re.findall(r"wait: ([\d.]+)", text)) < 0.3
-    # After a stop the second part is straight in the joints. After a pause the drag continues until
-    # it gets another target, which is a curve.
-    assert (text.count("trajectory:"), text.count("- joints:")) == (curved, 3 - curved)
     # The time of the pause is not in the recorded time either.
-    assert part.duration + part.waited == pytest.approx(part.t[-1], abs=0.1)
-    assert found.duration < 2.0 * part.duration
+    assert part.t[-1] - part.duration > 1.5
+    assert trace.t[-1] < 2.5 * part.duration
 
 
 def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
     steps = "  - grasp: cup\n  - line: {by: {z: 60}}\n  - nudge: {axis: 1, by: 10}\n"
     path = record_session(tmp_path / "grasp.mcap", 1500, program(f"frame: base\nsteps:\n{steps}"))
     part, text = read(path)
-    assert "gripper: {holding: cup, to: closed}" in text
+    assert "gripper: {to: closed, holding: cup}" in text
     simulation = run_by_clock(planned(text))
     last = simulation.states[-1]
     assert last.held is not None
@@ -263,7 +229,7 @@ def test_damaged_message_is_refused_in_words(
 
 
 def test_other_robot_is_refused(dragged: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["record", "again", str(dragged), "--headless", "--urdf", str(GANTRY)]) == 1
+    assert main(["record", "again", str(dragged), "--urdf", str(GANTRY)]) == 1
     assert "not of" in capsys.readouterr().err
     with RecordingFile.open(dragged) as file, pytest.raises(InputError, match="not of"):
         session_for(file, GANTRY)
@@ -291,7 +257,7 @@ def test_recording_of_a_run_is_verified_and_runs_again(dragged: Path, tmp_path: 
     assert result.identical, str(result)
     part, again = read(path)
     trace = run_by_clock(planned(again)).trace
-    assert path_difference(part.setpoint, trace.t, trace.q).joints < TOLERANCE
+    assert distance(part, trace.q) < TOLERANCE
 
 
 def moved(*pieces: FloatArray) -> RecordedPart:
@@ -309,9 +275,9 @@ def test_motions_below_the_rounding_are_left_out() -> None:
     up, rest = np.linspace(0.0, 0.1, 50), np.full(30, 0.1)
     tiny = 0.1 + np.linspace(1e-9, 4e-6, 20)
     part = moved(up, rest, tiny, np.full(30, tiny[-1]), tiny[-1] - up)
-    text = again_script(part, described().session.require_arm())
-    assert re.findall(r"- (\w+):", text) == [
-        "joints", "gripper", "joints", "wait", "wait", "joints",
+    text = again_script(part, described().session.require_arm().gripper)
+    assert re.findall(r"- {?(\w+):", text) == [
+        "joints", "gripper", "trajectory", "wait", "wait", "trajectory",
     ]  # fmt: skip
     program_ = planned(text).program
     assert not any("approach" in task.name for task in program_.tasks)
@@ -319,31 +285,13 @@ def test_motions_below_the_rounding_are_left_out() -> None:
 
 def test_part_with_too_much_motion_is_refused_and_a_long_one_is_coarser() -> None:
     t = np.arange(0.0, 60.0, 0.01)
-    arm = described().session.require_arm()
+    gripper = described().session.require_arm().gripper
     slow = 0.05 * np.sin(4.4 * t)
     with pytest.raises(InputError, match="60 s with too much motion for one script"):
-        again_script(moved(slow + 0.02 * np.sin(31.0 * t)), arm)
+        again_script(moved(slow + 0.02 * np.sin(31.0 * t)), gripper)
     part = moved(slow + 0.02 * np.sin(18.0 * t))
-    text = again_script(part, arm).split("through:")[1]
+    text = again_script(part, gripper).split("through:")[1]
     rows = np.array(re.findall(r"\[([\d.]+), (\S+),", text), dtype=float)
     spline = CubicSpline(rows[:, 0], np.radians(rows[:, 1:]))
     off = np.abs(spline.values_at(part.t)[:, 0] - part.setpoint[:, 0]).max()
     assert 1e-4 < off < 3.1e-4
-
-
-def test_difference_is_that_of_the_paths() -> None:
-    s = np.linspace(0.0, 1.0, 400)
-    recorded = np.stack((s, np.sin(3.0 * s), s**2), axis=1)
-    slow = np.sort(np.concatenate((s, s**2, np.full(50, 0.5))))
-    run_ = np.stack((slow, np.sin(3.0 * slow), slow**2), axis=1)
-    approach = np.linspace(recorded[0] - 1.0, recorded[0], 30)
-    t = np.linspace(0.0, 0.01 * (len(approach) + len(run_) - 1), len(approach) + len(run_))
-    same = path_difference(recorded, t, np.concatenate((approach, run_)))
-    assert same.joints < 2e-5
-    assert same.duration == pytest.approx(0.01 * (len(run_) - 1), abs=0.03)
-    other = run_ + 1e-3 * np.sin(9.0 * slow)[:, None] * (0.0, 1.0, 0.0)
-    off = path_difference(recorded, t, np.concatenate((approach, other))).joints
-    assert 3e-4 < off <= 1e-3
-    # A run that leaves the second half out.
-    half = path_difference(recorded, t, np.concatenate((approach, run_[: len(run_) // 2])))
-    assert half.joints > 0.1

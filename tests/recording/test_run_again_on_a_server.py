@@ -71,11 +71,6 @@ def test_recorded_drag_runs_again(
     assert main(["record", "again", str(recorded), "--url", server.url]) == 0
     printed = capsys.readouterr().out
     assert "Again drag.mcap: " in printed
-    found = re.search(r"recorded setpoints: (\S+) rad. It took (\S+) s, recorded (\S+) s", printed)
-    assert found is not None, printed
-    assert 0.0 < float(found[1]) < 1e-3
-    # It drives to the start first. How long that takes depends on the load of the machine.
-    assert float(found[3]) < float(found[2])
     with katana450.connect(server.url, "Ada") as client:
         end = client.query(answers.State).q
     assert np.abs(katana450.open(recorded).setpoint[-1] - end).max() < 1e-6

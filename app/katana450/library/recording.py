@@ -29,7 +29,7 @@ from katana450.extensions.recording.files.simulation import (
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
 from katana450.extensions.recording.run_again.again_command import (
-    part_and_script,
+    script_of_part,
 )
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
@@ -225,7 +225,7 @@ class Recording:
         """
         with RecordingFile.open(self.path) as file:
             robot = session_for(file, None if urdf is None else Path(urdf))
-            return part_and_script(file, robot, start, end)[1]
+            return script_of_part(file, robot, start, end)
 
     def score(
         self,

@@ -14,8 +14,6 @@ MIN_SPEED = 0.01
 
 FORMATS = {
     "csv": "t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it",
-    "mcap": "a recording",
-    "parquet": "the columns of csv in a Parquet file",
     "rosbag2": "a folder that ROS 2 plays as a bag",
     "lerobot": "a folder that LeRobot reads as a dataset, version 3.0",
     "html": "a page that plays it",
@@ -98,11 +96,8 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     verify.add_argument("file", type=Path, metavar="FILE")
     _add_urdf_option(verify)
     verify.add_argument("--json", action="store_true", help="print the result as JSON")
-    again = acts.add_parser("again", help="drive an arm along a recorded motion, or simulate it")
+    again = acts.add_parser("again", help="drive an arm along a recorded motion")
     again.add_argument("file", type=Path, metavar="FILE")
-    again.add_argument(
-        "--headless", action="store_true", help="simulate it in the recorded scene, without server"
-    )
     again.add_argument(
         "--out", type=Path, metavar="FILE", help="write the script instead of running it"
     )
@@ -112,11 +107,6 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     again.add_argument("--url", default=URL, help="address of the server (default: %(default)s)")
     again.add_argument(
         "--token", default="", help="token of an access link, if the server needs one"
-    )
-    again.add_argument(
-        "--unattended",
-        action="store_true",
-        help="let it run on when this command is ended or loses its connection",
     )
     _add_urdf_option(again)
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")

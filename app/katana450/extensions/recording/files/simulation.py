@@ -12,14 +12,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
 
-from katana450.arm.control.modes import IDLE
 from katana450.arm.control.session import Session
 from katana450.arm.control.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
@@ -48,7 +46,6 @@ from katana450.extensions.recording.ticks import (
     check_fits,
     tick_input,
 )
-from katana450.maths.motion.limiter import JointMotion
 from katana450.portable_rounding import ROUNDS_PORTABLY, can_round_portably, portable_rounding
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
@@ -317,13 +314,3 @@ def recorded_states(
         yield state
     if waiting is not None:
         yield waiting
-
-
-def at_rest(state: State) -> State:
-    """Return ``state`` with the arm at rest, in no mode and not stopped, at the time 0."""
-    rest = JointMotion.rest(state.setpoint)
-    return replace(
-        state, t=0.0, stopped=None, paused=False, blocked=False, findings=(), mode=IDLE,
-        motion=rest, goal=rest.q, q=rest.q, gripper=state.gripper_setpoint,
-        gripper_goal=state.gripper_setpoint, outcomes=(), presses=(), speed=1.0,
-    )  # fmt: skip

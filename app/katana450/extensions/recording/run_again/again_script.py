@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.session import TOOL_SPEED
+from katana450.arm.control.gripper_model import GripperModel
 from katana450.arm.control.state import Status
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import MAX_BYTES, MAX_VALUES
@@ -26,10 +25,6 @@ from katana450.extensions.recording.files.simulation import check_whole
 from katana450.extensions.recording.files.table import rows_from
 from katana450.extensions.recording.messages import StateRow
 from katana450.maths.geometry.arrays import FloatArray, IntArray, finite_array
-from katana450.maths.planning.joint_path import JointPath
-from katana450.maths.planning.pacing import fastest
-from katana450.maths.planning.scaling import Bounds
-from katana450.server.api.program_requests import SLOWEST_SPEED
 
 WAITING = (Status.PAUSED.value, Status.STOPPED.value)
 """Statuses of an arm that somebody has paused or stopped."""
@@ -68,11 +63,6 @@ class RecordedPart:
         """Flags (N - 1,) of the states from which on nothing moves until the next one."""
         moved = np.abs(np.diff(self.setpoint, axis=0)).max(axis=1) > 0.0
         return np.asarray(~(moved | (np.diff(self.fingers) != 0.0)))
-
-    @property
-    def waited(self) -> float:
-        """The time for which the arm stood paused or stopped [s]."""
-        return float(np.diff(self.t)[self.rests & self.waiting[:-1]].sum())
 
     @property
     def duration(self) -> float:
@@ -184,12 +174,6 @@ FIRST_SPACING = 0.2
 TIME_DIGITS, ANGLE_DIGITS, EXACT_DIGITS = 5, 6, 8
 """Decimals of times [s] and angles [deg] in a trajectory, and of single numbers."""
 
-SIMILAR = 0.9
-"""[1] Fraction of a time from which on a motion takes about that time."""
-
-HALVINGS = 40
-"""Number of halvings that find a speed."""
-
 EVENTS_OF_ROW = 3
 """YAML events of a posture, beside those of its angles."""
 
@@ -201,29 +185,11 @@ class Motion(NamedTuple):
     last: int
 
 
-class FingerMotion(NamedTuple):
-    """The fingers move to ``angle`` [rad or m]; ``holding``: object that they hold then."""
-
-    angle: float
-    holding: str
+Step = dict[str, Any]
+"""A step as a script has it."""
 
 
-class Rest(NamedTuple):
-    """The arm rests for ``seconds`` [s]."""
-
-    seconds: float
-
-
-class ToolFrame(NamedTuple):
-    """The tool frame ``name`` is chosen."""
-
-    name: str
-
-
-Piece = Motion | FingerMotion | Rest | ToolFrame
-
-
-def again_script(part: RecordedPart, arm: ArmModel, *, bare: bool = False) -> str:
+def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = False) -> str:
     """Return the script that moves to the start of ``part`` and then as recorded.
 
     Rests are kept, except those in which the arm was paused or stopped. Where the fingers moved
@@ -231,7 +197,7 @@ def again_script(part: RecordedPart, arm: ArmModel, *, bare: bool = False) -> st
 
     Args:
         part: the recorded motion.
-        arm: the arm.
+        gripper: the gripper of the arm.
         bare: whether the gripper was taken off the arm.
 
     Raises:
@@ -242,10 +208,10 @@ def again_script(part: RecordedPart, arm: ArmModel, *, bare: bool = False) -> st
             f"The hand holds {part.held[0]} at the start of this part. Begin before it is grasped, "
             "by --from."
         )
-    pieces = tuple(pieces_of(part))
+    pieces = tuple(pieces_of(part, gripper))
     of_row = EVENTS_OF_ROW + part.setpoint.shape[1]
     for tolerance in TOLERANCES:
-        steps = list(_steps(part, pieces, tolerance, arm))
+        steps = [*_to_start(part, gripper), *_steps(part, pieces, tolerance)]
         counts = [len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each]
         events = of_row * (sum(counts) + len(steps) + 5)
         text = _text(part, steps, bare=bare)
@@ -262,8 +228,8 @@ def again_script(part: RecordedPart, arm: ArmModel, *, bare: bool = False) -> st
     )
 
 
-def pieces_of(part: RecordedPart) -> Iterator[Piece]:
-    """Yield motions of the arm, motions of the fingers and rests, in their order."""
+def pieces_of(part: RecordedPart, gripper: GripperModel) -> Iterator[Motion | Step]:
+    """Yield motions of the arm, and steps of fingers, rests and tool frames, in their order."""
     moves = np.abs(np.diff(part.setpoint, axis=0)).max(axis=1) > 0.0
     for first, last in _runs(~moves):
         inside = first > 0 and last < len(moves)
@@ -281,10 +247,10 @@ def pieces_of(part: RecordedPart) -> Iterator[Piece]:
     busy = 0.0
     for first, last in pairwise(edges):
         if first in chosen:
-            yield ToolFrame(chosen[first])
+            yield {"tool": chosen[first]}
         if first in begins:
             end = begins[first]
-            yield FingerMotion(float(part.fingers[end]), part.held[end])
+            yield _fingers(part, end, gripper)
             busy = float(part.t[end])
         if moves[first]:
             if float(np.ptp(part.setpoint[first : last + 1], axis=0).max()) > MIN_MOTION:
@@ -293,9 +259,17 @@ def pieces_of(part: RecordedPart) -> Iterator[Piece]:
             # Rests before the first motion and after the last are left out.
             seconds = _rest(part, first, last, busy)
             if seconds > 0.0:
-                yield Rest(seconds)
+                yield {"wait": round(seconds, TIME_DIGITS)}
     if len(part.t) - 1 in begins:
-        yield FingerMotion(float(part.fingers[-1]), part.held[-1])
+        yield _fingers(part, -1, gripper)
+
+
+def _fingers(part: RecordedPart, number: int, gripper: GripperModel) -> Step:
+    """Return the step that moves the fingers to where they are in the state ``number``."""
+    if part.held[number]:
+        return {"gripper": {"to": "closed", "holding": part.held[number]}}
+    scale = 1e3 if gripper.slides else math.degrees(1.0)
+    return {"gripper": round(scale * float(part.fingers[number]), EXACT_DIGITS)}
 
 
 def _rest(part: RecordedPart, first: int, last: int, busy: float) -> float:
@@ -325,70 +299,32 @@ def _merged(t: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]
     return found
 
 
-def _steps(
-    part: RecordedPart, pieces: tuple[Piece, ...], tolerance: float, arm: ArmModel
-) -> Iterator[dict[str, Any]]:
-    """Yield the steps of the script."""
-    end: list[float] = []
-    gripper = arm.gripper
-    scale = 1e3 if gripper.slides else math.degrees(1.0)
+def _to_start(part: RecordedPart, gripper: GripperModel) -> Iterator[Step]:
+    """Yield the steps to the first state."""
     yield {"joints": _degrees(part.setpoint[0], EXACT_DIGITS)}
     if gripper.moves:
-        yield {"gripper": round(scale * float(part.fingers[0]), EXACT_DIGITS)}
+        yield _fingers(part, 0, gripper)
+
+
+def _steps(
+    part: RecordedPart, pieces: tuple[Motion | Step, ...], tolerance: float
+) -> Iterator[Step]:
+    """Yield ``pieces`` as steps, within ``tolerance`` [rad] of the setpoints."""
+    end: list[float] = []
     for piece in pieces:
-        match piece:
-            case ToolFrame(name=name):
-                yield {"tool": name}
-            case Rest(seconds=seconds):
-                yield {"wait": round(seconds, TIME_DIGITS)}
-            case FingerMotion(angle=angle, holding=holding) if holding:
-                yield {"gripper": {"to": "closed", "holding": holding}}
-            case FingerMotion(angle=angle):
-                yield {"gripper": round(scale * angle, EXACT_DIGITS)}
-            case Motion(first=first, last=last):
-                t, q = part.t[first : last + 1], part.setpoint[first : last + 1]
-                if is_straight(q, tolerance):
-                    end = _degrees(q[-1], ANGLE_DIGITS)
-                    speed = round(straight_speed(q, t[-1] - t[0], arm), TIME_DIGITS)
-                    if speed < 1.0:
-                        yield {"speed": speed}
-                    yield {"joints": end}
-                    if speed < 1.0:
-                        yield {"speed": 1.0}
-                    continue
-                chosen = postures(t, q, tolerance)
-                rows = [
-                    [round(float(at), TIME_DIGITS), *_degrees(each, ANGLE_DIGITS)]
-                    for at, each in zip(t[chosen], q[chosen], strict=True)
-                ]
-                # After motions that were left out, the difference is far below the tolerance.
-                rows[0][1:] = end or rows[0][1:]
-                end = rows[-1][1:]
-                yield {TRAJECTORY: {"through": rows}}
-
-
-def is_straight(q: FloatArray, tolerance: float) -> bool:
-    """Return whether the setpoints ``q`` (N, n) [rad] are a straight line that never turns back."""
-    line = q[-1] - q[0]
-    along = (q - q[0]) @ line / (line @ line) if line.any() else np.zeros(len(q))
-    off = np.abs(q - q[0] - np.outer(along, line)).max()
-    return bool(line.any() and off <= tolerance and np.diff(along).min() >= -REST_TOLERANCE)
-
-
-def straight_speed(q: FloatArray, seconds: float, arm: ArmModel) -> float:
-    """Return the fraction of full speed at which a straight motion takes ``seconds`` [s].
-
-    ``q``: (N, n) its setpoints [rad]. 1 for about the shortest time.
-    """
-    path = JointPath(arm.chain, np.stack((q[0], q[-1])), np.zeros(0))
-    scaling = fastest(path, Bounds(arm.limits, TOOL_SPEED))
-    if scaling.duration > SIMILAR * seconds:
-        return 1.0
-    low, high = SLOWEST_SPEED, 1.0
-    for _ in range(HALVINGS):
-        speed = 0.5 * (low + high)
-        low, high = (speed, high) if scaling.duration_at(speed) > seconds else (low, speed)
-    return high
+        if isinstance(piece, dict):
+            yield piece
+            continue
+        t, q = (rows[piece.first : piece.last + 1] for rows in (part.t, part.setpoint))
+        chosen = postures(t, q, tolerance)
+        rows = [
+            [round(float(time), TIME_DIGITS), *_degrees(posture, ANGLE_DIGITS)]
+            for time, posture in zip(t[chosen], q[chosen], strict=True)
+        ]
+        # After motions that were left out, the difference is far below the tolerance.
+        rows[0][1:] = end or rows[0][1:]
+        end = rows[-1][1:]
+        yield {TRAJECTORY: {"through": rows}}
 
 
 def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
@@ -422,7 +358,7 @@ def _degrees(q: FloatArray, digits: int) -> list[float]:
     return [round(each, digits) + 0.0 for each in np.degrees(q).tolist()]
 
 
-def _text(part: RecordedPart, steps: list[dict[str, Any]], *, bare: bool) -> str:
+def _text(part: RecordedPart, steps: list[Step], *, bare: bool) -> str:
     name = "".join(each for each in f"Again {part.name}" if each.isprintable())
     about = (
         f"{part.name}, {part.t[0]:.2f} to {part.t[-1]:.2f} s, run again. Times are those of the "
@@ -430,23 +366,11 @@ def _text(part: RecordedPart, steps: list[dict[str, Any]], *, bare: bool) -> str
     )
     head = {"name": name[:MAX_NAME_LENGTH], "about": about, "tool": part.tools[0]}
     head |= {"gripper": "none"} if bare else {}
-    lines = [yaml.safe_dump(head, sort_keys=False, allow_unicode=True, width=100), "steps:\n"]
-    for step in steps:
-        ((kind, value),) = step.items()
-        if kind == TRAJECTORY:
-            lines.append(f"- {TRAJECTORY}:\n    through:\n")
-            lines += [f"    - {_flow(row)}\n" for row in value["through"]]
-        else:
-            lines.append(f"- {kind}: {_flow(value)}\n")
-    return "".join(lines)
-
-
-def _flow(value: Any) -> str:
-    """Return ``value`` on one line of YAML."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_flow, value))}]"
-    if isinstance(value, float):
-        # YAML takes 1e-06 for a text; such an angle is 0 within the digits.
-        return f"{value:.{EXACT_DIGITS}f}".rstrip("0").rstrip(".")
-    text: str = yaml.safe_dump(value, default_flow_style=True, width=10_000)
-    return text.removesuffix("...\n").strip()
+    text: str = yaml.safe_dump(
+        head | {"steps": steps},
+        sort_keys=False,
+        default_flow_style=None,
+        allow_unicode=True,
+        width=100,
+    )
+    return text
