@@ -2,7 +2,7 @@
 import { html, svg } from "../instruments/shape.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-const EXPORTS = [["csv", "CSV table"], ["parquet", "Parquet table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
+const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 /** @param {keyof typeof ICONS} name */

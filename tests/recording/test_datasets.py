@@ -1,15 +1,13 @@
-"""Exports of recordings as Parquet files and as LeRobot datasets without pictures."""
+"""Exports of recordings as LeRobot datasets without pictures."""
 
 from __future__ import annotations
 
-import csv
 import json
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -56,26 +54,9 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str | Path) -> str:
     return capsys.readouterr().err
 
 
-def test_parquet_has_the_columns_of_csv_with_units(run: Path, tmp_path: Path) -> None:
-    part = ("--from", "0.5", "--to", "2")
-    table, text = tmp_path / "run.parquet", tmp_path / "run.csv"
-    assert export(run, "--format", "parquet", "--out", table, *part) == 0
-    assert export(run, "--format", "csv", "--out", text, *part) == 0
-    found = pq.read_table(table)
-    with text.open() as opened:
-        names, *rows = csv.reader(opened)
-    assert found.schema.names == names
-    np.testing.assert_array_equal(
-        np.column_stack([found[name] for name in names]), np.array(rows, dtype=float)
-    )
-    units = [found.schema.field(name).metadata[b"unit"] for name in names]
-    assert units == [b"s", *[b"rad"] * 6]
-    assert found.schema.metadata[b"robot"] == b"katana450"
-
-
 @pytest.mark.parametrize(
     ("kind", "library"),
-    [("parquet", "pyarrow"), ("lerobot", "pyarrow"), ("rosbag2", "rosbags")],
+    [("lerobot", "pyarrow"), ("rosbag2", "rosbags")],
 )
 def test_missing_library_is_reported(
     run: Path,

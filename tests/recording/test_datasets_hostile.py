@@ -15,7 +15,6 @@ import pytest
 from katana450.cli.main import main
 from katana450.errors import KatanaError
 from katana450.extensions.recording.datasets.lerobot_export import LerobotOptions, export_lerobot
-from katana450.extensions.recording.datasets.parquet_table import write_parquet
 from katana450.extensions.recording.datasets.ros_bag import write_bag
 from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
@@ -81,7 +80,6 @@ def exports(path: Path, out: Path) -> None:
         times = np.linspace(file.start, min(file.end, file.start + 1.0), 5)
         for work in (
             lambda: write_bag(file, out / "bag"),
-            lambda: write_parquet(file, out / "table.parquet"),
             lambda: list(RecordedStates(file, described().session).at(times)),
             lambda: export_lerobot([path], out / "set", LerobotOptions(30, "x")),
         ):
@@ -94,7 +92,7 @@ def test_changed_recording_is_refused_or_exported(run: Path, tmp_path: Path, num
     path = write_copy(run, tmp_path / "changed.mcap", change=changing(random.Random(number)))
     exports(path, tmp_path)
     assert {each.name for each in tmp_path.iterdir()} <= {
-        "changed.mcap", "bag", "table.parquet", "set",
+        "changed.mcap", "bag", "set",
     }  # fmt: skip
 
 

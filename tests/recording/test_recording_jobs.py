@@ -160,10 +160,8 @@ def test_selection_is_exported(page: Page, server: AppServer, tmp_path: Path) ->
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("format", "start"), [("html", b"<!"), ("parquet", b"PAR1"), ("mp4", b"")])
+@pytest.mark.parametrize(("format", "start"), [("html", b"<!"), ("mp4", b"")])
 def test_further_formats_are_exported(page: Page, format: str, start: bytes) -> None:
-    if format == "parquet":
-        pytest.importorskip("pyarrow")
     content = page.made(f"do={format}&last=0.5")
     assert content.startswith(start)
     assert len(content) > 1000

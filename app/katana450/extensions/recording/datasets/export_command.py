@@ -18,7 +18,6 @@ from katana450.extensions.recording.datasets.lerobot_export import (
     export_lerobot,
     files_of,
 )
-from katana450.extensions.recording.datasets.parquet_table import write_parquet
 from katana450.extensions.recording.datasets.ros_bag import write_bag
 from katana450.extensions.recording.datasets.sampling import frame_times
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -63,8 +62,6 @@ def _exported(options: argparse.Namespace, file: RecordingFile, start: float, en
     match options.format:
         case "csv":
             return _counted(write_csv(file, out, start, end), "row")
-        case "parquet":
-            return _counted(write_parquet(file, out, start, end), "row")
         case "rosbag2":
             return _counted(write_bag(file, out, start, end), "message")
         case "html":

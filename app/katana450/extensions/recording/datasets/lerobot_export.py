@@ -15,8 +15,11 @@ from katana450.arm.control.state import State
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo
-from katana450.extensions.recording.datasets.lerobot_writer import DatasetShape, LerobotWriter
-from katana450.extensions.recording.datasets.parquet_table import arrow
+from katana450.extensions.recording.datasets.lerobot_writer import (
+    DatasetShape,
+    LerobotWriter,
+    arrow,
+)
 from katana450.extensions.recording.datasets.sampling import (
     RecordedStates,
     check_fps,

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.recording.datasets.parquet_table import arrow
+from katana450.extras import library
 from katana450.maths.geometry.arrays import FloatArray
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
@@ -280,6 +280,15 @@ def pandas_metadata(index: str, columns: Sequence[str]) -> bytes:
             "pandas_version": "2.0.0",
         }
     ).encode()
+
+
+def arrow() -> tuple[Any, Any]:
+    """Return the modules ``pyarrow`` and ``pyarrow.parquet``.
+
+    Raises MissingExtraError if pyarrow is not installed.
+    """
+    what = "LeRobot datasets"
+    return library("pyarrow", "datasets", what), library("pyarrow.parquet", "datasets", what)
 
 
 MEGABYTE = 2**20

@@ -246,8 +246,6 @@ def _written(out: Path, found: Trimmed) -> int:
 
 def _export(options: Namespace) -> int:
     check_options(options)
-    if options.format == "mcap":
-        return _trim(options.files, options.out, options.start, options.end)
     print(printable(f"{options.out}: {export(options)}."))
     return 0
 

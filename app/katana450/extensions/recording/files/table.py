@@ -110,37 +110,26 @@ def columns(
     }
 
 
-def setpoint_table(
-    file: RecordingFile, start: float = -math.inf, end: float = math.inf
-) -> dict[str, FloatArray]:
-    """Return the setpoints as columns (N,) by their names.
-
-    These are ``t`` [s] from 0, which increases, ``theta1`` and so on [rad or m], and for an arm
-    ``gripper`` [rad or m]. Raises InputError.
-    """
-    table = columns(file, start, end, report)
-    t, q = table["t"], table["setpoint"]
-    # An extra tick for a STOP can have the time of the tick before.
-    later = np.concatenate(([True], np.diff(t) > 0.0))
-    found = {"t": t[later] - t[0]}
-    found.update({f"theta{axis}": row for axis, row in enumerate(q[later].T, start=1)})
-    if "position" in table:
-        found["gripper"] = table["gripper_setpoint"][later]
-    return found
-
-
 def write_csv(
     file: RecordingFile, out: Path, start: float = -math.inf, end: float = math.inf
 ) -> int:
-    """Write ``setpoint_table`` as a CSV file and return the number of its rows.
+    """Write the setpoints as a CSV file and return the number of its rows.
 
-    Its 17 digits are exact. Raises InputError.
+    Its columns are ``t`` [s] from 0, which increases, ``theta1`` and so on [rad or m], and for an
+    arm ``gripper`` [rad or m]. Its 17 digits are exact. Raises InputError.
     """
-    table = setpoint_table(file, start, end)
+    table = columns(file, start, end, report)
+    # An extra tick for a STOP can have the time of the tick before.
+    later = np.concatenate(([True], np.diff(table["t"]) > 0.0))
+    names = ["t", *(f"theta{axis}" for axis in range(1, table["setpoint"].shape[1] + 1))]
+    numbers = [table["t"] - table["t"][0], table["setpoint"]]
+    if POSITION in table:
+        names.append("gripper")
+        numbers.append(table["gripper_setpoint"])
+    lines = np.column_stack(numbers)[later]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table)
-    lines = np.stack(list(table.values()), axis=1)
-    writer.writerows([f"{value:.17g}" for value in line] for line in lines.tolist())
+    writer.writerow(names)
+    writer.writerows([f"{number:.17g}" for number in line] for line in lines.tolist())
     write_files({out: writer_of(text.getvalue().encode())})
     return len(lines)

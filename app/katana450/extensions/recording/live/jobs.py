@@ -208,7 +208,6 @@ TIMEOUT = 60.0
 
 FORMATS = {
     "csv": ".csv",
-    "parquet": ".parquet",
     "rosbag2": "",
     "html": ".html",
     "mp4": ".mp4",
