@@ -1,6 +1,6 @@
 // Who is connected, for admins: a list with buttons that disconnect.
-import { html } from "../instruments/shape.js";
 import { element, first, styled } from "../dom.js";
+import { html } from "../instruments/shape.js";
 
 const EVERY = 1000; // ms between two queries while the list is open
 const CONTENT = `

@@ -72,7 +72,7 @@ const highest = () => Math.max(HALF * innerHeight, innerHeight - ABOVE);
 /** Return the index of the height that is nearest to `tall` px. @param {number} tall */
 function nearest(tall) {
   const heights = [button.offsetHeight, HALF * innerHeight, highest()];
-  const away = heights.map((each) => Math.abs(each - tall));
+  const away = heights.map((height) => Math.abs(height - tall));
   return away.indexOf(Math.min(...away));
 }
 
@@ -86,7 +86,7 @@ function raise(next) {
 function turn(by) {
   /** @type {NodeListOf<HTMLElement>} */
   const tabs = document.querySelectorAll(TAB);
-  const at = [...tabs].findIndex((each) => each.ariaSelected === "true");
+  const at = [...tabs].findIndex((tab) => tab.ariaSelected === "true");
   if (height) tabs[at + by]?.click();
 }
 

@@ -54,10 +54,10 @@ def test_admin_lists_and_disconnects(site: Site, windows: Windows) -> None:
         page.keyboard.press("Enter")
         page.get_by_role("button", name="Who is connected").focus()
         page.keyboard.press("Enter")
-        waits(page, "Vera", "viewer · program from 127.0.0.1")
+        waits(page, "Vera", "viewer · connected from 127.0.0.1")
         assert not page.locator("#help").is_visible()
         assert page.get_by_role("dialog", name="Who is connected").is_visible()
-        waits(page, "Oda", "operator · drives · program")
+        waits(page, "Oda", "operator · drives · connected")
         assert page.locator("#people-list li b").all_inner_texts() == ["Ada (you)", "Vera", "Oda"]
         for size in ((1280, 800), (390, 844), (844, 390)):
             page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -108,7 +108,7 @@ def test_disconnected_page_says_why_and_comes_back(site: Site, windows: Windows)
         other.get_by_text("An admin has disconnected you. Come back in").wait_for()
         page.get_by_role("button", name="Let in Kai").click()
         gate.wait_for(state="hidden", timeout=10_000)
-        waits(page, "Kai", "page")
+        waits(page, "Kai", "connected from")
 
 
 @pytest.mark.long
