@@ -37,6 +37,9 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     assert goal(page, "axis-1") == start
     assert truth.status()["goal"][0] == pytest.approx(math.radians(start), abs=1e-9)
 
+    # Slowly, so that the plots get many points on a machine that draws seldom, too.
+    page.page.locator("#speed input").fill("30")
+    truth.wait(speed=0.3)
     turn(page, "axis-1", 50.0)
     assert goal(page, "axis-1") == pytest.approx(start + 50.0, abs=2.0)
     early = table(page, "joint-angles")
@@ -56,6 +59,8 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     speeds = table(page, "joint-speeds")
     distance = np.trapezoid(speeds["Axis 1 [deg/s]"], speeds["t [s]"])
     assert distance == pytest.approx(there - start, rel=0.1)
+    page.page.locator("#speed input").fill("100")
+    truth.wait(speed=1.0)
 
 
 def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -> None:
