@@ -1,9 +1,9 @@
 // Several files of one object: those that were dropped or chosen, as one .zip file without compression.
 
 // Suffixes of shapes, of files that shapes name, and of shapes that need no other file.
-const SHAPES = /\.(stl|obj|ply|glb|gltf|wrl|zip)$/i;
+const SHAPES = /\.(stl|obj|ply|glb|gltf|3mf|wrl|zip)$/i;
 const OTHERS = /\.(bin|mtl)$/i;
-const ALONE = /\.(stl|ply|glb|zip)$/i;
+const ALONE = /\.(stl|ply|glb|3mf|zip)$/i;
 
 /** @typedef {{ path: string, file: File }} Part */
 const MAX_FILES = 1000;

@@ -18,7 +18,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer
 from tests.browser.session import MOVE, Truth, bar, clear_stop
-from tests.exchange.square_gltf import DATA, SQUARE
+from tests.exchange.compressed_gltf import DATA, SQUARE
 
 DROP = """async ([files, [clientX, clientY] = []]) => {
     const data = new DataTransfer();

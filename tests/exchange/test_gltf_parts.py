@@ -1,4 +1,4 @@
-"""Test glTF with buffers in other files, quantized numbers, and compression, which is refused."""
+"""Test glTF with buffers in other files, quantized numbers, and compression."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import packed
 from katana450.extensions.importers.shape_file import Format, ShapeFile, read_shape
+from tests.exchange.compressed_gltf import DATA, POINTS, SQUARE, draco, quantized
 from tests.exchange.solids import sides
-from tests.exchange.square_gltf import DATA, SQUARE, quantized
 from tests.exchange.test_broken_shapes import glb
 
 
@@ -61,6 +61,18 @@ def test_sparse_numbers_are_refused_with_a_remedy() -> None:
         read(document, **{"a b_bin": DATA})
 
 
+def test_draco_is_decompressed() -> None:
+    document, data = draco(3.0 * POINTS)
+    shape = read_shape(glb(json.dumps(document).encode(), data), Format.GLB, "a.glb")
+    assert len(shape.faces) == 2
+    assert sides(shape) == pytest.approx([3e3, 0.0, 3e3], abs=1.0)
+    assert shape.scale == 0.5
+    for broken in (data[:20], b"", b"DRACO"):
+        content = broken + bytes(len(data) - len(broken))
+        with pytest.raises(InputError, match="corrupt"):
+            read_shape(glb(json.dumps(document).encode(), content), Format.GLB, "a.glb")
+
+
 def test_normalized_integers_are_read() -> None:
     document, data = quantized()
     shape = read_shape(glb(json.dumps(document).encode(), data), Format.GLB, "a.glb")
@@ -68,9 +80,9 @@ def test_normalized_integers_are_read() -> None:
     assert len(shape.faces) == 2
 
 
-def test_compression_is_refused_with_a_remedy() -> None:
-    for name in ("EXT_meshopt_compression", "KHR_draco_mesh_compression"):
-        with pytest.raises(InputError, match="Save it without compression"):
+def test_meshopt_is_refused_with_a_remedy() -> None:
+    for name in ("EXT_meshopt_compression", "KHR_meshopt_compression"):
+        with pytest.raises(InputError, match="without compression, or with Draco"):
             read(SQUARE | {"extensionsRequired": [name]}, **{"a b_bin": DATA})
 
 

@@ -22,6 +22,7 @@ from katana450.extensions.importers.shape_file import (
     SECONDS,
     Format,
 )
+from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 from tests.exchange.test_several_files import ARTICULATED
@@ -42,6 +43,7 @@ SEEDS = {
     "colours.ply": PAINTED,
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
     "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
+    "draco.glb": draco_glb(),
 }
 
 

@@ -27,7 +27,7 @@ from katana450.extensions.importers.scene_file import (
 )
 from katana450.extensions.importers.shape_file import Format, read_shape
 from katana450.extensions.programs.script.script_scene import Scene
-from tests.exchange.square_gltf import DATA, SQUARE
+from tests.exchange.compressed_gltf import DATA, SQUARE
 
 ROBOT = f'{HEADER}\nInline {{ url "parts/arm.wrl" }} Inline {{ url "parts/tool/grip.wrl" }}'
 

@@ -12,10 +12,14 @@ import pytest
 
 from katana450 import extras
 from katana450.cli.main import main
+from katana450.extensions.importers.reading import answer
+from katana450.extensions.importers.shape_file import Format
 from katana450.extensions.real_arm.driver.katana_driver import driver_of
 from katana450.extensions.real_arm.link import ArmUrl
 from katana450.extensions.rosbridge.serve_parts import check_installed
 from katana450.extras import MissingExtraError
+from tests.exchange.compressed_gltf import draco_glb
+from tests.exchange.test_threemf import threemf
 
 SCRIPT = """\
 frame: base
@@ -24,6 +28,11 @@ steps:
   - move: {x: 320, y: -100, z: 150, pitch: 50, roll: 0}
   - line: {by: {y: 50}}
 """
+
+
+def read(data: bytes, format: Format) -> str:
+    """Return why the reader refuses ``data``."""
+    return answer(data, format, f"a.{format.value}", None, None, "").error
 
 
 def test_each_missing_extra_is_named_with_its_command(
@@ -49,6 +58,8 @@ def test_each_missing_extra_is_named_with_its_command(
         ("foxglove", "foxglove", lambda: refused(check_installed, *foxglove)),
         ("serial", "serial", lambda: refused(ArmUrl("/dev/ttyUSB0", None).open)),
         ("serial", "serial", lambda: refused(driver_of, *arm)),
+        ("DracoPy", "meshes", lambda: read(draco_glb(), Format.GLB)),
+        ("networkx", "meshes", lambda: read(threemf(), Format.THREEMF)),
     ]
     wrong = []
     for module, extra, use in uses:

@@ -14,10 +14,12 @@ import trimesh
 
 from katana450.extras import PACKAGES
 from tests.commands import completed
+from tests.exchange.compressed_gltf import draco_glb
+from tests.exchange.test_threemf import threemf
 
 ROOT = Path(__file__).resolve().parents[2]
 LOADED_ON_USE = ("git", "imageio_ffmpeg", "matplotlib", "xacro")
-EXTRAS = ("embreex", "imageio_ffmpeg", "pyarrow", "serial")
+EXTRAS = ("DracoPy", "embreex", "imageio_ffmpeg", "networkx", "pyarrow", "serial")
 NOT_LOCKED = (*EXTRAS, "hypothesis", "mypy", "playwright", "pytest", "scipy")
 MAX_SIZE = 330
 """[MiB] What `make run` may put into `.venv` on Linux."""
@@ -113,8 +115,12 @@ def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
     box = trimesh.creation.box((10.0, 20.0, 30.0))
     for kind in ("stl", "obj", "ply", "glb"):
         box.export(tmp_path / f"box.{kind}")
+    (tmp_path / "draco.glb").write_bytes(draco_glb())
+    (tmp_path / "l.3mf").write_bytes(threemf())
     (tmp_path / "v.wrl").write_text(VRML, encoding="utf-8")
     found = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
+    assert found.pop("draco.glb").endswith("dracopy networkx")
+    assert found.pop("l.3mf").endswith("dracopy networkx")
     assert len(found) == 5
     assert all(int(faces) >= 2 for faces in found.values()), found
 

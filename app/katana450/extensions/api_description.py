@@ -153,7 +153,7 @@ CONTENTS: Mapping[str, dict[str, Any]] = {
 PARAMETERS: Mapping[str, dict[str, Any]] = {
     "format": TEXT
     | {
-        "description": "wrl, stl, obj, ply, glb, gltf or zip, for a name without an "
+        "description": "wrl, stl, obj, ply, glb, gltf, 3mf or zip, for a name without an "
         "ending. A zip holds one such file and the files that it names."
     },
     "from": {"type": "number", "description": "Begin [s since the epoch]."},

@@ -1,7 +1,8 @@
 """The document of a glTF file, in the form of version 2.0, and its numbers.
 
-Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022). Only the parts that
-are read are listed, named as in the specification in snake case.
+Source: Khronos Group, glTF 2.0 Specification (ISO/IEC 12113:2022); KHR_draco_mesh_compression. Only
+the parts that are read are listed, named as in the specification in snake case. The library that
+decompresses is imported when a file needs it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import Companions
+from katana450.extensions.importers.library_errors import failures_in_words
 from katana450.extensions.importers.surface import doubles
+from katana450.extras import library
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -57,6 +60,19 @@ class Accessor(msgspec.Struct, rename="camel"):
     sparse: Any = None
 
 
+class DracoPart(msgspec.Struct, rename="camel"):
+    """The compressed numbers of a primitive (KHR_draco_mesh_compression)."""
+
+    buffer_view: Natural
+    attributes: dict[str, Natural]
+
+
+class PrimitiveExtensions(msgspec.Struct):
+    """The extension of a primitive that is read."""
+
+    draco: DracoPart | None = msgspec.field(default=None, name="KHR_draco_mesh_compression")
+
+
 class Primitive(msgspec.Struct, rename="camel"):
     """A part of a mesh with one material."""
 
@@ -65,6 +81,7 @@ class Primitive(msgspec.Struct, rename="camel"):
     material: Natural | None = None
     mode: Natural = TRIANGLES
     targets: list[Any] = []
+    extensions: PrimitiveExtensions = msgspec.field(default_factory=PrimitiveExtensions)
 
 
 class Mesh(msgspec.Struct, rename="camel"):
@@ -228,6 +245,21 @@ class Buffers:
         return self._part(
             accessor.buffer_view, accessor.byte_offset, accessor.count, columns, kind, what
         )
+
+    def draco(self, part: DracoPart) -> tuple[dict[str, npt.NDArray[Any]], npt.NDArray[Any]]:
+        """Return the attributes of a compressed primitive by their names, and its triangles."""
+        data = self._view(part.buffer_view)
+        decoder = library("DracoPy", "meshes", "glTF files with Draco compression")
+        with failures_in_words(self._name):
+            mesh = decoder.decode(data)
+            by_id = {attribute["unique_id"]: attribute["data"] for attribute in mesh.attributes}
+            faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3), np.uint32)))
+        attributes = {
+            name: np.asarray(by_id[number]).reshape(len(by_id[number]), -1)
+            for name, number in part.attributes.items()
+            if number in by_id
+        }
+        return attributes, faces.astype(np.int64).ravel()
 
     def broken(self, what: str) -> InputError:
         """Return the error of a file that contradicts itself."""

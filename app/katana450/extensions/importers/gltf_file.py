@@ -32,11 +32,11 @@ from katana450.extensions.importers.surface import (
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.srgb import to_srgb
 
-QUANTIZED = "KHR_mesh_quantization"
-"""A required extension that is read."""
+READ_EXTENSIONS = ("KHR_draco_mesh_compression", "KHR_mesh_quantization")
+"""Required extensions that are read."""
 
-COMPRESSED = ("_meshopt_compression", "_draco_mesh_compression")
-"""Ends of the names of extensions with which a file is refused."""
+MESHOPT = "_meshopt_compression"
+"""End of the names of extensions with which a file is refused."""
 
 NO_SURFACE = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture", "KHR_techniques_")
 """Prefixes of required extensions that change no surface, and are not reported."""
@@ -49,10 +49,10 @@ NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 def read_gltf(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
     """Return all triangles of the scene in metres, y up. Raises InputError for an invalid file."""
     document, binary = decoded(data, name)
-    if any(extension.endswith(COMPRESSED) for extension in document.extensions_required):
+    if any(extension.endswith(MESHOPT) for extension in document.extensions_required):
         raise InputError(
-            f"{name} is compressed with meshopt or Draco, which is not read. Save it without "
-            "compression."
+            f"{name} is compressed with meshopt, which is not read. Save it without compression, "
+            "or with Draco."
         )
     try:
         buffers = Buffers(document, binary, companions or Companions(), name)
@@ -95,7 +95,7 @@ class _File:
         if self._document.animations:
             self._left_out["motion"] += 1
         for extension in self._document.extensions_required:
-            if extension != QUANTIZED and not extension.startswith(NO_SURFACE):
+            if extension not in READ_EXTENSIONS and not extension.startswith(NO_SURFACE):
                 self._left_out[f"the extension {extension[:60]}"] += 1
         return MeshReading(builder.surface(), tuple(self._left_out))
 
@@ -122,13 +122,24 @@ class _File:
     def _surface(self, primitive: Primitive) -> MeshSurface:
         if "POSITION" not in primitive.attributes:
             return NOTHING
-        points = self._buffers.numbers(primitive.attributes["POSITION"], 3)
-        index = np.arange(len(points))
-        if primitive.indices is not None:
-            index = self._buffers.rows(primitive.indices, 1).ravel().astype(np.int64)
-        colour = primitive.attributes.get("COLOR_0")
-        own = None if colour is None else self._buffers.numbers(colour, None)
-        corners = self._corners(index, primitive.mode)
+        mode, own = primitive.mode, None
+        draco = primitive.extensions.draco
+        if draco is not None:
+            attributes, index = self._buffers.draco(draco)
+            if attributes.get("POSITION", index).shape[1:] != (3,):
+                raise self._buffers.broken("compressed vertices do not have three coordinates")
+            points = self._buffers.scaled(attributes["POSITION"], primitive.attributes["POSITION"])
+            if "COLOR_0" in attributes and "COLOR_0" in primitive.attributes:
+                own = self._buffers.scaled(attributes["COLOR_0"], primitive.attributes["COLOR_0"])
+            mode = TRIANGLES
+        else:
+            points = self._buffers.numbers(primitive.attributes["POSITION"], 3)
+            index = np.arange(len(points))
+            if primitive.indices is not None:
+                index = self._buffers.rows(primitive.indices, 1).ravel().astype(np.int64)
+            colour = primitive.attributes.get("COLOR_0")
+            own = None if colour is None else self._buffers.numbers(colour, None)
+        corners = self._corners(index, mode)
         if primitive.targets:
             self._left_out["changes of shape"] += 1
         return of_polygons(

@@ -1,4 +1,4 @@
-"""Shapes of other programs as triangles in metres, z up: meshes and worlds in six formats.
+"""Shapes of other programs as triangles in metres, z up: meshes and worlds in seven formats.
 
 Files are untrusted. Readers see no file but those of the same upload, execute nothing, and stop at
 limits of their own. `read_shape_guarded` adds limits of the system, in a disposable subprocess.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -64,6 +64,7 @@ class Format(Enum):
     PLY = "ply"
     GLB = "glb"
     GLTF = "gltf"
+    THREEMF = "3mf"
     ZIP = "zip"
 
     @property
@@ -170,6 +171,7 @@ def read_shape(
     finally:
         if missing is not None:
             missing += companions.missing
+    reading = _in_known_unit(reading)
     surface = reading.surface.tidy()
     left_out = [*reading.left_out, *_degenerate(reading.surface, surface)]
     if not len(surface.faces):
@@ -178,7 +180,7 @@ def read_shape(
         raise InputError(f"{file} has no triangles.{without}{hint}")
     sides = np.ptp(surface.vertices, axis=0)
     longest = float(sides.max())
-    metres, why = _unit(format, longest, unit)
+    metres, why = _unit(format, longest, unit, reading.unit)
     scale = fitting_scale(longest * metres)
     if scale is None:
         raise _beyond(longest, metres, file)
@@ -251,6 +253,11 @@ def _read(data: bytes, format: Format, file: str, companions: Companions) -> Mes
             return read_obj(data, file, companions)
         case Format.PLY:
             return read_ply(data, file)
+        # The library for this format takes longer to import than a file takes to read.
+        case Format.THREEMF:
+            from katana450.extensions.importers.threemf_file import read_3mf
+
+            return read_3mf(data, file, MAX_FILE_BYTES)
     return read_gltf(data, file, companions)
 
 
@@ -271,10 +278,23 @@ def _degenerate(surface: MeshSurface, tidy: MeshSurface) -> list[str]:
     return [f"{count} degenerate triangle{'' if count == 1 else 's'}"] if count else []
 
 
-def _unit(format: Format, longest: float, chosen: float | None) -> tuple[float, str]:
+def _in_known_unit(reading: MeshReading) -> MeshReading:
+    """Return the reading in metres if its unit is not in UNITS, else unchanged."""
+    if reading.unit is None or reading.unit in UNITS.values():
+        return reading
+    surface = reading.surface
+    scaled = replace(surface, vertices=surface.vertices * reading.unit)
+    return replace(reading, surface=scaled, unit=1.0)
+
+
+def _unit(
+    format: Format, longest: float, chosen: float | None, of_file: float | None
+) -> tuple[float, str]:
     """Return the unit [m], and a clause on its source."""
     if chosen is not None:
         return chosen, f"the unit is {_sign(chosen)}, as given"
+    if of_file is not None:
+        return of_file, f"the unit is {_sign(of_file)}, as in the file"
     if format in (Format.GLB, Format.GLTF):
         return 1.0, "the unit is m, as in all glTF files"
     if longest > MAX_SIZE * (1.0 + ROUNDING):

@@ -204,10 +204,12 @@ class MeshReading:
     Attributes:
         surface: the surface.
         left_out: names of the parts that were not read.
+        unit: unit [m], if the file gives it.
     """
 
     surface: MeshSurface
     left_out: tuple[str, ...] = ()
+    unit: float | None = None
 
 
 class MeshBuilder:
