@@ -55,6 +55,7 @@ steps:
 - pour: {into: basin, ml: 50}
 - pick: cup
 - place: {at: {x: 300, y: 40, yaw: 20}, on: box}
+- stack: {object: cup, on: box}
 - release
 - repeat:
     times: 2
@@ -101,6 +102,7 @@ def everything() -> katana450.ScriptWriter:
         p.pour("basin", ml=50)
         p.pick("cup")
         p.place({"x": 300, "y": 40, "yaw": 20}, on="box")
+        p.stack("cup", on="box")
         p.release()
         with p.repeat(2):
             p.nudge(1, 5)

@@ -1,4 +1,4 @@
-"""Tests of the steps that pick objects up, place them and let them go."""
+"""Tests of the steps that pick objects up, place them, stack them and let them go."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def place(scene_object: SceneObject) -> list[float]:
 
 @pytest.mark.long
 def test_three_boxes_are_stacked(stage: Stage) -> None:
-    steps = "- pick: b\n- place: {on: a}\n- pick: c\n- place: {on: b}\n- home\n"
+    steps = "- stack: {object: b, on: a}\n- stack: {object: c, on: b}\n- home\n"
     end = played(
         stage,
         steps,
@@ -72,6 +72,14 @@ def test_three_boxes_are_stacked(stage: Stage) -> None:
     )
     assert [place(end[name])[2] for name in "abc"] == pytest.approx([0.0, 40.0, 90.0], abs=1e-9)
     assert place(end["c"])[:2] == pytest.approx([240.0, -100.0], abs=1e-6)
+
+
+def test_stacked_object_is_grasped_so_that_it_can_be_placed(stage: Stage) -> None:
+    """From above, which is tried first, the arm does not reach the other object."""
+    objects = box("a", (360.0, -100.0), (50.0, 50.0, 40.0)), box("b", (290.0, 0.0))
+    with pytest.raises(ScriptError, match=r"b cannot be placed there: .* a pitch of 90"):
+        planned(stage, "- stack: {object: b, on: a, side: above}\n", *objects)
+    planned(stage, "- stack: {object: b, on: a}\n", *objects)
 
 
 def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
@@ -90,6 +98,7 @@ def test_released_object_stands_on_what_is_below_it(stage: Stage) -> None:
         ("- place: {at: {x: 230, y: -120}}\n", "The hand holds nothing to place. `pick` an object"),
         ("- release\n", "The hand holds nothing to release"),
         ("- pick: part\n- pick: low\n", "already holds an object"),
+        ("- pick: part\n- stack: {object: low, on: far}\n", "already holds an object"),
         ("- pick: part\n- release\n", "part would fall 60 mm"),
         ("- pick: part\n- gripper: open\n", "part would fall 60 mm. Lower it to at most 10 mm"),
         # The pitch of the grasp has nothing to do with it.
@@ -242,6 +251,8 @@ def test_object_held_from_the_front_is_not_turned(stage: Stage) -> None:
         ("place: {on: a, at: {x: 1, y: 2, z: 3}}", "either `on` or the height z"),
         ("place: {at: {x: 1}}", "The place of an object needs 'y'"),
         ("place: a", "A place step must be a mapping"),
+        ("stack: {object: a, on: a}", "a cannot stand on itself"),
+        ("stack: {object: a}", "A stack needs 'on'"),
         ("pick: {object: a, side: left}", "Expected one of front, above"),
         ("release: a", "`release` takes no value"),
     ],

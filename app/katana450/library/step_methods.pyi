@@ -104,6 +104,25 @@ class StepMethods:
             height: Height above the underside, mm; found unless given.
         """
 
+    def stack(
+        self,
+        object: str,
+        on: str,
+        *,
+        side: str | None = ...,
+        pitch: float | str | None = ...,
+        height: float | str | None = ...,
+    ) -> None:
+        """Pick an object, and place it on the middle of another.
+
+        Args:
+            object: Name of an object.
+            on: Name of an object.
+            side: Side of the tool; found unless given.
+            pitch: Pitch of the tool, deg; found unless given.
+            height: Height above the underside, mm; found unless given.
+        """
+
     def pour(
         self,
         into: str,

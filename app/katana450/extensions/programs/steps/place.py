@@ -1,10 +1,10 @@
-"""The steps that lift an object and put it somewhere: ``pick``, ``place`` and others."""
+"""The steps that lift an object and put it somewhere: ``pick``, ``place``, ``stack`` and others."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ from katana450.extensions.programs.building.actions import MoveFingers
 from katana450.extensions.programs.building.hand_motions import APPROACHES, carry, with_fingers
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
-from katana450.extensions.programs.language.kinds import NAME
+from katana450.extensions.programs.language.kinds import NAME, ObjectName
 from katana450.extensions.programs.language.places import SPOT, Spot
 from katana450.extensions.programs.planning.approach import UP
 from katana450.extensions.programs.planning.curves import line_between
@@ -242,3 +242,39 @@ class Pick(Grasp, word="pick"):
             return plan.first(LIFTS, lift)
         except InputError as error:
             raise error.after(f"{self.name} cannot be lifted") from error
+
+
+@dataclass(frozen=True)
+class Stack(Pick, word="stack"):
+    """Pick an object, and place it on the middle of another.
+
+    Attributes:
+        on: name of the object that carries it.
+    """
+
+    short = ""
+
+    on: ObjectName = field(kw_only=True)
+
+    @classmethod
+    def mistakes(cls, values: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+        """Yield the mistake of an object on itself."""
+        if values.get("name") is not None and values["name"] == values.get("on"):
+            yield "", f"{values['name']} cannot stand on itself."
+
+    def build(self, plan: PlanState) -> PlanState:
+        """Plan with the first grasp that can be placed. Raises InputError if there is none."""
+        given_up, refused = plan.given_up, None
+        before = replace(plan, taken=None, ahead=())
+        while True:
+            attempt = replace(before, given_up=given_up, is_brief=refused is not None)
+            try:
+                attempt = super().build(attempt)
+                placed = PlaceHeld(on=self.on).build(attempt)
+            except InputError as error:
+                refused = refused or error
+                if attempt.taken is None or attempt.taken.chosen is None:
+                    raise refused from error
+                given_up = (*given_up, attempt.taken.chosen)
+            else:
+                return replace(placed, is_brief=plan.is_brief)
