@@ -30,7 +30,7 @@ from katana450.extensions.recording.episodes.episode import (
 from katana450.extensions.recording.episodes.episode_folder import (
     EpisodeFolder,
     episode_files,
-    episode_in,
+    only_episode,
     with_episode,
     write_episode,
 )
@@ -68,7 +68,8 @@ def attempt(path: Path, number: int = 1, **changes: object) -> Episode:
 def test_episode_is_cut_out_of_a_recording(recorded: Path, tmp_path: Path) -> None:
     path, episode = tmp_path / "episode-0001.mcap", attempt(recorded)
     write_episode([recorded], path, episode)
-    assert episode_in(path) == episode
+    with RecordingFile.open(path) as file:
+        assert only_episode(file) == episode
     opened = katana450.open(path)
     assert opened.episodes == (episode,)
     assert (opened.start, opened.end) == (episode.start, episode.end)
@@ -87,7 +88,8 @@ def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_p
         after = attempt(recorded, note=outcome.value)
         after = structs.replace(after, outcome=outcome)
         with_episode(path, after, "judged")
-        assert episode_in(path) == after
+        with RecordingFile.open(path) as file:
+            assert only_episode(file) == after
     with RecordingFile.open(path) as file:
         assert file.counts()[EPISODES] == 4
         assert verify_recording(file, session_for(file).session).identical

@@ -17,7 +17,6 @@ from typing import Any, BinaryIO
 
 import msgspec
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
 from mcap.records import Message as McapMessage
 from mcap.summary import Summary
 from msgspec.structs import replace
@@ -32,10 +31,9 @@ from katana450.extensions.recording.episodes.episode import (
     message_of,
 )
 from katana450.extensions.recording.files.recording_file import (
-    MAX_RECORD_BYTES,
-    BoundedStream,
     Message,
     RecordingFile,
+    reading,
 )
 from katana450.extensions.recording.files.recording_writer import (
     DATA_END_BYTES,
@@ -60,12 +58,6 @@ def episodes_in(file: RecordingFile) -> tuple[Episode, ...]:
         return episodes_of(message.data for message in file.messages(EPISODES))
     except InputError as error:
         raise InputError(f"{file.path} is damaged: {error}") from error
-
-
-def episode_in(path: Path) -> Episode:
-    """Return the episode of the file ``path``. Raises InputError unless there is exactly one."""
-    with RecordingFile.open(path) as file:
-        return only_episode(file)
 
 
 def only_episode(file: RecordingFile) -> Episode:
@@ -118,11 +110,10 @@ def with_episode(path: Path, episode: Episode, kind: str) -> None:
 
     Raises InputError if the file is of another episode, or cannot be read or written.
     """
-    before = episode_in(path)
+    with RecordingFile.open(path) as file:
+        before, end = only_episode(file), file.end
     if before.number != episode.number:
         raise InputError(f"{path} is of episode {before.number}, not {episode.number}.")
-    with RecordingFile.open(path) as file:
-        end = file.end
     text = json_text(message_of(episode, end, kind))
     append_message(path, Message(EPISODES, 0, nanoseconds(end), text))
 
@@ -132,21 +123,12 @@ def append_message(path: Path, message: Message) -> None:
 
     Raises InputError if the file is not a whole recording or cannot be written.
     """
-    with RecordingFile.open(path):
-        pass
-    try:
-        with path.open("rb") as file:
-            stream = BoundedStream(file)
-            reader = SeekingReader(
-                stream,  # type: ignore[arg-type]  # it has all that is used of a file
-                record_size_limit=MAX_RECORD_BYTES,
-            )
-            summary = reader.get_summary()
-            if summary is None or summary.statistics is None:
-                raise InputError(f"{path} has no index, so it is not a whole recording.")
-            data = _data(path, file)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    with RecordingFile.open(path) as recording:
+        summary = recording.summary
+    if summary.statistics is None:
+        raise InputError(f"{path} has no index, so it is not a whole recording.")
+    with reading(path), path.open("rb") as file:
+        data = _data(path, file)
     write_files({path: lambda out: _write(out, data, summary, message)})
 
 

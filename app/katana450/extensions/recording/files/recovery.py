@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mcap.records import Attachment as McapAttachment
-from mcap.records import Channel, Chunk, Footer, Metadata
-from mcap.records import Message as McapMessage
+from mcap.records import Chunk, Footer, Metadata
 
 from katana450.atomic import write_files
 from katana450.errors import InputError
@@ -21,11 +20,15 @@ from katana450.extensions.recording.files.header import METADATA, Attachment
 from katana450.extensions.recording.files.recording_file import (
     FAULTS,
     HEAD,
+    MAX_CHUNK_BYTES,
     BoundedStream,
     Message,
     RecordingFile,
+    channels_in,
+    chunk_content,
+    messages_in,
+    reading,
     records_at,
-    unpacked,
 )
 from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.trimming import KEY
@@ -94,24 +97,21 @@ def recover(path: Path, out: Path) -> Recovered | None:
     """
     if is_whole(path):
         return None
-    try:
-        with path.open("rb") as file:
-            _check_unclaimed(path, file)
-            metadata, attachments, why = _header(file)
-            if metadata is None:
-                raise InputError(
-                    f"{path} cannot be recovered: its beginning is not that of a recording ({why})."
-                )
-            recovered = Recovered()
-            write_files(
-                {
-                    out: lambda target: _write(
-                        file, MessageWriter(target, metadata, attachments), recovered
-                    )
-                }
+    with reading(path), path.open("rb") as file:
+        _check_unclaimed(path, file)
+        metadata, attachments, why = _header(file)
+        if metadata is None:
+            raise InputError(
+                f"{path} cannot be recovered: its beginning is not that of a recording ({why})."
             )
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+        recovered = Recovered()
+        write_files(
+            {
+                out: lambda target: _write(
+                    file, MessageWriter(target, metadata, attachments), recovered
+                )
+            }
+        )
     return recovered
 
 
@@ -183,31 +183,29 @@ def _write(file: BinaryIO, copy: MessageWriter, recovered: Recovered) -> None:
         if not isinstance(record, Chunk):
             continue
         try:
-            content = unpacked(record)
+            content = chunk_content(record, MAX_CHUNK_BYTES)
+            topics.update(channels_in(content))
+            messages = list(messages_in(content, topics))
         except FAULTS as error:
             recovered.lose(len(record.data), str(error) or type(error).__name__)
             continue
-        for part in content:
-            if isinstance(part, Channel):
-                topics[part.id] = part.topic
-            elif isinstance(part, McapMessage) and (topic := topics.get(part.channel_id)):
-                message = Message(topic, part.sequence, part.log_time, part.data)
-                if topic in (PLANS, SOLIDS):
-                    keys.update(KEY.findall(message.data)[:1])
-                elif topic in (COMMANDS, CHECKPOINTS) and recovered.lost_bytes:
-                    if not keys.issuperset(KEY.findall(message.data)):
-                        continue
-                    lost = 0 if newest is None else message.number - newest - 1
-                    if topic == COMMANDS and lost > 0:
-                        recovered.missing_ticks += lost
-                        copy.copy(_gap(message, lost))
-                if topic == COMMANDS:
-                    newest = message.number
-                recovered.start = recovered.start if recovered.messages else message.t
-                recovered.start = min(recovered.start, message.t)
-                recovered.end = max(recovered.end, message.t)
-                recovered.messages += 1
-                copy.copy(message)
+        for message in messages:
+            if message.topic in (PLANS, SOLIDS):
+                keys.update(KEY.findall(message.data)[:1])
+            elif message.topic in (COMMANDS, CHECKPOINTS) and recovered.lost_bytes:
+                if not keys.issuperset(KEY.findall(message.data)):
+                    continue
+                lost = 0 if newest is None else message.number - newest - 1
+                if message.topic == COMMANDS and lost > 0:
+                    recovered.missing_ticks += lost
+                    copy.copy(_gap(message, lost))
+            if message.topic == COMMANDS:
+                newest = message.number
+            recovered.start = recovered.start if recovered.messages else message.t
+            recovered.start = min(recovered.start, message.t)
+            recovered.end = max(recovered.end, message.t)
+            recovered.messages += 1
+            copy.copy(message)
         copy.flush()
     copy.finish()
 

@@ -10,21 +10,19 @@ import struct
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
 
-from mcap.records import Channel, Chunk, Metadata
+from mcap.records import Metadata
 
-from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA
 from katana450.extensions.recording.files.recording_file import (
-    FAULTS,
     HEAD,
     PART_START,
     BoundedStream,
     Message,
-    chunk_content,
-    messages_in,
+    channels_in,
+    content_at,
+    messages_at,
+    reading,
     records_at,
-    unpacked,
-    unreadable,
     utc_offset_of,
 )
 from katana450.extensions.recording.messages import NANO
@@ -84,13 +82,8 @@ class ChunkIndex:
         """Find the chunks that were added since the last call. Raises InputError."""
         if self._ended:
             return
-        try:
-            with self.path.open("rb") as file:
-                self._scan(file)
-        except FAULTS as error:
-            raise unreadable(self.path, error) from error
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+        with reading(self.path), self.path.open("rb") as file:
+            self._scan(file)
 
     def has(self, chunk: ChunkSpan, topic: str) -> bool:
         """Return whether ``chunk`` has messages of ``topic``."""
@@ -98,19 +91,9 @@ class ChunkIndex:
 
     def messages(self, chunk: ChunkSpan, *topics: str) -> list[Message]:
         """Return the messages of ``topics`` in ``chunk``. Raises InputError."""
-        wanted = frozenset(topics)
-        try:
-            with self.path.open("rb") as file:
-                found = next(records_at(BoundedStream(file), chunk.offset))
-            if not isinstance(found, Chunk):
-                raise ValueError("its index is wrong")
-            channels = {each: topic for each, topic in self._topics.items() if topic in wanted}
-            return list(messages_in(chunk_content(found, MAX_UNPACKED), channels))
-        except FAULTS as error:
-            why = str(error) or type(error).__name__
-            raise InputError(f"{self.path} is damaged: {why}.") from error
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be read: {error.strerror or error}.") from error
+        with reading(self.path), self.path.open("rb") as file:
+            stream = BoundedStream(file)
+            return messages_at(stream, chunk.offset, self._topics, topics, MAX_UNPACKED)
 
     def _scan(self, file: BinaryIO) -> None:
         stream = BoundedStream(file)
@@ -145,10 +128,7 @@ class ChunkIndex:
             raise ValueError(f"a chunk has {size} bytes, more than {MAX_UNPACKED}")
         if not self.chunks:
             # All channels are described in the first chunk.
-            chunk = next(records_at(stream, self._next))
-            if isinstance(chunk, Chunk):
-                found = (each for each in unpacked(chunk) if isinstance(each, Channel))
-                self._topics = {each.id: each.topic for each in found}
+            self._topics = channels_in(content_at(stream, self._next, MAX_UNPACKED))
         self.chunks.append(ChunkSpan(self._next, first / NANO, last / NANO, frozenset()))
 
     def _add_metadata(self, stream: BoundedStream) -> None:
