@@ -58,7 +58,9 @@ def runner() -> RecordedRunner:
 def goal(runner: RecordedRunner) -> FollowGoal:
     """A goal whose program was sent."""
     hub: Any = SimpleNamespace(runner=runner, gate=SimpleNamespace(revocations=0))
-    return made(hub, [])
+    goal = made(hub, [])
+    goal._is_sent = True
+    return goal
 
 
 def made(hub: Any, sent: list[dict[str, Any]]) -> FollowGoal:
@@ -133,6 +135,14 @@ def test_cancel_leaves_the_unread_program_of_another_client(
     goal: FollowGoal, runner: RecordedRunner
 ) -> None:
     runner.status, runner.owned = "planning", False
+    goal.cancel("The client cancelled it.")
+    assert runner.ended == []
+
+
+def test_goal_that_is_not_sent_yet_ends_no_program_of_its_client(
+    goal: FollowGoal, runner: RecordedRunner
+) -> None:
+    goal._is_sent, runner.status = False, "planning"
     goal.cancel("The client cancelled it.")
     assert runner.ended == []
 

@@ -62,6 +62,38 @@ def test_trajectory_is_followed_with_feedback(server: AppServer) -> None:
     asyncio.run(act())
 
 
+def test_new_trajectory_replaces_the_running_one(server: AppServer) -> None:
+    """The replaced goals are cancelled, an invalid one replaces nothing, and STOP ends the last."""
+
+    async def act() -> None:
+        async with ros(server.url) as client:
+            start = (await client.home())["q"]
+            first = await client.goal(FOLLOW, trajectory((9.0, AWAY)))
+            await client.when(lambda state: state["moving"])
+            invalid = await client.goal(FOLLOW, trajectory((1.0, [9.0] * 4)))
+            assert (await client.result(invalid))["status"] == 6
+            # The point at time 0 is where the arm was when the goals were sent.
+            q = (await client.state())["q"]
+            second = await client.goal(FOLLOW, trajectory((0.0, q), (1.5, AWAY)))
+            third = await client.goal(FOLLOW, trajectory((0.0, q), (1.0, start)))
+            for number in (first, second):
+                result = await client.result(number)
+                assert result["status"] == 5
+                assert "newer trajectory" in result["values"]["error_string"]
+            assert (await client.result(third))["status"] == 4
+            assert (await client.state())["q"] == pytest.approx(start, abs=1e-3)
+            await client.goal(FOLLOW, trajectory((9.0, AWAY)))
+            await client.when(lambda state: state["moving"])
+            last = await client.goal(FOLLOW, trajectory((1.0, AWAY)))
+            assert (await client.call("/stop"))["values"]["success"]
+            assert (await client.result(last))["status"] == 5
+            here = (await client.when(lambda state: not state["moving"]))["q"]
+            await asyncio.sleep(0.2)
+            assert (await client.state())["q"] == pytest.approx(here, abs=1e-6)
+
+    asyncio.run(act())
+
+
 @pytest.mark.long
 def test_cancel_brings_the_arm_to_rest(server: AppServer) -> None:
     async def act() -> None:

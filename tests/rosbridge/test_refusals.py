@@ -228,20 +228,6 @@ def test_goal_that_is_not_possible_is_aborted_with_its_code(server: AppServer) -
     asyncio.run(act())
 
 
-def test_second_trajectory_is_refused(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            first = await client.goal(FOLLOW, trajectory((5.0, [0.4, *HOME[1:]])))
-            second = await client.goal(FOLLOW, trajectory((5.0, HOME)))
-            refused = await client.result(second)
-            assert refused["result"] is False
-            assert "Another trajectory" in refused["values"]
-            await client.say("cancel_action_goal", id=first, action=FOLLOW)
-            assert (await client.result(first))["status"] == 5
-
-    asyncio.run(act())
-
-
 def test_client_of_many_invalid_messages_is_disconnected_with_the_reason(
     server: AppServer,
 ) -> None:

@@ -281,7 +281,8 @@ class RosChannel(Channel):
             self._check_goals(op)
             host = GoalHost(self.hub, participant, self._handle, self.notify, self._show_newest)
             follows = action == names.FOLLOW
-            goal = FollowGoal(host, op) if follows else GripperGoal(host, op)
+            earlier = [goal for goal in self._goals if isinstance(goal, FollowGoal)]
+            goal = FollowGoal(host, op, earlier) if follows else GripperGoal(host, op)
         except InputError as error:
             refused = {"op": "action_result", "action": op.action, "id": op.id, "result": False}
             self.notify({**refused, "values": str(error), "status": 6})
@@ -291,15 +292,12 @@ class RosChannel(Channel):
         self._acting.set()
 
     def _check_goals(self, op: ops.SendActionGoal) -> None:
-        """Raise InputError if another goal conflicts with ``op``; a finger goal never does."""
+        """Raise InputError if the id of ``op`` is taken, or the client has too many goals."""
         self._goals = [goal for goal in self._goals if not goal.ended]
         if any(goal.id == op.id for goal in self._goals):
             raise InputError(f"There is a goal with the id {op.id!r} already.")
         if len(self._goals) >= MAX_GOALS:
             raise InputError(f"A client can have {MAX_GOALS} goals at a time. Wait for a result.")
-        for goal in self._goals:
-            if names.resolved(goal.action) == names.resolved(op.action) == names.FOLLOW:
-                raise InputError("Another trajectory is being followed. Cancel it first, or wait.")
 
     def _cancel_goal(self, op: ops.CancelActionGoal) -> None:
         for goal in self._goals:

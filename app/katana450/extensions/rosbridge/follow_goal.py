@@ -98,11 +98,18 @@ class CheckedTrajectory:
 
     @classmethod
     def of(
-        cls, goal: FollowJointTrajectory, joints: Sequence[str], q: FloatArray, now: float
+        cls,
+        goal: FollowJointTrajectory,
+        joints: Sequence[str],
+        q: FloatArray,
+        now: float,
+        *,
+        anywhere: bool = False,
     ) -> CheckedTrajectory:
         """Return ``goal`` for an arm with ``joints`` at rest at ``q`` (n,) [rad].
 
-        ``now`` is the time [s since the epoch]. Raises GoalError with the reason for a refusal.
+        ``now`` is the time [s since the epoch]. ``anywhere``: a first point at time 0 may be away
+        from ``q``. Raises GoalError with the reason for a refusal.
         """
         trajectory = goal.trajectory
         if sorted(trajectory.joint_names) != sorted(joints):
@@ -135,7 +142,7 @@ class CheckedTrajectory:
         postures = np.array(rows)
         if times[0] < MIN_INTERVAL:
             away = float(np.abs(postures[0] - q).max())
-            if away > START_TOLERANCE:
+            if away > START_TOLERANCE and not anywhere:
                 raise _invalid(
                     f"The first point is at time 0 and {away:.3g} rad from where the arm stands. "
                     "Begin where it stands, or give the first point a later time."
@@ -230,11 +237,20 @@ _numbers = itertools.count(1)
 
 
 class FollowGoal(Goal):
-    """One trajectory. The program that moves along it drives, and this client owns it."""
+    """One trajectory. The program that moves along it drives, and this client owns it.
 
-    def __init__(self, host: GoalHost, op: SendActionGoal) -> None:
+    A valid goal replaces the ``earlier`` ones of its client, as in ros2_control: they brake the
+    arm, and it begins where the arm comes to rest.
+    """
+
+    def __init__(
+        self, host: GoalHost, op: SendActionGoal, earlier: Sequence[FollowGoal] = ()
+    ) -> None:
         """Create the goal. Raises InputError if it does not have the fields of its type."""
         super().__init__(host, op)
+        self._earlier = earlier
+        self._received = time.time()
+        self._is_sent = False
         self._goal = read(op.args, FollowJointTrajectory, "a goal of FollowJointTrajectory")
         self._name = f"ROS trajectory {next(_numbers)}"
         self._began: float | None = None
@@ -244,15 +260,19 @@ class FollowGoal(Goal):
         """Check the trajectory, plan it and move along it."""
         gate, arm = self.host.hub.gate, self.host.arm
         gate.check_not_stopped()
+        self._checked()
+        if self._earlier:
+            await self._replace()
+        if self.cancelled:
+            return self._canceled("")
         if arm.state.moving:
             raise _invalid("The arm is moving. Send a trajectory when it is at rest.")
-        trajectory = CheckedTrajectory.of(
-            self._goal, arm.arm.chain.names, arm.state.setpoint, time.time()
-        )
+        trajectory = self._checked()
         if not trajectory.moves:
             return _result(GoalStatus.SUCCEEDED, ErrorCode.SUCCESSFUL, "The arm is there already.")
         script = trajectory.script(self._name)
         self.host.handle(Program(text=script, revocations=self._revocations))
+        self._is_sent = True
         while (now := self._progress()) is not None and now.status == "planning":
             # Raises if the arm was stopped, or the driver changed, while it was planned.
             gate.check_current(self._actor)
@@ -271,6 +291,27 @@ class FollowGoal(Goal):
         request = Steer(order=ProgramOrder.RUN, revocations=self._revocations, wait=MAX_SECONDS)
         end = await self.host.motion_end(request)
         return self._ended(end)
+
+    async def _replace(self) -> None:
+        """Cancel the earlier goals, and wait until the arm is at rest. Raises LeaseError."""
+        gate = self.host.hub.gate
+        for goal in self._earlier:
+            goal.cancel("A newer trajectory replaces it.")
+        # Their program has released the lease, which voids no goal of its owner; a stop does, and
+        # could not be cleared yet.
+        self._revocations = gate.revocations
+        gate.check_not_stopped()
+        while not all(goal.ended for goal in self._earlier):
+            gate.check_current(self._actor)
+            await asyncio.sleep(TICK)
+
+    def _checked(self) -> CheckedTrajectory:
+        """Return the trajectory from where the arm is. Raises GoalError if it is invalid."""
+        arm = self.host.arm
+        names, q = arm.arm.chain.names, arm.state.setpoint
+        return CheckedTrajectory.of(
+            self._goal, names, q, self._received, anywhere=bool(self._earlier)
+        )
 
     def _ended(self, end: answers.MotionEnd) -> Result:
         """Return the result of a trajectory that was begun. Raises GoalError if it failed."""
@@ -331,7 +372,7 @@ class FollowGoal(Goal):
         """Return the progress of the program; None if it is not the present one any more."""
         runner = self.host.hub.runner
         now = runner.progress()
-        if now is None:
+        if now is None or not self._is_sent:
             return None
         # A script has no name until its thread has read it.
         unread = not now.name and runner.owns(self.host.participant)

@@ -1,4 +1,9 @@
-"""The websocket of rosbridge, and the robot's description, as in the exported package for ROS 2."""
+"""The websocket of rosbridge, and the robot's description with the meshes that it names.
+
+They are those of the exported package for ROS 2. The addresses of the meshes hold a secret of this
+server, because viewers load meshes without cookies and headers: a client that has received the
+description can load them.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +11,16 @@ import asyncio
 import functools
 import io
 import logging
+import mimetypes
+import secrets
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
-from starlette.routing import BaseRoute, WebSocketRoute
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from katana450.errors import RobotDescriptionError
@@ -22,10 +33,25 @@ from katana450.server.web.program_socket import serve_socket
 
 log = logging.getLogger(__name__)
 
+MESHES = "/rosbridge/meshes"
+"""Path of the meshes; the secret and the path of a file follow."""
+
+
+class ServedPackage(NamedTuple):
+    """The package of a robot: its description with the meshes.
+
+    Attributes:
+        text: the URDF, whose meshes are at ``package://PATH``; empty without one.
+        files: content of each file by its PATH, which begins with the name of the package.
+    """
+
+    text: str
+    files: dict[str, bytes]
+
 
 @functools.cache
-def description_of(urdf: Path) -> str:
-    """Return the URDF of the package that `export urdf` makes of ``urdf``; empty if it is invalid.
+def description_of(urdf: Path) -> ServedPackage:
+    """Return the package that `export urdf` makes of ``urdf``, without a text if it is invalid.
 
     The first call takes seconds.
     """
@@ -33,22 +59,47 @@ def description_of(urdf: Path) -> str:
         (content,) = package_files(urdf).values()
     except RobotDescriptionError as error:
         log.warning("There is no /robot_description: %s", error)
-        return ""
+        return ServedPackage("", {})
     with zipfile.ZipFile(io.BytesIO(content)) as packed:
-        (name,) = (path for path in packed.namelist() if path.endswith(".urdf"))
-        return packed.read(name).decode()
+        files = {path: packed.read(path) for path in packed.namelist()}
+    (text,) = (content.decode() for path, content in files.items() if path.endswith(".urdf"))
+    return ServedPackage(text, files)
 
 
 def ros_routes(context: RouteContext, urdf: Path) -> list[BaseRoute]:
-    """Return the route of the websocket, for the robot of the file ``urdf``."""
+    """Return the routes of websocket and meshes, for the robot of the file ``urdf``."""
     hub, authenticator = context.hub, context.authenticator
+    secret = secrets.token_urlsafe(16)
 
     async def serve(socket: WebSocket) -> None:
         """Serve one client until its websocket closes."""
         # Without an identity the websocket is refused below.
         known = client_of(authenticator, socket) is not None
-        text = await asyncio.to_thread(description_of, urdf) if known else ""
+        text = (await asyncio.to_thread(description_of, urdf)).text if known else ""
+        scheme = "https" if authenticator.address.cookies_are_secure else "http"
+        folder = f"{scheme}://{socket.headers['host']}{MESHES}/{secret}/"
+        text = text.replace('filename="package://', f'filename="{folder}')
         make = functools.partial(RosChannel, publications=Publications(hub, lambda: text))
         await serve_socket(hub, authenticator, context.budgets, socket, make, RosLine)
 
-    return [WebSocketRoute("/rosbridge", serve)]
+    def mesh(request: Request) -> Response:
+        """Answer with a file of the description, to everybody who knows its address."""
+        key, path = request.path_params["key"].encode(), request.path_params["path"]
+        if not secrets.compare_digest(key, secret.encode()):
+            raise HTTPException(404)
+        content = description_of(urdf).files.get(path)
+        if content is None:
+            raise HTTPException(404)
+        headers = {
+            # Of pages, only those of our site and of `--ros-page` get here.
+            "Access-Control-Allow-Origin": "*",
+            "Cross-Origin-Resource-Policy": "cross-origin",
+            "Cache-Control": "private, max-age=3600",
+        }
+        kind = mimetypes.guess_type(path)[0] or "application/octet-stream"
+        return Response(content, headers=headers, media_type=kind)
+
+    return [
+        WebSocketRoute("/rosbridge", serve),
+        Route(f"{MESHES}/{{key}}/{{path:path}}", mesh),
+    ]
