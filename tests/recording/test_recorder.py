@@ -9,7 +9,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from multiprocessing import Pipe
@@ -27,6 +27,7 @@ from katana450.extensions.recording.files.keeping import keep
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.live.job_process import JobReport
 from katana450.extensions.recording.live.jobs import RecordingJob, RecordingRoutes
 from katana450.extensions.recording.live.record_end import LostTicks, RecordDeserializer, RecordEnd
 from katana450.extensions.recording.live.ring import Ring
@@ -128,9 +129,9 @@ def _pids(server: AppServer) -> tuple[int, int]:
 def test_script_leaves_no_file_even_if_nobody_takes_it(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def made(_job: RecordingJob, command: Sequence[str]) -> str:
-        Path(command[-1]).write_bytes(b"recorded")
-        return ""
+    async def made(job: RecordingJob) -> JobReport:
+        (job._folder / "again.yaml").write_bytes(b"recorded")
+        return JobReport(words="", file="again.yaml")
 
     monkeypatch.setattr(RecordingJob, "_result", made)
     who = Identity("session", "Ada", Role.OPERATOR)

@@ -73,13 +73,6 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="seconds before the end of the recording (default: all)",
     )
-    for name, end in (("--since", "begin"), ("--until", "end")):
-        keep.add_argument(
-            name,
-            type=_seconds,
-            metavar="S",
-            help=f"{end} of the part, in seconds since 1970 (UTC)",
-        )
     keep.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
     listed = acts.add_parser("list", help="list the recordings in a folder")
     listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")

@@ -120,8 +120,7 @@ def record(options: Namespace) -> int:
 
 
 def _keep(options: Namespace) -> int:
-    part = options.since or -math.inf, options.until or math.inf
-    return _written(options.out, keep(options.folder, options.out, options.last, part))
+    return _written(options.out, keep(options.folder, options.out, options.last))
 
 
 def _list(folder: Path) -> int:
