@@ -328,7 +328,7 @@ def test_episode_states_what_the_disk_did_not_take(
     bench.keeper.tick()
     assert bench.keeper.status()["last"]["missing_ticks"] == 61
     assert bench.folder.find(1).episode.missing_ticks == 61
-    assert main(["record", "episodes", "list", str(bench.folder.folder)]) == 0
+    assert main(["record", "list", str(bench.folder.folder)]) == 0
     assert "(61 ticks of 10 ms are missing)" in capsys.readouterr().out
 
 
@@ -370,13 +370,15 @@ def test_folder_is_listed_and_recovered_by_the_command(
     bench.ask(do="start", task="stir")
     bench.move(100)
     bench.ring.sync()
-    assert main(["record", "episodes", "recover", folder]) == 1
+    assert main(["record", "recover", folder]) == 1
     assert "Another server uses" in capsys.readouterr().err
-    assert main(["record", "episodes", "list", folder]) == 0
-    assert "success     pour\nEpisode 2 runs" in capsys.readouterr().out
+    assert main(["record", "list", folder]) == 0
+    assert "episode 1, success: pour\nEpisode 2 runs" in capsys.readouterr().out
     # As after a crash of the server.
     bench.folder.release()
-    assert main(["record", "episodes", "recover", folder]) == 0
+    assert main(["record", "recover", folder, "--out", "all.mcap"]) == 1
+    assert "which has no --out" in capsys.readouterr().err
+    assert main(["record", "recover", folder]) == 0
     assert "Episode 2 was interrupted and is kept as unfinished" in capsys.readouterr().out
     assert main(["record", "list", folder]) == 0
     assert "episode 2, unfinished: stir" in capsys.readouterr().out

@@ -25,11 +25,11 @@ def test_interrupted_episode_waits_until_its_ring_is_found(
     bench.folder.release()
     monkeypatch.chdir("/")
     away.with_name("ring").rename(away)
-    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert main(["record", "recover", str(folder)]) == 0
     assert "There is no folder" in capsys.readouterr().out
     assert len(bench.folder.markers()) == 1
     away.rename(away.with_name("ring"))
-    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert main(["record", "recover", str(folder)]) == 0
     assert "is kept as unfinished" in capsys.readouterr().out
     assert not bench.folder.markers()
     bench.keeper = bench.made()

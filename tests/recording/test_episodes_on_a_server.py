@@ -109,9 +109,7 @@ def test_client_records_episodes(
     server.stop()
     assert main(["record", "list", str(folder)]) == 0
     assert "episode 1, success: pour" in capsys.readouterr().out
-    assert main(["record", "episodes", "list", str(folder)]) == 0
-    assert "success     pour" in capsys.readouterr().out
-    assert main(["record", "episodes", "recover", str(folder)]) == 0
+    assert main(["record", "recover", str(folder)]) == 0
     assert "No episode was interrupted" in capsys.readouterr().out
 
 
@@ -186,4 +184,4 @@ def _answers(client: EpisodeClient, number: int) -> bool:
 
 
 def _recovered(folder: Path) -> bool:
-    return main(["record", "episodes", "recover", str(folder)]) == 0
+    return main(["record", "recover", str(folder)]) == 0

@@ -55,7 +55,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     acts = parser.add_subparsers(
         dest="act",
         required=True,
-        metavar="keep | list | info | recover | verify | again | trim | export | episodes",
+        metavar="keep | list | info | recover | verify | again | trim | export",
     )
     keep = acts.add_parser(
         "keep", help="keep what a server has just recorded, whether it still runs or not"
@@ -74,12 +74,14 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         help="seconds before the end of the recording (default: all)",
     )
     keep.add_argument("--out", type=Path, required=True, metavar="FILE", help="new file")
-    listed = acts.add_parser("list", help="list the recordings in a folder")
+    listed = acts.add_parser("list", help="list the recordings and episodes in a folder")
     listed.add_argument("folder", type=Path, nargs="?", default=Path(), metavar="FOLDER")
     info = acts.add_parser("info", help="describe a recording")
     info.add_argument("file", type=Path, metavar="FILE")
-    recover = acts.add_parser("recover", help="repair a recording after a crash")
-    recover.add_argument("file", type=Path, metavar="FILE")
+    recover = acts.add_parser(
+        "recover", help="repair a recording, or a folder of episodes, after a crash"
+    )
+    recover.add_argument("path", type=Path, metavar="FILE | FOLDER")
     recover.add_argument(
         "--out", type=Path, metavar="FILE", help="new file (default: replace the broken one)"
     )
@@ -104,9 +106,6 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     _add_urdf_option(again)
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    _add_episode_options(
-        acts.add_parser("episodes", help="list and recover the episodes in a folder")
-    )
     export = acts.add_parser("export", help="write recordings for other programs")
     _add_export_options(export)
     for each in (trim, export):
@@ -144,17 +143,6 @@ def add_score_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print the measures as JSON")
     _add_urdf_option(parser)
-
-
-def _add_episode_options(parser: argparse.ArgumentParser) -> None:
-    """Add the subcommands of ``katana450 record episodes`` to ``parser``."""
-    acts = parser.add_subparsers(dest="episode_act", required=True, metavar="list | recover")
-    acts.add_parser("list", help="list the episodes in a folder")
-    acts.add_parser(
-        "recover", help="finish the episode that ran when a server ended, without that server"
-    )
-    for act in acts.choices.values():
-        act.add_argument("folder", type=Path, metavar="FOLDER")
 
 
 def _add_export_options(parser: argparse.ArgumentParser) -> None:

@@ -17,11 +17,7 @@ from katana450.errors import InputError, KatanaError
 from katana450.extensions.progress import report
 from katana450.extensions.recording.datasets.export_command import check_options, export
 from katana450.extensions.recording.episodes.episode import Episode
-from katana450.extensions.recording.episodes.episode_folder import (
-    DISCARDED,
-    EpisodeFolder,
-    episodes_in,
-)
+from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, episodes_in
 from katana450.extensions.recording.episodes.running_episode import finish_interrupted
 from katana450.extensions.recording.files.header import (
     DISTANCES,
@@ -37,49 +33,6 @@ from katana450.extensions.recording.files.simulation import simulates_apart, ver
 from katana450.extensions.recording.files.trimming import Trimmed, trim
 from katana450.extensions.recording.folders import recordings_in
 from katana450.extensions.recording.ticks import Verification
-
-
-def episodes(options: Namespace) -> int:
-    """Run ``katana450 record episodes`` and return the exit status. Raises KatanaError."""
-    path: Path = options.folder
-    if not path.is_dir():
-        raise InputError(f"There is no folder {path}.")
-    return _list_episodes(path) if options.episode_act == "list" else _recover_episodes(path)
-
-
-def _list_episodes(path: Path) -> int:
-    """Print the episodes in the folder ``path``."""
-    folder = EpisodeFolder(path)
-    for each in folder.kept():
-        found = each.episode
-        missing = found.missing_ticks
-        remarks = (f"{missing} ticks of 10 ms are missing" if missing else "", found.note)
-        remark = "; ".join(filter(None, remarks))
-        remark = f"  ({remark})" if remark else ""
-        length, outcome = f"{found.length:7.1f} s", f"{found.outcome.value:10}"
-        print(printable(f"{found.number:4}  {length}  {outcome}  {found.task}{remark}"))
-    for why in folder.unreadable():
-        print(printable(why))
-    gone = len(folder.discarded())
-    if gone:
-        print(f"{gone} discarded, in {path / DISCARDED}")
-    for marker in folder.markers():
-        print(f"Episode {marker.episode.number} runs, or was interrupted.")
-    return 0
-
-
-def _recover_episodes(path: Path) -> int:
-    """Finish interrupted episodes in the folder ``path``, which no server may use."""
-    folder = EpisodeFolder(path)
-    folder.claim()
-    try:
-        said = finish_interrupted(folder, folder.markers())
-    finally:
-        folder.release()
-    for each in said or ["No episode was interrupted."]:
-        print(printable(each))
-    return 0
-
 
 PROGRESS_STEP = 0.02
 """[1] Fraction of a recording after which the progress is shown again."""
@@ -108,13 +61,11 @@ def record(options: Namespace) -> int:
         case "info":
             return _info(options.file)
         case "recover":
-            return _recover(options.file, options.out or options.file)
+            return _recover(options.path, options.out)
         case "verify":
             return _verify(options.file, options.urdf, as_json=options.json)
         case "trim":
             return _trim(options.files, options.out, options.start, options.end)
-        case "episodes":
-            return episodes(options)
         case _:
             return _export(options)
 
@@ -134,12 +85,18 @@ def _list(folder: Path) -> int:
                 print(printable("  ".join((line, *map(_about, episodes_in(file))))))
         except InputError as error:
             print(printable(f"{path}  {error}"), file=sys.stderr)
+    for marker in EpisodeFolder(folder).markers():
+        print(f"Episode {marker.episode.number} runs, or was interrupted.")
     return 0
 
 
 def _about(episode: Episode) -> str:
-    """Return number, outcome and task of ``episode`` in words."""
-    return f"episode {episode.number}, {episode.outcome.value}: {episode.task}"
+    """Return number, outcome, task and remarks of ``episode`` in words."""
+    missing = episode.missing_ticks
+    gap = f"{missing} ticks of 10 ms are missing" if missing else ""
+    remark = "; ".join(filter(None, (gap, episode.note)))
+    about = f"episode {episode.number}, {episode.outcome.value}: {episode.task}"
+    return f"{about} ({remark})" if remark else about
 
 
 def _info(path: Path) -> int:
@@ -159,12 +116,29 @@ def _info(path: Path) -> int:
     return 0
 
 
-def _recover(path: Path, out: Path) -> int:
-    found = recover(path, out)
-    if found is None:
+def _recover(path: Path, out: Path | None) -> int:
+    if path.is_dir():
+        if out is not None:
+            raise InputError(f"{path} is a folder of episodes, which has no --out.")
+        return _recover_episodes(path)
+    recovered = recover(path, out or path)
+    if recovered is None:
         print(f"{path} is whole: nothing was changed.")
     else:
-        print(printable(f"{out}: {found}."))
+        print(printable(f"{out or path}: {recovered}."))
+    return 0
+
+
+def _recover_episodes(path: Path) -> int:
+    """Finish interrupted episodes in the folder ``path``, which no server may use."""
+    folder = EpisodeFolder(path)
+    folder.claim()
+    try:
+        sentences = finish_interrupted(folder, folder.markers())
+    finally:
+        folder.release()
+    for sentence in sentences or ["No episode was interrupted."]:
+        print(printable(sentence))
     return 0
 
 
