@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -234,20 +235,20 @@ def export_lerobot(
         ]
         for video in videos:
             stack.callback(video.abandon)
-        episodes = (_sampled_episode(cut, options.fps) for cut in cuts)
+        episodes: Iterator[_Episode] = (_sampled_episode(cut, options.fps) for cut in cuts)
+        pictures: Iterator[tuple[Pixels, ...]] = repeat(())
         if cameras is None or session is None:
-            for episode in progress(episodes, len(cuts), out.name):
-                _add(writer, episode, {}, {})
+            episodes = progress(episodes, len(cuts), out.name)
         else:
             states = _states(cuts, options.fps, session)
             pictures = progress(stack.enter_context(cameras(states, count)), count, out.name)
-            for episode in episodes:
-                for _ in episode.times:
-                    for video, picture in zip(videos, next(pictures), strict=True):
-                        video.add(picture)
-                _add_with_videos(writer, episode, shape, videos)
-            # The last step of the progress.
-            next(pictures, None)
+        for episode in episodes:
+            for _ in episode.times:
+                for video, picture in zip(videos, next(pictures), strict=True):
+                    video.add(picture)
+            _add(writer, episode, shape, videos)
+        # The last step of the progress.
+        next(pictures, None)
         for video in videos:
             video.finish()
         found = [video.counts.statistics for video in videos]
@@ -306,16 +307,6 @@ def _states(cuts: Sequence[EpisodeCut], fps: int, session: Session) -> Iterator[
 def _add(
     writer: LerobotWriter,
     episode: _Episode,
-    videos: dict[str, object],
-    statistics: dict[str, dict[str, list[object]]],
-) -> None:
-    cut = episode.cut
-    writer.add_episode(episode.state, episode.action, cut.task, cut.success, videos, statistics)
-
-
-def _add_with_videos(
-    writer: LerobotWriter,
-    episode: _Episode,
     shape: DatasetShape,
     videos: Sequence[EpisodeVideo],
 ) -> None:
@@ -324,7 +315,8 @@ def _add_with_videos(
     for feature, video in zip(shape.videos.values(), videos, strict=True):
         row, statistics[feature] = video.end_episode()
         columns.update(row)
-    _add(writer, episode, columns, statistics)
+    cut = episode.cut
+    writer.add_episode(episode.state, episode.action, cut.task, cut.success, columns, statistics)
 
 
 def _exported(cuts: Sequence[EpisodeCut], frames: int) -> Exported:
