@@ -38,7 +38,6 @@ AVOIDED = frozenset(
 NOT_YET = (
     "extensions/leader",
     "extensions/real_arm",
-    "extensions/recording",
     # Its keyword `at` is the word of scripts.
     "library/script_writer.py",
 )

@@ -267,7 +267,7 @@ def form_of(hint: Any) -> TextForm:
     if issubclass(hint, tuple) and hasattr(hint, "_fields"):
         hints = typing.get_type_hints(hint)
         kinds = tuple(hints[name] for name in hint._fields)
-        return _row(kinds, made=lambda items: hint(*items))
+        return _row(kinds, convert=lambda items: hint(*items))
     if dataclasses.is_dataclass(hint) or issubclass(hint, msgspec.Struct):
         record = _Record(hint)
         return _shared(record) if hint in SHARED else TextForm((dict,), record.decode, record)
@@ -292,7 +292,7 @@ def _bytes(form: Any) -> bytes:
 
 
 def _plain(
-    kind: type, allowed: tuple[Any, ...] = (), made: Callable[[Any], Any] = lambda form: form
+    kind: type, allowed: tuple[Any, ...] = (), convert: Callable[[Any], Any] = lambda form: form
 ) -> TextForm:
     """Return the form of texts, whole numbers or truth values, of those in ``allowed`` if any."""
     named = "a whole number" if kind is int else f"of the type {kind.__name__}"
@@ -302,13 +302,13 @@ def _plain(
             raise FormError(f"{shown(form)} is not {named}")
         if allowed and form not in allowed:
             raise FormError(f"{shown(form)} is not one of {', '.join(map(str, allowed))}")
-        return made(form)
+        return convert(form)
 
     return TextForm((kind,), decode)
 
 
 def _row(
-    hints: tuple[Any, ...], *, repeated: bool = False, made: Callable[[Any], Any] = tuple
+    hints: tuple[Any, ...], *, repeated: bool = False, convert: Callable[[Any], Any] = tuple
 ) -> TextForm:
     """Return the form of tuples of ``hints``; if ``repeated``, of any number of the first."""
 
@@ -324,7 +324,7 @@ def _row(
                 items.append(kind.decode(item, shared))
             except FormError as error:
                 raise error.within(place) from None
-        return made(items)
+        return convert(items)
 
     for hint in hints:
         form_of(hint)
@@ -364,10 +364,10 @@ def _union(parts: Iterable[Any]) -> TextForm:
             if record is None:
                 raise FormError(f"{shown(name)} is not one of {', '.join(records)}")
             return record.decode(form, shared)
-        found = by_json.get(type(form))
-        if found is None:
+        plain_form = by_json.get(type(form))
+        if plain_form is None:
             raise FormError(f"{shown(form)} has no value here")
-        return found.decode(form, shared)
+        return plain_form.decode(form, shared)
 
     return TextForm(tuple(by_json), decode)
 
@@ -409,7 +409,7 @@ class _Record:
         if not isinstance(form, dict):
             raise FormError(f"{shown(form)} is not an object of {name}")
         order = form.get(ORDER) if self.kind is Plan else None
-        given: dict[str, Any] = {}
+        forms: dict[str, Any] = {}
         for field, content in upgraded(self.kind, form).items():
             if field not in self.forms:
                 known = field == TAG or (field == ORDER and self.kind is Plan)
@@ -417,45 +417,45 @@ class _Record:
                     continue
                 raise FormError(f"{name} has no field {shown(field)}")
             try:
-                given[field] = self.forms[field].decode(content, shared)
+                forms[field] = self.forms[field].decode(content, shared)
             except FormError as error:
                 raise error.within(field) from None
-        missing = self._required - given.keys()
+        missing = self._required - forms.keys()
         if missing:
             raise FormError(f"{name} lacks {', '.join(sorted(missing))}")
         if self.kind is Plan:
-            given["segments"] = _ordered(given["segments"], order)
-        return self._made(given)
+            forms["segments"] = _ordered(forms["segments"], order)
+        return self._made(forms)
 
-    def _made(self, given: Mapping[str, Any]) -> Any:
+    def _made(self, forms: Mapping[str, Any]) -> Any:
         """Return the value with the fields ``given``. Raises FormError if they are invalid."""
         if self.kind in SINGLE:
             return SINGLE[self.kind]
         try:
-            value = self.kind(**given)
+            value = self.kind(**forms)
         except Exception as error:
             # Whatever a constructor raises for fields of the right types, they are invalid.
             raise FormError(f"these fields are no {self.kind.__name__}: {error}") from None
         if hasattr(self.kind, "__post_init__"):
-            self._keep_exact(value, given)
+            self._keep_exact(value, forms)
         return value
 
-    def _keep_exact(self, value: Any, given: Mapping[str, Any]) -> None:
+    def _keep_exact(self, value: Any, forms: Mapping[str, Any]) -> None:
         """Undo the rounding of what was rounded before, such as the length of a direction."""
-        for name, wanted in given.items():
-            made = getattr(value, name)
+        for name, wanted in forms.items():
+            computed = getattr(value, name)
             if isinstance(wanted, np.ndarray):
                 if not (
-                    isinstance(made, np.ndarray)
-                    and made.shape == wanted.shape
-                    and np.allclose(made, wanted, ROUNDING, ROUNDING, equal_nan=True)
+                    isinstance(computed, np.ndarray)
+                    and computed.shape == wanted.shape
+                    and np.allclose(computed, wanted, ROUNDING, ROUNDING, equal_nan=True)
                 ):
                     raise FormError(f"this is not a valid {name} of {self.kind.__name__}")
                 if isinstance(value, msgspec.Struct):
                     msgspec.structs.force_setattr(value, name, wanted)
                 else:
                     object.__setattr__(value, name, wanted)
-            elif made is not wanted and made != wanted:
+            elif computed is not wanted and computed != wanted:
                 raise FormError(f"{name} of {self.kind.__name__} cannot be {shown(wanted)}")
 
 

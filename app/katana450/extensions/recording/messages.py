@@ -280,8 +280,8 @@ class Topic(NamedTuple):
     def schema(self) -> dict[str, Any]:
         """The JSON schema of the messages, which refers to no other part: displays need that."""
         (whole,), parts = msgspec.json.schema_components((self.kind,), ref_template="{name}")
-        found: dict[str, Any] = _without_references(whole, parts)
-        return found
+        schema: dict[str, Any] = _without_references(whole, parts)
+        return schema
 
 
 def _without_references(schema: Any, parts: dict[str, Any]) -> Any:
@@ -325,7 +325,7 @@ def nanoseconds(t: float) -> int:
 
 def _rounded(values: FloatArray, digits: int) -> list[float]:
     """Return a few numbers (n,) with ``digits`` decimals; numpy takes longer for them."""
-    return [round(each, digits) + 0.0 for each in values.tolist()]
+    return [round(value, digits) + 0.0 for value in values.tolist()]
 
 
 def _point(values: Iterable[float], digits: int) -> Vector:
@@ -357,9 +357,9 @@ class StateMessages:
     def prepare(self, states: Sequence[State]) -> None:
         """Find the poses of the tool in ``states`` together, which takes less time."""
         arm = self._robot.arm
-        if arm is None or len({each.tool for each in states}) != 1:
+        if arm is None or len({sample.tool for sample in states}) != 1:
             return
-        q = np.array([each.q for each in states])
+        q = np.array([sample.q for sample in states])
         poses = arm.T_base_shoulder @ forward_batch(arm.chain_to(states[0].tool), q)
         self._tools = {id(state): (state, T) for state, T in zip(states, poses, strict=True)}
 

@@ -108,12 +108,12 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
     export = acts.add_parser("export", help="write recordings for other programs")
     _add_export_options(export)
-    for each in (trim, export):
-        each.add_argument(
+    for command in (trim, export):
+        command.add_argument(
             "--out", type=Path, required=True, metavar="FILE", help="new file or folder"
         )
-    for each in (trim, export):
-        _add_part_options(each)
+    for command in (trim, export):
+        _add_part_options(command)
     _add_part_options(again, episode=True)
 
 
@@ -241,12 +241,12 @@ def _seconds(text: str) -> float:
 
 
 def _outcomes(text: str) -> tuple[str, ...]:
-    found = tuple(each.strip() for each in text.split(","))
-    if not set(found) <= set(OUTCOMES):
+    outcomes = tuple(name.strip() for name in text.split(","))
+    if not set(outcomes) <= set(OUTCOMES):
         raise argparse.ArgumentTypeError(
             f"expected some of {', '.join(OUTCOMES)}, separated by commas, not {text!r}"
         )
-    return found
+    return outcomes
 
 
 def _size(text: str) -> tuple[int, int]:
@@ -264,7 +264,7 @@ def _size(text: str) -> tuple[int, int]:
 def _target(text: str) -> tuple[str, tuple[float, float, float]]:
     name, _, place = text.partition("=")
     try:
-        numbers = [1e-3 * float(each) for each in place.split(",")]
+        numbers = [1e-3 * float(coordinate) for coordinate in place.split(",")]
     except ValueError:
         numbers = []
     if not name or len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):

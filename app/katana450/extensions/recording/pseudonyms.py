@@ -38,8 +38,8 @@ class Pseudonyms:
         if state is record.state and not record.submissions:
             return record
         submissions = [
-            Submission(self._command(each.command), self._actor(each.actor))
-            for each in record.submissions
+            Submission(self._command(submission.command), self._actor(submission.actor))
+            for submission in record.submissions
         ]
         return record._replace(submissions=submissions, state=state)
 

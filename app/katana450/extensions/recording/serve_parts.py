@@ -101,11 +101,11 @@ def routes(context: RouteContext) -> list[BaseRoute]:
         from katana450.extensions.recording.playback.store import RecordingStore
 
         store = RecordingStore(folder)
-        made: list[BaseRoute] = [*RecordingRoutes(context, store).routes()]
-        made += PlaybackRoutes(context, store).routes()
+        late_routes: list[BaseRoute] = [*RecordingRoutes(context, store).routes()]
+        late_routes += PlaybackRoutes(context, store).routes()
         if episodes is not None and link is not None:
-            made += EpisodeRoutes(context, episodes, link).routes()
-        return made
+            late_routes += EpisodeRoutes(context, episodes, link).routes()
+        return late_routes
 
     names = [f"{ROOT}/{name}" for name in ("recording", "playback", "episodes")]
     return LateRoutes(names, make).routes()

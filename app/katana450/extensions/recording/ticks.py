@@ -43,7 +43,7 @@ DIGEST_DIGITS = 10
 take less room than others beside numbers."""
 
 APART = ("t", "mode", "objects")
-PLAIN = tuple(each.name for each in fields(State) if each.name not in APART)
+PLAIN = tuple(field.name for field in fields(State) if field.name not in APART)
 POURED = PLAIN.index("poured")
 
 
@@ -86,8 +86,8 @@ class Digester:
     def digest(self, state: State, content: bytes | None = None) -> str:
         """Return the digest of ``state``. ``content``: its content, if it is known."""
         content = self.content(state) if content is None else content
-        found = hashlib.blake2b(self._encoder.encode(state.t) + content, digest_size=8).digest()
-        return f"{int.from_bytes(found) % 10**DIGEST_DIGITS:0{DIGEST_DIGITS}d}"
+        digest = hashlib.blake2b(self._encoder.encode(state.t) + content, digest_size=8).digest()
+        return f"{int.from_bytes(digest) % 10**DIGEST_DIGITS:0{DIGEST_DIGITS}d}"
 
 
 def _mode(mode: Mode) -> tuple[Any, ...]:
@@ -154,10 +154,10 @@ def _is_at_setpoint(state: State) -> bool:
 def tick_input(codec: Codec, message: TickMessage) -> TickInput:
     """Return the tick of ``message``. Raises FormError."""
     submissions, sent = [], None
-    for place, given in enumerate(message.commands):
+    for place, text in enumerate(message.commands):
         try:
-            command = codec.decoded(Command, given.command)
-            submissions.append(Submission(command, codec.decoded(Actor | None, given.actor)))
+            command = codec.decoded(Command, text.command)
+            submissions.append(Submission(command, codec.decoded(Actor | None, text.actor)))
         except FormError as error:
             raise error.within(place).within("commands") from None
     if message.sent is not None:
@@ -230,7 +230,7 @@ def after(session: Session, before: State, tick: TickInput) -> State:
 
     Raises InputError for a tick that the rules refuse, which no control loop has recorded.
     """
-    commands = [each.command for each in tick.submissions]
+    commands = [submission.command for submission in tick.submissions]
     if tick.t_before is not None:
         before = replace(before, t=tick.t_before)
     if tick.failed:
@@ -326,12 +326,12 @@ class Checker:
         """Note the difference of the last tick, whose setpoint is known by now."""
         if self._differs is None or self._state is None:
             return
-        found = Difference(self._differs, self._size(self._state))
+        difference = Difference(self._differs, self._size(self._state))
         self._differs = None
         self._different += 1
-        self._first = found if self._first is None else self._first
-        if self._largest is None or found.size > self._largest.size:
-            self._largest = found
+        self._first = difference if self._first is None else self._first
+        if self._largest is None or difference.size > self._largest.size:
+            self._largest = difference
 
     def _size(self, state: State) -> float:
         known = self._setpoint

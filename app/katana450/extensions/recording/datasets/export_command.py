@@ -102,7 +102,7 @@ def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: f
 def _lerobot(options: argparse.Namespace) -> Exported:
     views = tuple(dict.fromkeys(options.views or ()))
     size = options.size or DEFAULT_SIZES["lerobot"]
-    asked = LerobotOptions(
+    request = LerobotOptions(
         fps=DEFAULT_FPS["lerobot"] if options.fps is None else options.fps,
         task=options.task or "",
         outcomes=options.outcomes or DEFAULT_OUTCOMES,
@@ -110,18 +110,18 @@ def _lerobot(options: argparse.Namespace) -> Exported:
         views=views,
         size=size,
     )
-    if len(options.files) > 1 and asked.part != (0.0, math.inf):
+    if len(options.files) > 1 and request.part != (0.0, math.inf):
         raise InputError("--from and --to cut one recording; trim several one by one before.")
     if not views:
-        return export_lerobot(options.files, options.out, asked)
+        return export_lerobot(options.files, options.out, request)
     from katana450.extensions.media.film import check_filmable
     from katana450.extensions.recording.datasets.player_files import PictureViews
 
-    check_filmable(size, asked.fps)
+    check_filmable(size, request.fps)
     with RecordingFile.open(files_of(options.files)[0]) as first:
         robot = _robot(first, options.urdf)
         pictures = PictureViews(views, size, options.urdf, first.settings.bare)
-    return export_lerobot(options.files, options.out, asked, robot.session, pictures.pictures)
+    return export_lerobot(options.files, options.out, request, robot.session, pictures.pictures)
 
 
 def _robot(file: RecordingFile, urdf: Path | None) -> DescribedRobot:

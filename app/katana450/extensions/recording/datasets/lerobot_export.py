@@ -35,7 +35,7 @@ from katana450.extensions.recording.files.simulation import check_whole
 from katana450.extensions.recording.folders import new_folder
 from katana450.maths.geometry.arrays import FloatArray
 
-DEFAULT_OUTCOMES = tuple(each.value for each in JUDGED)
+DEFAULT_OUTCOMES = tuple(outcome.value for outcome in JUDGED)
 """Outcomes that are exported unless others are asked for."""
 
 EPISODE_FILES = "episode-*.mcap"
@@ -74,16 +74,16 @@ def files_of(paths: Sequence[Path]) -> list[Path]:
 
     Raises InputError for a folder without episodes.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     for path in paths:
         if not path.is_dir():
-            found.append(path)
+            files.append(path)
             continue
-        inside = sorted(path.glob(EPISODE_FILES), key=lambda each: (len(each.name), each.name))
+        inside = sorted(path.glob(EPISODE_FILES), key=lambda file: (len(file.name), file.name))
         if not inside:
             raise InputError(f"{path} has no episodes: its files would be {EPISODE_FILES}.")
-        found += inside
-    return found
+        files += inside
+    return files
 
 
 def cuts_in(
@@ -102,7 +102,7 @@ def cuts_in(
     """
     episodes = episodes_in(file)
     if not episodes:
-        start, end = (min(file.start + each, file.end) for each in part)
+        start, end = (min(file.start + episode, file.end) for episode in part)
         yield EpisodeCut(file.path, start, end, _task(task, file), None)
         return
     if part[0] > 0.0 or file.start + part[1] < file.end:
@@ -110,17 +110,24 @@ def cuts_in(
             f"{file.path} has {len(episodes)} episodes. --from and --to cut recordings without "
             "episodes only."
         )
-    for each in episodes:
-        if each.outcome.value in outcomes and each.end is not None:
-            if not file.start - MAX_OUTSIDE <= each.start < each.end <= file.end + MAX_OUTSIDE:
+    for episode in episodes:
+        if episode.outcome.value in outcomes and episode.end is not None:
+            if (
+                not file.start - MAX_OUTSIDE
+                <= episode.start
+                < episode.end
+                <= file.end + MAX_OUTSIDE
+            ):
                 raise InputError(
-                    f"Episode {each.number} of {file.path} is from {each.start:.3f} to "
-                    f"{each.end:.3f} s, but the recording is from {file.start:.3f} to "
+                    f"Episode {episode.number} of {file.path} is from {episode.start:.3f} to "
+                    f"{episode.end:.3f} s, but the recording is from {file.start:.3f} to "
                     f"{file.end:.3f} s. The file was changed or is damaged."
                 )
-            success = each.outcome is EpisodeOutcome.SUCCESS if each.outcome in JUDGED else None
-            task_text = _task(each.task or task, file, each.number)
-            yield EpisodeCut(file.path, each.start, each.end, task_text, success)
+            success = (
+                episode.outcome is EpisodeOutcome.SUCCESS if episode.outcome in JUDGED else None
+            )
+            task_text = _task(episode.task or task, file, episode.number)
+            yield EpisodeCut(file.path, episode.start, episode.end, task_text, success)
 
 
 def _task(task: str, file: RecordingFile, number: int | None = None) -> str:
@@ -251,8 +258,8 @@ def export_lerobot(
         next(pictures, None)
         for video in videos:
             video.finish()
-        found = [video.counts.statistics for video in videos]
-        writer.finish(dict(zip(shape.videos.values(), found, strict=True)))
+        statistics = [video.counts.statistics for video in videos]
+        writer.finish(dict(zip(shape.videos.values(), statistics, strict=True)))
     return _exported(cuts, count)
 
 

@@ -32,15 +32,15 @@ def column_statistics(values: npt.NDArray[Any]) -> Statistics:
     interpolated. ``count`` is a list of one number.
     """
     numbers = np.asarray(values, dtype=np.float64)
-    found = {
+    statistics = {
         "min": numbers.min(axis=0),
         "max": numbers.max(axis=0),
         "mean": numbers.mean(axis=0),
         "std": numbers.std(axis=0),
     }
     quantiles = np.quantile(numbers, tuple(QUANTILES.values()), axis=0)
-    found.update(zip(QUANTILES, quantiles, strict=True))
-    lists: Statistics = {name: value.tolist() for name, value in found.items()}
+    statistics.update(zip(QUANTILES, quantiles, strict=True))
+    lists: Statistics = {name: value.tolist() for name, value in statistics.items()}
     return {**lists, "count": [len(numbers)]}
 
 
@@ -74,17 +74,17 @@ class PixelCounts:
                 for counts, middle in zip(self._counts, mean, strict=True)
             ]
         )
-        found = {
+        statistics = {
             "min": [levels[np.flatnonzero(counts)[0]] for counts in self._counts],
             "max": [levels[np.flatnonzero(counts)[-1]] for counts in self._counts],
             "mean": mean,
             "std": np.sqrt(spread / total),
         }
         for name, fraction in QUANTILES.items():
-            found[name] = [_quantile(counts, fraction) for counts in self._counts]
+            statistics[name] = [_quantile(counts, fraction) for counts in self._counts]
         lists: Statistics = {
             name: np.asarray(value, dtype=np.float64).reshape(3, 1, 1).tolist()
-            for name, value in found.items()
+            for name, value in statistics.items()
         }
         return {**lists, "count": [self._pictures]}
 
@@ -349,7 +349,7 @@ class LerobotWriter:
                 f"Episode {len(self._rows)} of the dataset has states of {state.shape[1]} numbers, "
                 f"not {len(self._shape.names)}: its recording is of another robot."
             )
-        farthest = max(float(np.abs(each).max(initial=0.0)) for each in (state, action))
+        farthest = max(float(np.abs(values).max(initial=0.0)) for values in (state, action))
         if farthest > MAX_VALUE:
             raise InputError(
                 f"Episode {len(self._rows)} of the dataset has a joint at {farthest:g} rad or m. "
@@ -430,8 +430,8 @@ class LerobotWriter:
 
     def _type(self, kind: str, shape: list[int]) -> Any:
         pa = self._arrow
-        found = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}[kind]
-        return found if shape == [1] else pa.list_(found, shape[0])
+        types = {"float32": pa.float32(), "int64": pa.int64(), "bool": pa.bool_()}[kind]
+        return types if shape == [1] else pa.list_(types, shape[0])
 
     def _episode_schema(self) -> Any:
         """Return the types of the columns of episodes, by their names."""

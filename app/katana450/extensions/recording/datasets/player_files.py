@@ -92,8 +92,8 @@ def write_film_of(
     check_filmable(size, fps)
     times = frame_times(*part, fps)
     reader = RecordedStates(file, robot.session)
-    with views.pictures(reader.at(times), len(times)) as taken:
-        pictures = (first for (first,) in taken)
+    with views.pictures(reader.at(times), len(times)) as images:
+        pictures = (first for (first,) in images)
         count = write_film(out, progress(pictures, len(times), out.name), size, fps)
     report_unknown(reader)
     return count

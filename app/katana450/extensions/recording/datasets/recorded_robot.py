@@ -26,9 +26,9 @@ URDF, XACRO = ".urdf", ".xacro"
 def attached_urdf(file: RecordingFile) -> Attachment:
     """Return the URDF of ``file``. Raises InputError without one."""
     name = file.metadata.get("urdf")
-    for each in file.attachments():
-        if each.name == name:
-            return each
+    for attachment in file.attachments():
+        if attachment.name == name:
+            return attachment
     raise InputError(f"{file.path} has no URDF attached, so the names of its joints are unknown.")
 
 
@@ -55,16 +55,16 @@ def orientations(file: RecordingFile, start: float, end: float) -> FloatArray:
     a tool, and for a damaged recording.
     """
     arm = recorded_robot(file).arm
-    found = list(rows(file, start, end))
+    states = list(rows(file, start, end))
     if arm is None:
         raise InputError(f"{file.path} has no orientation: its robot has joints only.")
-    tools = [each.tool for each in found]
-    shape = (len(found), arm.chain.n)
-    joints = [each.joints for each in found]
+    tools = [state.tool for state in states]
+    shape = (len(states), arm.chain.n)
+    joints = [state.joints for state in states]
     q = finite_array(joints, shape, f"The joints in {file.path}")
-    quaternions = np.empty((len(found), 4))
+    quaternions = np.empty((len(states), 4))
     for tool in dict.fromkeys(tools):
-        here = np.array([each == tool for each in tools])
-        R = (arm.T_base_shoulder @ forward_batch(arm.chain_to(tool), q[here]))[:, :3, :3]
-        quaternions[here] = [so3.to_quaternion(each)[[1, 2, 3, 0]] for each in R]
+        mask = np.array([name == tool for name in tools])
+        R = (arm.T_base_shoulder @ forward_batch(arm.chain_to(tool), q[mask]))[:, :3, :3]
+        quaternions[mask] = [so3.to_quaternion(rotation)[[1, 2, 3, 0]] for rotation in R]
     return frozen(quaternions)

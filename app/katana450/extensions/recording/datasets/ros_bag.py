@@ -132,15 +132,15 @@ class _Bag:
 
     def add_part(self, start: float, end: float) -> None:
         """Add all messages from ``start`` to ``end`` [s]."""
-        begun = False
+        started = False
         for message in self._messages(start, end):
             t = message.log_time + self._offset
             if not 0 <= t < MAX_TIME:
                 raise InputError(
                     f"{self._file.path} is damaged: its times are not from 1970 to 2038."
                 )
-            if not begun:
-                begun = True
+            if not started:
+                started = True
                 urdf = attached_urdf(self._file).data.decode(errors="replace")
                 self._add(DESCRIPTION, t, data=urdf)
                 self._add(TF_STATIC, t, transforms=self._transforms(t, self._fixed()))

@@ -73,14 +73,14 @@ def sampled(t: FloatArray, values: FloatArray, times: FloatArray) -> FloatArray:
         values: their values, (M,) or (M, n).
         times: times to sample at [s].
     """
-    at = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
-    after = np.minimum(at + 1, len(t) - 1)
-    begin, end = t[at], t[after]
+    index = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+    after = np.minimum(index + 1, len(t) - 1)
+    begin, end = t[index], t[after]
     begin = np.where(end - begin > MAX_STEP, end - TICK, begin)
     length = end - begin
     fraction = np.divide(times - begin, length, out=np.zeros(len(times)), where=length > 0.0)
     fraction = np.clip(fraction, 0.0, 1.0).reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(values[at] + fraction * (values[after] - values[at]))
+    return np.asarray(values[index] + fraction * (values[after] - values[index]))
 
 
 def columns_from(file: RecordingFile, start: float, end: float) -> dict[str, FloatArray]:

@@ -266,7 +266,7 @@ _decoder: msgspec.json.Decoder[Any] = msgspec.json.Decoder(AnyEpisodeRequest)
 def episode_request(text: bytes | str) -> AnyEpisodeRequest:
     """Return the request in the JSON ``text``. Raises InputError with the reason if it is wrong."""
     try:
-        found: AnyEpisodeRequest = _decoder.decode(text)
+        request: AnyEpisodeRequest = _decoder.decode(text)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise InputError(f"This is not a valid request about episodes: {error}.") from error
-    return found
+    return request

@@ -62,10 +62,10 @@ def episodes_in(file: RecordingFile) -> tuple[Episode, ...]:
 
 def only_episode(file: RecordingFile) -> Episode:
     """Return the episode that ``file`` describes. Raises InputError unless there is exactly one."""
-    found = episodes_in(file)
-    if len(found) != 1:
-        raise InputError(f"{file.path} describes {len(found)} episodes, not one.")
-    return found[0]
+    episodes = episodes_in(file)
+    if len(episodes) != 1:
+        raise InputError(f"{file.path} describes {len(episodes)} episodes, not one.")
+    return episodes[0]
 
 
 def shown_part(file: RecordingFile, start: float | None, end: float | None) -> tuple[float, float]:
@@ -75,9 +75,9 @@ def shown_part(file: RecordingFile, start: float | None, end: float | None) -> t
     trimmed, if the file was cut out as that of one episode; else it is that of the file.
     """
     first, last = 0.0, math.inf
-    found = episodes_in(file)
-    if len(found) == 1 and found[0].end is not None and _is_cut_out(file):
-        first, last = (max(t - file.start, 0.0) for t in (found[0].start, found[0].end))
+    episodes = episodes_in(file)
+    if len(episodes) == 1 and episodes[0].end is not None and _is_cut_out(file):
+        first, last = (max(t - file.start, 0.0) for t in (episodes[0].start, episodes[0].end))
     return first if start is None else start, last if end is None else end
 
 
@@ -147,10 +147,10 @@ def _data(path: Path, file: BinaryIO) -> bytes:
 def _write(out: BinaryIO, data: bytes, summary: Summary, message: Message) -> None:
     """Write ``data``, ``message`` in a chunk of its own, and the index of both."""
     out.write(data)
-    channel = next(each.id for each in summary.channels.values() if each.topic == message.topic)
-    at = message.log_time
-    content = packed_records([McapMessage(channel, at, message.data, at, message.number)])
-    write_chunk(out, summary, content, {channel: [(at, 0)]})
+    channel = next(entry.id for entry in summary.channels.values() if entry.topic == message.topic)
+    stamp = message.log_time
+    content = packed_records([McapMessage(channel, stamp, message.data, stamp, message.number)])
+    write_chunk(out, summary, content, {channel: [(stamp, 0)]})
     write_end(out, summary)
 
 
@@ -207,14 +207,14 @@ class EpisodeMarker(msgspec.Struct, frozen=True):
 
 def episode_files(folder: Path) -> list[Path]:
     """Return the files of the kept episodes in ``folder``, by number."""
-    found = [path for path in folder.glob(f"episode-*{SUFFIX}") if NAME.fullmatch(path.name)]
-    return sorted(found, key=number_of)
+    files = [path for path in folder.glob(f"episode-*{SUFFIX}") if NAME.fullmatch(path.name)]
+    return sorted(files, key=number_of)
 
 
 def number_of(path: Path) -> int:
     """Return the number of the episode in the name of ``path``; 0 for another file."""
-    found = NAME.fullmatch(path.name)
-    return 0 if found is None else int(found[1])
+    match = NAME.fullmatch(path.name)
+    return 0 if match is None else int(match[1])
 
 
 class EpisodeFolder:
@@ -285,13 +285,13 @@ class EpisodeFolder:
 
     def unreadable(self) -> list[str]:
         """Return what is wrong with each file of an episode that cannot be read."""
-        found = []
+        reasons = []
         for path in episode_files(self.folder):
             try:
                 self._kept(path, discarded=False)
             except InputError as error:
-                found.append(str(error))
-        return found
+                reasons.append(str(error))
+        return reasons
 
     def next_number(self) -> int:
         """Return the number of the next episode, which no file has had since the last one."""
@@ -311,12 +311,12 @@ class EpisodeFolder:
 
         Raises InputError if there is no such episode, or it was discarded.
         """
-        found = self.find(number)
-        if found.discarded:
+        before = self.find(number)
+        if before.discarded:
             raise InputError(f"Episode {number} was discarded. Bring it back first.")
-        episode = replace(found.episode, **changes)
-        if episode != found.episode:
-            with_episode(found.path, episode, kind)
+        episode = replace(before.episode, **changes)
+        if episode != before.episode:
+            with_episode(before.path, episode, kind)
         return episode
 
     def discard(self, number: int) -> None:
@@ -328,7 +328,7 @@ class EpisodeFolder:
         self._move(number, discard=False)
 
     def _move(self, number: int, *, discard: bool) -> None:
-        source, target = (self.path(number, discarded=each) for each in (not discard, discard))
+        source, target = (self.path(number, discarded=side) for side in (not discard, discard))
         if not source.exists():
             state = "kept" if discard else "discarded"
             raise InputError(f"There is no {state} episode {number} in {self.folder}.")
@@ -354,11 +354,11 @@ class EpisodeFolder:
 
     def markers(self) -> list[EpisodeMarker]:
         """Return the markers in the folder, by number. Wrong ones are left out."""
-        found = []
+        markers = []
         for path in sorted(self.folder.glob(f"episode-*{MARKER_SUFFIX}")):
             with suppress(InputError, OSError):
-                found.append(_marker_in(path))
-        return found
+                markers.append(_marker_in(path))
+        return markers
 
     def _marker(self, number: int) -> Path:
         return self.folder / f"episode-{number:04d}{MARKER_SUFFIX}"
@@ -380,11 +380,11 @@ class EpisodeFolder:
         if before is not None and before[0] == version:
             return before[1]
         with RecordingFile.open(path) as file:
-            found = KeptEpisode(
+            episode = KeptEpisode(
                 path, only_episode(file), file.start, file.end, file.size, discarded
             )
-        self._known[path] = version, found
-        return found
+        self._known[path] = version, episode
+        return episode
 
 
 def _marker_in(path: Path) -> EpisodeMarker:

@@ -150,10 +150,10 @@ class EpisodeKeeper:
 
     def _last_kept(self) -> dict[str, Any] | None:
         """Return the last kept episode for the state; None without any."""
-        kept = self._folder.last()
-        if kept is None:
+        last = self._folder.last()
+        if last is None:
             return None
-        episode = kept.episode
+        episode = last.episode
         return {
             "number": episode.number,
             "outcome": episode.outcome.value,
@@ -264,10 +264,10 @@ class EpisodeKeeper:
     def _replacing(self, episode: Episode, replaced: tuple[int, ...]) -> Episode:
         """Return ``episode``, which is saved, after the ones that it replaces are discarded."""
         if episode.outcome is not EpisodeOutcome.UNFINISHED:
-            for each in replaced:
+            for number in replaced:
                 # Somebody may have discarded it meanwhile.
                 with suppress(InputError):
-                    self._move_to_discarded(each)
+                    self._move_to_discarded(number)
         return episode
 
     def _move_to_discarded(self, number: int) -> Episode:
@@ -279,10 +279,10 @@ class EpisodeKeeper:
         """Return the episode of ``number``; for None the last one."""
         if number is not None:
             return self._folder.find(number).episode
-        kept = self._folder.last()
-        if kept is None:
+        last = self._folder.last()
+        if last is None:
             raise InputError("There is no episode yet.")
-        return kept.episode
+        return last.episode
 
     def _judge(self, number: int | None, outcome: EpisodeOutcome, t: float) -> Episode:
         before = EpisodeOutcome.UNJUDGED
@@ -290,9 +290,9 @@ class EpisodeKeeper:
             # With its outcome, which is kept if it can only be saved later.
             episode = self._stop(outcome, t)
         else:
-            found = self._last(number)
-            episode = self._change(found.number, "judged", outcome=outcome)
-            before = found.outcome
+            judged = self._last(number)
+            episode = self._change(judged.number, "judged", outcome=outcome)
+            before = judged.outcome
         if outcome is not before:
             self._make_undoable(episode.number, before)
         return episode
@@ -354,9 +354,9 @@ class EpisodeKeeper:
         return self._change(undo.number, "judged", outcome=undo.before)
 
     def _trim(self, number: int, start: float, end: float) -> Episode:
-        found = self._folder.find(number)
-        length = found.end - found.start
-        first, last = found.start + start, min(found.start + end, found.end)
+        whole = self._folder.find(number)
+        length = whole.end - whole.start
+        first, last = whole.start + start, min(whole.start + end, whole.end)
         # The page shows tenths of a second.
         if not first < last or end > length + 0.1:
             raise InputError(

@@ -76,10 +76,10 @@ class EpisodeRoutes:
         """Return the lists. ``paths``: whether to tell where the files are."""
         unreadable = self._read.unreadable()
         if not paths:
-            unreadable = [each.replace(f"{self._folder}{os.sep}", "") for each in unreadable]
+            unreadable = [reason.replace(f"{self._folder}{os.sep}", "") for reason in unreadable]
         return {
-            "episodes": [described(each) for each in self._read.kept()],
-            "discarded": [described(each) for each in self._read.discarded()],
+            "episodes": [described(file) for file in self._read.kept()],
+            "discarded": [described(file) for file in self._read.discarded()],
             "unreadable": unreadable,
             "folder": str(self._folder) if paths else "",
             "state": self._context.hub.shown.get(ENTRY),
@@ -135,15 +135,15 @@ def giver_of(actor: Actor) -> EpisodeGiver:
     return EpisodeGiver(actor.name, actor.person.role.value, actor.key)
 
 
-def described(kept: KeptEpisode) -> dict[str, Any]:
+def described(file: KeptEpisode) -> dict[str, Any]:
     """Return an episode for a list, with times in seconds after the start of its file."""
-    episode = kept.episode
-    end = kept.end if episode.end is None else episode.end
+    episode = file.episode
+    end = file.end if episode.end is None else episode.end
     return {
         **msgspec.to_builtins(episode),
-        "start": round(episode.start - kept.start, 3),
-        "end": round(end - kept.start, 3),
-        "recorded": round(kept.end - kept.start, 3),
-        "bytes": kept.size,
-        "file": kept.path.name,
+        "start": round(episode.start - file.start, 3),
+        "end": round(end - file.start, 3),
+        "recorded": round(file.end - file.start, 3),
+        "bytes": file.size,
+        "file": file.path.name,
     }

@@ -66,7 +66,7 @@ def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) 
     said = []
     for marker in markers:
         number = marker.episode.number
-        if any(folder.path(number, discarded=each).exists() for each in (False, True)):
+        if any(folder.path(number, discarded=discarded).exists() for discarded in (False, True)):
             folder.unmark(number)
             continue
         try:
@@ -88,7 +88,7 @@ def finish_interrupted(folder: EpisodeFolder, markers: Sequence[EpisodeMarker]) 
 def _sources(marker: EpisodeMarker) -> Iterator[list[Path]]:
     """Yield whole files of the ring with the ticks of the episode of ``marker``."""
     with tempfile.TemporaryDirectory(prefix="katana450-") as temporary:
-        found = []
+        sources = []
         for written in recordings_in(marker.ring):
             path = written
             if path.name < marker.first:
@@ -101,8 +101,8 @@ def _sources(marker: EpisodeMarker) -> Iterator[list[Path]]:
                     continue
                 path, run = copy, _run_of(copy)
             if run == marker.run:
-                found.append(path)
-        yield found
+                sources.append(path)
+        yield sources
 
 
 def _run_of(path: Path) -> str | None:
@@ -332,5 +332,5 @@ class RunningEpisode:
         # Under the lock: interrupted episodes are finished in another thread.
         with self._ring.lock:
             markers = self._folder.markers()
-            firsts = [each.first for each in markers if each.ring == self._ring_folder]
+            firsts = [marker.first for marker in markers if marker.ring == self._ring_folder]
             self._ring.held = min(firsts, default=None)

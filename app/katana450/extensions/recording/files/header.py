@@ -79,11 +79,11 @@ def differences(recorded: Mapping[str, str], left_out: Collection[str] = ()) -> 
 
     ``left_out``: entries that do not count.
     """
-    here = fingerprint()
+    present = fingerprint()
     return [
-        f"{name}: {recorded.get(name, UNKNOWN)} there, {here[name]} here"
+        f"{name}: {recorded.get(name, UNKNOWN)} there, {present[name]} here"
         for name in RELEVANT
-        if name not in left_out and recorded.get(name, UNKNOWN) != here[name]
+        if name not in left_out and recorded.get(name, UNKNOWN) != present[name]
     ]
 
 
@@ -113,14 +113,14 @@ def _numpy_rounding() -> str:
     """Return a hash of functions of whole arrays, for which numpy has code of its own."""
     x = np.arange(1.0, 1.0 + PROBES) / 317.0
     results = (np.sin(x), np.cos(x), np.tan(x), np.arctan2(x, 3.0), np.exp(-x), np.log(x), x**0.3)
-    return hashlib.sha256(b"".join(each.tobytes() for each in results)).hexdigest()[:HASH_DIGITS]
+    return hashlib.sha256(b"".join(row.tobytes() for row in results)).hexdigest()[:HASH_DIGITS]
 
 
 def _blas() -> str:
     config: Any = np.show_config(mode="dicts")
     with suppress(KeyError, TypeError):
-        found = config["Build Dependencies"]["blas"]
-        return f"{found['name']} {found['version']}"
+        library = config["Build Dependencies"]["blas"]
+        return f"{library['name']} {library['version']}"
     return UNKNOWN
 
 

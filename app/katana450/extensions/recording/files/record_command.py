@@ -105,9 +105,9 @@ def _info(path: Path) -> int:
         print(f"Times of its messages: {file.start:.3f} to {file.end:.3f} s")
         for topic, count in file.counts().items():
             print(printable(f"  {topic}: {count} messages"))
-        for each in file.attachments():
-            about = f"{len(each.data)} bytes, SHA-256 {sha256(each.data)}"
-            print(printable(f"  attached: {each.name}, {about}"))
+        for attachment in file.attachments():
+            about = f"{len(attachment.data)} bytes, SHA-256 {sha256(attachment.data)}"
+            print(printable(f"  attached: {attachment.name}, {about}"))
         for run in script_runs([file]):
             end = "" if run.end is None else f" to {run.end:.3f}"
             print(printable(f"  script {run.name} from {run.start:.3f}{end} s: {run.script}"))
@@ -159,8 +159,8 @@ def _verify(path: Path, urdf: Path | None, *, as_json: bool) -> int:
         others = differences(file.metadata, OF_PROCESS if simulates_apart(file) else ())
         if others:
             print("It was made by another program or machine, whose rounding can differ:")
-            for each in others:
-                print(printable(f"  {each}"))
+            for difference in others:
+                print(printable(f"  {difference}"))
         else:
             print("Program, libraries and rounding are the same, so the recording was changed.")
     return 1
@@ -210,9 +210,9 @@ def _trim(paths: list[Path], out: Path, start: float, end: float) -> int:
     return _written(out, trim(paths, out, first + start, first + end))
 
 
-def _written(out: Path, found: Trimmed) -> int:
-    print(printable(f"{out}: {found.end - found.start:.1f} s."))
-    if found.simulated_from is None:
+def _written(out: Path, part: Trimmed) -> int:
+    print(printable(f"{out}: {part.end - part.start:.1f} s."))
+    if part.simulated_from is None:
         print("No complete state lies before its end, so it cannot be verified.")
     return 0
 

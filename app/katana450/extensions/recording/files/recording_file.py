@@ -240,9 +240,9 @@ class RecordingFile:
             channels = self.summary.channels.values()
             self._topics = {channel.id: channel.topic for channel in channels}
             self._chunks = sorted(
-                self.summary.chunk_indexes, key=lambda each: each.chunk_start_offset
+                self.summary.chunk_indexes, key=lambda record: record.chunk_start_offset
             )
-            named = {each.name: dict(each.metadata) for each in self._reader.iter_metadata()}
+            named = {record.name: dict(record.metadata) for record in self._reader.iter_metadata()}
         if METADATA not in named:
             raise InputError(f"{path} is an MCAP file, but no recording of katana450.")
         self.metadata: Mapping[str, str] = named[METADATA]
@@ -295,7 +295,7 @@ class RecordingFile:
 
         Ticks before the start of a part that was cut out serve its simulation only.
         """
-        first = min((each.message_start_time for each in self._chunks), default=0) / NANO
+        first = min((chunk.message_start_time for chunk in self._chunks), default=0) / NANO
         try:
             return max(first, float(self.metadata.get(PART_START, "-inf")))
         except ValueError:
@@ -304,7 +304,7 @@ class RecordingFile:
     @property
     def end(self) -> float:
         """Time of the last message [s]; 0 if there is none."""
-        return max((each.message_end_time for each in self._chunks), default=0) / NANO
+        return max((chunk.message_end_time for chunk in self._chunks), default=0) / NANO
 
     @property
     def size(self) -> int:
@@ -327,8 +327,8 @@ class RecordingFile:
     def attachments(self) -> Iterator[Attachment]:
         """Yield the files that belong to the recording. Raises InputError."""
         with reading(self.path):
-            for each in self._reader.iter_attachments():
-                yield Attachment(each.name, each.media_type, each.data, each.log_time)
+            for file in self._reader.iter_attachments():
+                yield Attachment(file.name, file.media_type, file.data, file.log_time)
 
     def counts(self) -> dict[str, int]:
         """Return the number of messages of each topic; nothing if the file does not state them."""
@@ -362,13 +362,15 @@ class RecordingFile:
         for index in reversed(self._chunks):
             if index.message_start_time <= nanoseconds_of(t) and self._has(index, wanted):
                 last = nanoseconds_of(t)
-                found = [each for each in self._messages(index, wanted) if each.log_time <= last]
-                if found:
-                    return found[-1]
+                messages = [
+                    message for message in self._messages(index, wanted) if message.log_time <= last
+                ]
+                if messages:
+                    return messages[-1]
         return None
 
     def _has(self, index: ChunkIndex, topics: frozenset[str]) -> bool:
-        return any(self._topics.get(each) in topics for each in index.message_index_offsets)
+        return any(self._topics.get(channel) in topics for channel in index.message_index_offsets)
 
     def _messages(self, index: ChunkIndex, topics: frozenset[str]) -> list[Message]:
         with reading(self.path):

@@ -99,8 +99,8 @@ def write_records(out: BinaryIO, records: Iterable[Any]) -> int:
 def packed_records(records: Iterable[Any]) -> bytes:
     """Return ``records`` as bytes."""
     builder = RecordBuilder()
-    for each in records:
-        each.write(builder)
+    for record in records:
+        record.write(builder)
     return bytes(builder.end())
 
 
@@ -109,7 +109,7 @@ def write_chunk(out: BinaryIO, summary: Summary, content: bytes, index: Index) -
 
     ``index``: the messages in it, of which there is at least one.
     """
-    times = [at for places in index.values() for at, _ in places]
+    times = [t for places in index.values() for t, _ in places]
     first, last = min(times), max(times)
     packed = zstandard.ZstdCompressor(compression_params=PACKING).compress(content)
     start = out.tell()
@@ -204,27 +204,27 @@ class MessageWriter:
         self._content = bytearray(packed_records(described))
         self._add_metadata(metadata)
         statistics = self._summary.statistics
-        for each in attachments:
-            self.attach(each)
+        for attachment in attachments:
+            self.attach(attachment)
         statistics.schema_count = statistics.channel_count = len(TOPICS)
         statistics.metadata_count = len(self._summary.metadata_indexes)
 
     def _add_metadata(self, metadata: Mapping[str, str]) -> None:
-        at = self._file.tell()
+        offset = self._file.tell()
         length = write_records(self._file, [Metadata(METADATA, dict(metadata))])
-        self._summary.metadata_indexes.append(MetadataIndex(at, length, METADATA))
+        self._summary.metadata_indexes.append(MetadataIndex(offset, length, METADATA))
 
     def attach(self, added: Attachment) -> None:
         """Attach a file, unless one of its name is attached."""
-        found = self._summary.attachment_indexes
-        at, (name, kind, data) = self._file.tell(), (added.name, added.media_type, added.data)
-        if any(each.name == name for each in found):
+        indexes = self._summary.attachment_indexes
+        offset, (name, kind, data) = self._file.tell(), (added.name, added.media_type, added.data)
+        if any(index.name == name for index in indexes):
             return
         t = added.log_time
         length = write_records(self._file, [McapAttachment(t, t, name, kind, data)])
-        found.append(AttachmentIndex(at, length, t, t, len(data), name, kind))
+        indexes.append(AttachmentIndex(offset, length, t, t, len(data), name, kind))
         if self._summary.statistics is not None:
-            self._summary.statistics.attachment_count = len(found)
+            self._summary.statistics.attachment_count = len(indexes)
 
     def add(self, topic: str, number: int, log_time: int, data: bytes) -> None:
         """Write a message; see ``recording_file.Message``. Other topics are left out."""
@@ -299,7 +299,7 @@ class RecordingWriter:
 
     def prepare(self, records: Sequence[TickRecord]) -> None:
         """Do what takes less time for several ticks together. ``put`` must follow for each."""
-        self._messages.prepare([each.state for each in records])
+        self._messages.prepare([record.state for record in records])
 
     def put(self, record: TickRecord) -> None:
         """Write one tick. Its records must come in the order of the ticks, without gaps.
@@ -370,11 +370,11 @@ class RecordingWriter:
         self._writer.add(topic, self._number, max(nanoseconds(t), 0), json_text(form))
 
     def _add_shared(self, t: float) -> None:
-        at = max(nanoseconds(t), 0)
+        log_time = max(nanoseconds(t), 0)
         for kind, key, text in self._codec.shared.take_new():
             # The key is that of these bytes, so they are written as they are.
             data = b'{"key":"%b","value":%b}' % (key.encode(), text)
-            self._writer.add(SHARED_TOPICS[kind], self._number, at, data)
+            self._writer.add(SHARED_TOPICS[kind], self._number, log_time, data)
 
     def _add_state(self, t: float, state: State) -> None:
         message = self._messages.state(state)

@@ -93,7 +93,7 @@ class ScriptRun:
 
 def script_runs(files: Iterable[RecordingFile]) -> list[ScriptRun]:
     """Return the runs in ``files`` of one run of the server, by their begin. Raises InputError."""
-    found: dict[tuple[str, float], ScriptRun] = {}
+    by_begin: dict[tuple[str, float], ScriptRun] = {}
     for file in files:
         for message in file.messages(EVENTS):
             event = program_event_in(message)
@@ -101,11 +101,11 @@ def script_runs(files: Iterable[RecordingFile]) -> list[ScriptRun]:
                 continue
             key = event.script, event.since
             end = None if event.began else event.t
-            known = found.get(key)
+            known = by_begin.get(key)
             if known is not None and end is None:
                 end = known.end
-            found[key] = ScriptRun(event.name, event.script, event.sha256, event.since, end)
-    return sorted(found.values(), key=lambda run: run.start)
+            by_begin[key] = ScriptRun(event.name, event.script, event.sha256, event.since, end)
+    return sorted(by_begin.values(), key=lambda run: run.start)
 
 
 def program_event_in(message: Message) -> ProgramEvent | None:
@@ -132,11 +132,11 @@ def scripts_in(
     All but the scripts that ran at other times only; and the runs in the part. Raises InputError.
     """
     runs = script_runs(files)
-    known, here = {run.script for run in runs}, [run for run in runs if run.overlaps(start, end)]
-    needed = {run.script for run in here}
-    found: dict[str, Attachment] = {}
+    known, present = {run.script for run in runs}, [run for run in runs if run.overlaps(start, end)]
+    needed = {run.script for run in present}
+    attachments: dict[str, Attachment] = {}
     for file in files:
-        for each in file.attachments():
-            if each.name not in known or each.name in needed:
-                found.setdefault(each.name, each)
-    return list(found.values()), here
+        for attachment in file.attachments():
+            if attachment.name not in known or attachment.name in needed:
+                attachments.setdefault(attachment.name, attachment)
+    return list(attachments.values()), present

@@ -64,8 +64,8 @@ class TickReader:
     def add_shared(self, message: Message) -> None:
         """Remember the plan or solid in ``message``. Raises InputError."""
         with _placed(message):
-            found: SharedMessage = json_form(message.data, SharedMessage)
-            self._codec.shared.add(SharedText(KINDS[message.topic], found.key, bytes(found.value)))
+            entry: SharedMessage = json_form(message.data, SharedMessage)
+            self._codec.shared.add(SharedText(KINDS[message.topic], entry.key, bytes(entry.value)))
 
     def tick(self, message: Message) -> TickInput | TickMessage:
         """Return the tick in ``message``, or the note that it is missing. Raises InputError."""
@@ -84,8 +84,8 @@ class TickReader:
     def checkpoint(self, message: Message) -> State:
         """Return the state in ``message``. Raises InputError."""
         with _placed(message):
-            found: CheckpointMessage = json_form(message.data, CheckpointMessage)
-            state: State = self._codec.decoded(State, found.state)
+            checkpoint: CheckpointMessage = json_form(message.data, CheckpointMessage)
+            state: State = self._codec.decoded(State, checkpoint.state)
             return state
 
 
@@ -102,8 +102,8 @@ def _placed(message: Message) -> Iterator[None]:
     try:
         yield
     except (FormError, msgspec.MsgspecError, RecursionError, UnicodeError) as error:
-        at = f"the message of {message.topic} at t = {message.t:.3f} s"
-        raise InputError(f"The recording is damaged in {at}: {error}.") from error
+        place = f"the message of {message.topic} at t = {message.t:.3f} s"
+        raise InputError(f"The recording is damaged in {place}: {error}.") from error
 
 
 def verify_recording(
@@ -123,10 +123,10 @@ def verify_recording(
         elif message.topic == CHECKPOINTS:
             if checker.state is None:
                 checker.checkpoint(reader.checkpoint(message))
-        elif isinstance(found := reader.tick(message), TickMessage):
-            checker.missing(found.ticks)
+        elif isinstance(tick := reader.tick(message), TickMessage):
+            checker.missing(tick.ticks)
         else:
-            checker.tick(found)
+            checker.tick(tick)
             if progress is not None:
                 progress(message.t)
     return checker.result
@@ -147,9 +147,9 @@ def gaps_in(file: RecordingFile, start: float, end: float) -> Iterator[tuple[flo
 
 def check_whole(file: RecordingFile, first: float, last: float) -> None:
     """Raise InputError with the time of the first gap from ``first`` to ``last`` [s]."""
-    found = next(gaps_in(file, first, last), None)
-    if found is not None:
-        t, gap = found
+    first_gap = next(gaps_in(file, first, last), None)
+    if first_gap is not None:
+        t, gap = first_gap
         raise InputError(
             f"{file.path} has a gap at {t - file.start:.2f} s: {gap.ticks} ticks are missing "
             f"({gap.missing}). Leave the file out, or choose a part before or after it by --from "
@@ -166,10 +166,10 @@ def session_for(file: RecordingFile, urdf: Path | None = None) -> DescribedRobot
     recorded = file.metadata.get("urdf_sha256")
     path = URDF_PATH if urdf is None else urdf
     try:
-        here = hashlib.sha256(path.read_bytes()).hexdigest()
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    if here != recorded:
+    if digest != recorded:
         raise InputError(
             f"{file.path} is a recording of {file.metadata.get('urdf', 'another robot')!r}, not of "
             f"{path}. Name the same URDF, with its meshes beside it, by --urdf."
@@ -227,10 +227,10 @@ def _verified_apart(path: Path, urdf: Path | None, *, shows: bool) -> Verificati
         check=False,
     )
     try:
-        found = msgspec.json.decode(done.stdout)
-        if "error" in found:
-            raise InputError(found["error"])
-        return msgspec.convert(found, Verification)
+        answer = msgspec.json.decode(done.stdout)
+        if "error" in answer:
+            raise InputError(answer["error"])
+        return msgspec.convert(answer, Verification)
     except msgspec.MsgspecError as error:
         text = (done.stderr or b"").decode(errors="replace").strip()
         raise InputError(
@@ -267,13 +267,13 @@ def simulated_states(
         reader.add_shared(message)
     first = file.last_before(CHECKPOINTS, start) if math.isfinite(start) else None
     state: State | None = None
-    begun = False
+    started = False
     begin = -math.inf if first is None else first.t - MOMENT
     for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
         if message.topic == CHECKPOINTS:
             if state is not None and lost is None:
                 continue
-            state, begun = reader.checkpoint(message), True
+            state, started = reader.checkpoint(message), True
             check_fits(session, state)
             yield state
             continue
@@ -281,7 +281,7 @@ def simulated_states(
         if isinstance(tick, TickMessage):
             missing, state = tick.ticks, None
         elif state is None:
-            missing = int(begun)
+            missing = int(started)
         else:
             try:
                 state = after(session, state, tick)

@@ -92,18 +92,18 @@ def columns(
     ``position`` of an arm. ``done`` is called with the fraction that was read. Raises InputError
     for a damaged recording.
     """
-    found = list(rows(file, start, end, done))
-    if not found:
+    states = list(rows(file, start, end, done))
+    if not states:
         raise InputError(f"{file.path} has no states in that time.")
-    columns = {name: [getattr(row, name) for row in found] for name in SINGLE}
-    columns |= {name: [getattr(row, name) for row in found] for name in ROWS}
-    columns["q"] = [row.joints for row in found]
-    if found[0].position is not None:
-        columns[POSITION] = [row.position for row in found]
+    columns = {name: [getattr(row, name) for row in states] for name in SINGLE}
+    columns |= {name: [getattr(row, name) for row in states] for name in ROWS}
+    columns["q"] = [row.joints for row in states]
+    if states[0].position is not None:
+        columns[POSITION] = [row.position for row in states]
     return {
         name: finite_array(
             values,
-            (len(found),) if name in SINGLE else (len(found), len(values[0])),
+            (len(states),) if name in SINGLE else (len(states), len(values[0])),
             f"{name} of {file.path}",
         )
         for name, values in columns.items()

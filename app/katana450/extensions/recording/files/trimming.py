@@ -87,10 +87,10 @@ def trim(
 def _checkpoint_before(files: Sequence[RecordingFile], t: float) -> float | None:
     """Return the time of the last checkpoint at or before ``t`` [s], or else of the first."""
     for file in reversed(files):
-        found = file.last_before(CHECKPOINTS, t)
-        if found is not None:
-            return found.t
-    return next((each.t for file in files for each in file.messages(CHECKPOINTS)), None)
+        checkpoint = file.last_before(CHECKPOINTS, t)
+        if checkpoint is not None:
+            return checkpoint.t
+    return next((message.t for file in files for message in file.messages(CHECKPOINTS)), None)
 
 
 def _write(
@@ -107,12 +107,12 @@ def _write(
     needed: set[bytes] = set()
     for message in _simulated(files, begin, end):
         needed.update(KEY.findall(message.data))
-    given: set[bytes] = set()
+    written: set[bytes] = set()
     for file in files:
         for message in file.messages(PLANS, SOLIDS, end=end):
             key = KEY.search(message.data)
-            if key is not None and key[1] in needed - given:
-                given.add(key[1])
+            if key is not None and key[1] in needed - written:
+                written.add(key[1])
                 copy.copy(message)
     copy.flush()
     chunk_ends = start
@@ -156,16 +156,16 @@ def _merged(
     files: Sequence[RecordingFile], begin: float | None, start: float, end: float
 ) -> Iterator[Message]:
     """Yield the messages of the part in the order of their files."""
-    begun = False
+    started = False
     first = start if begin is None else min(begin, start)
     for file in files:
         for message in file.messages(COMMANDS, CHECKPOINTS, STATE, *SHOWN, start=first, end=end):
-            begun |= message.topic == CHECKPOINTS
+            started |= message.topic == CHECKPOINTS
             if message.topic == STATE:
                 # The first one is that of the checkpoint, which names all objects.
                 yield message
             elif message.topic in SHOWN:
                 if message.log_time >= nanoseconds_of(start):
                     yield message
-            elif begun:
+            elif started:
                 yield message

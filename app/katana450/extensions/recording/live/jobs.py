@@ -220,7 +220,7 @@ class RecordingRoutes:
             known = ", ".join((VERIFY, *FORMATS))
             raise HTTPException(HTTPStatus.BAD_REQUEST, f"`do` is one of {known}, not {do!r}.")
         task = job_task(self._store, request.query_params, do, self._urdf)
-        if any(each.status is JobStatus.WORKING for each in self._jobs.values()):
+        if any(earlier.status is JobStatus.WORKING for earlier in self._jobs.values()):
             raise HTTPException(
                 TOO_MANY, "Another recording is being exported or verified. Wait, or cancel it."
             )
@@ -305,5 +305,5 @@ def _seconds(query: Mapping[str, str], name: str) -> float:
     return value
 
 
-def _json(found: Any) -> Response:
-    return Response(msgspec.json.encode(found), media_type="application/json")
+def _json(content: Any) -> Response:
+    return Response(msgspec.json.encode(content), media_type="application/json")

@@ -96,11 +96,11 @@ def _ring(config: RecorderConfig, scripts: RunningScripts) -> tuple[Ring, Record
     from katana450.extensions.recording.live.ring import Ring
 
     facts = config.facts
-    found = find_robot(facts.settings, facts.urdf, facts.tool)
+    robot = find_robot(facts.settings, facts.urdf, facts.tool)
     attachments = () if config.scene is None else attached_scene(config.scene)
-    environment = found.session.environment
+    environment = robot.session.environment
     header = header_of(
-        found.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
+        robot.robot, facts.settings, facts.urdf, facts.tool, environment, attachments
     )
     return Ring(config.folder, header, scripts=scripts), header
 

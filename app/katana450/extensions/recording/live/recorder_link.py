@@ -199,8 +199,8 @@ class RecorderListener:
             self._scripts.end_all(time.perf_counter())
         connection.close()
 
-    def _in_thread(self, work: Any, *given: Any) -> None:
-        threading.Thread(target=work, args=given, name="episode request", daemon=True).start()
+    def _in_thread(self, work: Any, *arguments: Any) -> None:
+        threading.Thread(target=work, args=arguments, name="episode request", daemon=True).start()
 
     def _send(self, connection: Any, message: msgspec.Struct) -> None:
         with self._sending:
@@ -217,18 +217,18 @@ class RecorderListener:
                 self._send(connection, EpisodesState(keeper.status()))
                 keeper.wait(revision, ACTIVE_SECONDS if keeper.active else IDLE_SECONDS)
 
-    def _answer(self, connection: Any, given: GivenRequest) -> None:
-        by = msgspec.structs.replace(given.by, key=self._pseudonyms.of(given.by.key))
+    def _answer(self, connection: Any, request: GivenRequest) -> None:
+        by = msgspec.structs.replace(request.by, key=self._pseudonyms.of(request.by.key))
         try:
             if isinstance(self._keeper, InputError):
                 raise self._keeper
-            answer = RequestAnswer(given.number, self._keeper.handle(given.request, by))
+            answer = RequestAnswer(request.number, self._keeper.handle(request.request, by))
         except InputError as error:
-            answer = RequestAnswer(given.number, why=str(error))
+            answer = RequestAnswer(request.number, why=str(error))
         except Exception as error:
             log.exception("A request about an episode met an error.")
             why = f"The process that records met an error: {error}."
-            answer = RequestAnswer(given.number, why=why)
+            answer = RequestAnswer(request.number, why=why)
         with suppress(*PIPE_ERRORS):
             self._send(connection, answer)
 
@@ -318,13 +318,13 @@ class RecorderLink:
 
     def _connected(self) -> Any:
         """Return a connection on which both ends have shown that they know the key."""
-        found = json.loads(self._file.read_bytes())
-        connection: Any = Client(found["address"])
+        target = json.loads(self._file.read_bytes())
+        connection: Any = Client(target["address"])
         try:
             # A process that hangs accepts connections too.
             if not connection.poll(GREETING_SECONDS):
                 raise EOFError("The process that records does not answer.")
-            key = bytes.fromhex(found["key"])
+            key = bytes.fromhex(target["key"])
             answer_challenge(connection, key)
             deliver_challenge(connection, key)
         except BaseException:

@@ -182,12 +182,12 @@ class Ring:
 
     def size_from(self, first: str) -> int:
         """Return the length [bytes] of the file ``first`` and all later ones."""
-        found = 0
+        size = 0
         for path in recordings_in(self._folder):
             if path.name >= first:
                 with suppress(OSError):
-                    found += path.stat().st_size
-        return found
+                    size += path.stat().st_size
+        return size
 
     def _events(self, record: TickRecord) -> list[tuple[str, Mapping[str, Any]]]:
         """Return the events of ``record``: also each finding that begins or ends with it."""
@@ -220,8 +220,8 @@ class Ring:
             for began, t in ((True, since), (False, ended)):
                 if t is not None:
                     # A time without ticks is not part of the recording.
-                    at = min(max(t, self._unsynced_t), self.last_t)
-                    self._writer.script(at, run.name, run.text, since, began=began)
+                    moment = min(max(t, self._unsynced_t), self.last_t)
+                    self._writer.script(moment, run.name, run.text, since, began=began)
         self._unsynced_t = math.inf
 
     def lost(self, t: float, ticks: int) -> None:
@@ -321,12 +321,12 @@ def _repair(folder: Path) -> None:
     """Make whole files of those that a crash left open."""
     for path in recordings_in(folder):
         try:
-            found = recover(path, path)
+            recovered = recover(path, path)
         except InputError as error:
             # Another server may write it; otherwise it is removed in its turn.
             log.warning("%s", error)
         except OSError as error:
             log.warning("%s could not be repaired: %s.", path, error.strerror or error)
         else:
-            if found is not None:
-                log.warning("%s was repaired: %s.", path, found)
+            if recovered is not None:
+                log.warning("%s was repaired: %s.", path, recovered)

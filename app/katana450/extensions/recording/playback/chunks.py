@@ -87,7 +87,7 @@ class ChunkIndex:
 
     def has(self, chunk: ChunkSpan, topic: str) -> bool:
         """Return whether ``chunk`` has messages of ``topic``."""
-        return any(self._topics.get(each) == topic for each in chunk.channels)
+        return any(self._topics.get(channel) == topic for channel in chunk.channels)
 
     def messages(self, chunk: ChunkSpan, *topics: str) -> list[Message]:
         """Return the messages of ``topics`` in ``chunk``. Raises InputError."""
@@ -132,6 +132,6 @@ class ChunkIndex:
         self.chunks.append(ChunkSpan(self._next, first / NANO, last / NANO, frozenset()))
 
     def _add_metadata(self, stream: BoundedStream) -> None:
-        found = next(records_at(stream, self._next))
-        if isinstance(found, Metadata) and found.name == METADATA:
-            self.metadata = dict(found.metadata)
+        record = next(records_at(stream, self._next))
+        if isinstance(record, Metadata) and record.name == METADATA:
+            self.metadata = dict(record.metadata)

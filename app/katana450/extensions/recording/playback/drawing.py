@@ -43,14 +43,14 @@ class RunDrawing:
         row = moment.row
         self._arm.move(self._robot.joint_values(np.array(row.joints), row.gripper))
         self._arm.show(True, self._colour)
-        there = {} if other is None else {each.name: each.T for each in other.objects}
+        poses = {} if other is None else {body.name: body.T for body in other.objects}
         moved = [
-            each
-            for each in moment.objects
-            if each.name not in there or np.abs(each.T - there[each.name]).max() > SAME_PLACE
+            body
+            for body in moment.objects
+            if body.name not in poses or np.abs(body.T - poses[body.name]).max() > SAME_PLACE
         ]
-        self._scene.place([(each, each.T) for each in moved])
-        with_cup = any(each.name == CUP for each in moved)
+        self._scene.place([(body, body.T) for body in moved])
+        with_cup = any(body.name == CUP for body in moved)
         water = moment.water if with_cup else None
         if water is not None and session.pouring is not None:
             water = still_flying(water, session.pouring.water_environment(moment.objects))
@@ -106,12 +106,12 @@ class PlaybackWindows:
     def moving(self) -> list[str]:
         """The nodes of the present arm's links that move, which are drawn at another place."""
         paths: dict[str | None, str] = {None: "/arm"}
-        found = []
+        windows = []
         for link in self._robot.links:
             paths[link.name] = f"{paths[link.parent]}/{node_name(link.name)}"
             if link.name in self._robot.moving and link.parent not in self._robot.moving:
-                found.append(paths[link.name])
-        return found
+                windows.append(paths[link.name])
+        return windows
 
     def show(self, key: str, moments: tuple[RecordedMoment | None, ...]) -> None:
         """Show ``moments`` in the window of the participant ``key``, one for each run.
@@ -143,16 +143,16 @@ class PlaybackWindows:
         window = self._window(key)
         if window is not None:
             with window.lock, window.client.atomic():
-                for each in window.runs.values():
-                    each.hide()
+                for drawing in window.runs.values():
+                    drawing.hide()
             window.client.flush()
 
     def _window(self, key: str) -> _Window | None:
         number = self._gestures.client_of(key)
         clients = self._server.get_clients()
         with self._lock:
-            for gone in self._windows.keys() - clients.keys():
-                del self._windows[gone]
+            for client in self._windows.keys() - clients.keys():
+                del self._windows[client]
             if number is None or number not in clients:
                 return None
             return self._windows.setdefault(number, _Window(clients[number]))

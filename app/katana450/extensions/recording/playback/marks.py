@@ -44,12 +44,12 @@ def add_marks(marks: list[Mark], messages: Iterable[Message]) -> None:
     """
     for mark in _all(messages):
         if mark.kind == NAMED:
-            stops = [number for number, each in enumerate(marks) if each.kind == run_events.STOP]
+            stops = [number for number, old in enumerate(marks) if old.kind == run_events.STOP]
             if stops:
                 marks[stops[-1]] = marks[stops[-1]]._replace(text=mark.text)
             continue
-        again = (each for each in reversed(marks) if mark.t - each.t < REPEATED)
-        if not any(each[1:] == mark[1:] for each in again):
+        again = (old for old in reversed(marks) if mark.t - old.t < REPEATED)
+        if not any(old[1:] == mark[1:] for old in again):
             marks.append(mark)
 
 
@@ -62,11 +62,11 @@ def _all(messages: Iterable[Message]) -> Iterator[Mark]:
         if not isinstance(form, dict):
             continue
         kind = form.get("kind")
-        found = (
+        words = (
             ("episode", _episode(form)) if message.topic == EPISODES else _event(str(kind), form)
         )
-        if found is not None:
-            yield Mark(message.t, found[0], found[1][:MAX_TEXT])
+        if words is not None:
+            yield Mark(message.t, words[0], words[1][:MAX_TEXT])
 
 
 def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -112,4 +112,4 @@ def _finding(form: Mapping[str, Any]) -> tuple[str, str] | None:
 
 def _episode(form: Mapping[str, Any]) -> str:
     words = (form.get("kind"), form.get("task"), form.get("outcome"))
-    return "Episode: " + ", ".join(str(each) for each in words if each)
+    return "Episode: " + ", ".join(str(word) for word in words if word)

@@ -73,18 +73,18 @@ class OpenedRun:
 
     def marks(self) -> list[Mark]:
         """See ``PlaybackRun.marks``."""
-        found: list[Mark] = self._ask("marks")
-        return found
+        marks: list[Mark] = self._ask("marks")
+        return marks
 
     def at(self, t: float) -> RecordedMoment | None:
         """See ``PlaybackRun.at``."""
-        found: RecordedMoment | None = self._ask("at", t)
-        return found
+        moment: RecordedMoment | None = self._ask("at", t)
+        return moment
 
     def rows_at(self, times: Sequence[float]) -> list[StateRow | None]:
         """See ``PlaybackRun.rows_at``."""
-        found: list[StateRow | None] = self._ask("rows_at", list(times))
-        return found
+        rows: list[StateRow | None] = self._ask("rows_at", list(times))
+        return rows
 
     def close(self) -> None:
         """End the process, without waiting for a request that it works on."""
@@ -101,7 +101,7 @@ class OpenedRun:
             try:
                 if again:
                     _request(process, "update", ())
-                successful, found = _request(process, method, arguments)
+                successful, result = _request(process, method, arguments)
             except (OSError, EOFError) as error:
                 self._end()
                 raise InputError(
@@ -111,8 +111,8 @@ class OpenedRun:
             finally:
                 self._asked = None
         if not successful:
-            raise InputError(found)
-        return found
+            raise InputError(result)
+        return result
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None:
@@ -135,14 +135,14 @@ class OpenedRun:
             self._process = None
 
 
-def _watch(of: weakref.ref[OpenedRun], process: subprocess.Popen[bytes]) -> None:
+def _watch(reference: weakref.ref[OpenedRun], process: subprocess.Popen[bytes]) -> None:
     """Kill ``process`` when it hangs, so that the pipe with its answer ends."""
     while process.poll() is None:
         time.sleep(WATCH_PERIOD)
-        run = of()
-        asked = None if run is None else run._asked
+        run = reference()
+        start = None if run is None else run._asked
         del run
-        if asked is not None and time.monotonic() - asked > TIMEOUT:
+        if start is not None and time.monotonic() - start > TIMEOUT:
             process.kill()
 
 
@@ -165,10 +165,10 @@ def _request(process: subprocess.Popen[bytes], method: str, arguments: Sequence[
 def _end(process: subprocess.Popen[bytes]) -> None:
     """Kill ``process`` and close its pipes."""
     process.kill()
-    for each in (process.stdin, process.stdout):
+    for pipe in (process.stdin, process.stdout):
         with suppress(OSError):
-            if each is not None:
-                each.close()
+            if pipe is not None:
+                pipe.close()
     process.wait()
 
 
@@ -177,14 +177,14 @@ def answer(run: PlaybackRun, request: bytes) -> bytes:
     method, arguments = json.loads(request)
     try:
         if method == "about":
-            found: tuple[bool, Any] = True, (run.spans, run.metadata)
+            result: tuple[bool, Any] = True, (run.spans, run.metadata)
         else:
-            found = True, getattr(run, method)(*arguments)
+            result = True, getattr(run, method)(*arguments)
     except InputError as error:
-        found = False, str(error)
+        result = False, str(error)
     except MemoryError:
-        found = False, "The file needs too much memory."
-    content = pickle.dumps(found, pickle.HIGHEST_PROTOCOL)
+        result = False, "The file needs too much memory."
+    content = pickle.dumps(result, pickle.HIGHEST_PROTOCOL)
     return LENGTH.pack(len(content)) + content
 
 

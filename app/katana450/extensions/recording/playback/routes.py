@@ -63,8 +63,8 @@ class RunDifference(NamedTuple):
 
 def times_of(length: float) -> list[float]:
     """Return the times of the points of a plot over ``length`` [s]."""
-    found: list[float] = np.linspace(0.0, max(length, 0.0), MAX_POINTS).tolist()
-    return found
+    times: list[float] = np.linspace(0.0, max(length, 0.0), MAX_POINTS).tolist()
+    return times
 
 
 def difference(
@@ -78,7 +78,7 @@ def difference(
     Times at which one of them has no state are left out. ``slides`` says of each joint whether it
     slides. Raises InputError for robots with other joints.
     """
-    found = RunDifference([], [], [], [])
+    rows = RunDifference([], [], [], [])
     sliding = np.array(slides, dtype=bool)
     for t, a, b in zip(times, first, second, strict=True):
         if a is None or b is None:
@@ -87,14 +87,14 @@ def difference(
         if len(set(counts)) > 1:
             raise InputError("The runs have {} and {} joints, the robot {}.".format(*counts))
         away = np.abs(np.subtract(a.joints, b.joints))
-        found.t.append(t)
+        rows.t.append(t)
         if not sliding.all():
-            found.joints.append(float(np.degrees(away[~sliding].max())))
+            rows.joints.append(float(np.degrees(away[~sliding].max())))
         if sliding.any():
-            found.slides.append(1e3 * float(away[sliding].max()))
+            rows.slides.append(1e3 * float(away[sliding].max()))
         if a.position is not None and b.position is not None:
-            found.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
-    return found
+            rows.tool.append(1e3 * float(np.linalg.norm(np.subtract(a.position, b.position))))
+    return rows
 
 
 AT_ONCE, WAITING = 2, 8
@@ -164,11 +164,11 @@ class PlaybackRoutes:
             if any(not run.spans for run, _ in runs):
                 for run, _ in runs:
                     run.update()
-            found = tuple(run.at(t) for run, t in runs)
-            if found[0] is None:
+            shown = tuple(run.at(t) for run, t in runs)
+            if shown[0] is None:
                 raise InputError("Nothing is recorded yet: the arm has not moved.")
-            windows.show(key, found)
-            moments = [_said(moment) for moment in found]
+            windows.show(key, shown)
+            moments = [_said(moment) for moment in shown]
             return _json({"moments": moments, "moving": windows.moving})
 
         return await self._in_thread(show)
@@ -242,8 +242,8 @@ class PlaybackRoutes:
     def _is_of_another_robot(self, run: AnyRun) -> bool:
         """Return whether ``run`` is that of another robot than the server's."""
         urdf = getattr(self._context.options, "urdf", None) or URDF_PATH
-        here = hashlib.sha256(Path(urdf).read_bytes()).hexdigest()
-        return run.metadata.get("urdf_sha256") != here
+        digest = hashlib.sha256(Path(urdf).read_bytes()).hexdigest()
+        return run.metadata.get("urdf_sha256") != digest
 
     def _run(self, request: Request, name: str) -> AnyRun:
         """Return the recording ``name`` for the sender of ``request``. Raises HTTPException."""
@@ -332,7 +332,7 @@ def _said(moment: RecordedMoment | None) -> dict[str, Any] | None:
         "gripper": row.gripper,
         "position": row.position,
         "status": row.status,
-        "objects": {each.name: each.T[:3, 3].tolist() for each in moment.objects},
+        "objects": {body.name: body.T[:3, 3].tolist() for body in moment.objects},
     }
 
 
@@ -346,5 +346,5 @@ def _number(text: str | None) -> float:
     return value
 
 
-def _json(found: Any) -> Response:
-    return Response(msgspec.json.encode(found), media_type="application/json")
+def _json(content: Any) -> Response:
+    return Response(msgspec.json.encode(content), media_type="application/json")

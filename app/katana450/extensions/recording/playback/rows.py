@@ -66,7 +66,7 @@ class Block:
         one adds objects that an earlier one has not. Raises InputError.
         """
         self._states = list(messages)
-        self._times = [each.log_time for each in self._states]
+        self._times = [state.log_time for state in self._states]
         self._poses: list[Mapping[str, ObjectPose]] = []
         self._described: dict[str, SceneObject] = {}
         self._water: Water | None = None
@@ -80,7 +80,7 @@ class Block:
                     new = Parcel(round(ml * MILLILITRE), start, velocity, 0.0, span)
                     self._parcels.append((row.t, new))
             # Most states name no object, and are decoded when they are shown.
-            if any(each in message.data for each in CHANGES):
+            if any(change in message.data for change in CHANGES):
                 row = content_of(message, StateRow)
                 poses = dict(poses)
                 row.move_objects(poses)
@@ -88,16 +88,16 @@ class Block:
                     raise InputError(f"The recording has more than {MAX_POSES} objects at a time.")
             self._poses.append(poses)
         self._puddles: tuple[Puddle, ...] = ()
-        for each in descriptions:
-            if each.water is not None:
+        for description in descriptions:
+            if description.water is not None:
                 # One that has just left is in the state of the same tick too.
-                flying = [old for old in each.water.parcels if old.age > 0.0]
-                if each.t <= self.start:
-                    self._parcels += ((each.t - old.age, old) for old in flying)
-            self._described = {**each.objects, **self._described}
-            self._water = self._water or each.water
-            if each.water is not None:
-                self._puddles = self._puddles or each.water.puddles
+                flying = [old for old in description.water.parcels if old.age > 0.0]
+                if description.t <= self.start:
+                    self._parcels += ((description.t - old.age, old) for old in flying)
+            self._described = {**description.objects, **self._described}
+            self._water = self._water or description.water
+            if description.water is not None:
+                self._puddles = self._puddles or description.water.puddles
 
     @property
     def start(self) -> float:
@@ -123,11 +123,13 @@ class Block:
             return None
         vessels = (VesselWaterMessage(CUP, row.water.cup, row.water.lean), *row.water.vessels)
         return Water(
-            tuple(_vessel(each, poses[each.name].T) for each in vessels if each.name in poses),
+            tuple(
+                _vessel(vessel, poses[vessel.name].T) for vessel in vessels if vessel.name in poses
+            ),
             basin=round(row.water.basin * MILLILITRE),
             parcels=tuple(
-                each._replace(age=row.t - t)
-                for t, each in sorted(self._parcels)
+                drop._replace(age=row.t - t)
+                for t, drop in sorted(self._parcels)
                 if 0.0 <= row.t - t < MAX_FLIGHT
             ),
             puddles=self._puddles if row.water.spilled > 0.0 else (),
@@ -150,7 +152,7 @@ CHANGES = (b'"objects":', b'"removed":')
 def still_flying(water: Water, environment: WaterEnvironment) -> Water:
     """Return ``water`` without the parcels that have landed."""
     level = environment.basin.level(water.basin * FEMTOLITRE)
-    flying = (each for each in water.parcels if landing(each, environment, level).age > each.age)
+    flying = (drop for drop in water.parcels if landing(drop, environment, level).age > drop.age)
     return replace(water, parcels=tuple(flying))
 
 
@@ -174,5 +176,5 @@ class Describer:
         """Return that of the complete state in ``message``. Raises InputError."""
         objects: tuple[SceneObject, ...] = self._reader.field(message, "objects", ())
         poured: MotionWithWater | None = self._reader.field(message, "poured", None)
-        named = {each.name: each for each in objects}
+        named = {body.name: body for body in objects}
         return Description(message.t, named, None if poured is None else poured.water)

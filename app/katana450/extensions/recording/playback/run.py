@@ -47,13 +47,13 @@ class Span(NamedTuple):
 
 def spans_of(parts: Iterable[tuple[float, float]]) -> tuple[Span, ...]:
     """Return the spans that ``parts``, each with begin and end [s], form in their order."""
-    found: list[Span] = []
+    spans: list[Span] = []
     for start, end in sorted(parts):
-        if found and start - found[-1].end <= MAX_PAUSE:
-            found[-1] = Span(found[-1].start, max(found[-1].end, end))
+        if spans and start - spans[-1].end <= MAX_PAUSE:
+            spans[-1] = Span(spans[-1].start, max(spans[-1].end, end))
         else:
-            found.append(Span(start, end))
-    return tuple(found)
+            spans.append(Span(start, end))
+    return tuple(spans)
 
 
 def at_place(spans: Sequence[Span], place: float) -> float:
@@ -122,13 +122,13 @@ class _File:
             if self.index.has(chunk, CHECKPOINTS):
                 self.starts.append(self._searched)
             if self.index.has(chunk, SOLIDS):
-                for each in self.index.messages(chunk, SOLIDS):
-                    self._solid_bytes += len(each.data)
+                for message in self.index.messages(chunk, SOLIDS):
+                    self._solid_bytes += len(message.data)
                     if self._solid_bytes > MAX_SOLID_BYTES:
                         raise InputError(
                             f"The shapes in the recording have more than {MAX_SOLID_BYTES} bytes."
                         )
-                    self.describer.add_solid(each)
+                    self.describer.add_solid(message)
             self._searched += 1
 
 
@@ -156,8 +156,8 @@ class PlaybackRun:
     def update(self) -> None:
         """Read what was added. Raises InputError if there is nothing that can be read."""
         with self._lock:
-            known = {each.index.path: each for each in self._files}
-            found: list[_File] = []
+            known = {known_file.index.path: known_file for known_file in self._files}
+            files: list[_File] = []
             problem: InputError | None = None
             for path in reversed(self._paths()):
                 try:
@@ -168,12 +168,12 @@ class PlaybackRun:
                     continue
                 if not file.chunks or not file.index.metadata:
                     continue
-                if found and file.index.utc_offset != found[0].index.utc_offset:
+                if files and file.index.utc_offset != files[0].index.utc_offset:
                     break
-                found.append(file)
-            self._files = found[::-1]
-            if found:
-                self._offset, self.metadata = found[0].index.utc_offset, found[0].index.metadata
+                files.append(file)
+            self._files = files[::-1]
+            if files:
+                self._offset, self.metadata = files[0].index.utc_offset, files[0].index.metadata
             elif problem is not None:
                 raise problem
 
@@ -182,17 +182,17 @@ class PlaybackRun:
         """The times with records."""
         shift = self._offset
         return spans_of(
-            (max(each.start, file.index.part_start) + shift, each.end + shift)
+            (max(chunk.start, file.index.part_start) + shift, chunk.end + shift)
             for file in self._files
-            for each in file.chunks
-            if each.end >= file.index.part_start
+            for chunk in file.chunks
+            if chunk.end >= file.index.part_start
         )
 
     def marks(self) -> list[Mark]:
         """Return the newest marks in their order. Raises InputError for a damaged file."""
         with self._lock:
-            found = [mark for file in self._files for mark in self._marks(file)]
-            return [each._replace(t=each.t + self._offset) for each in found[-MAX_MARKS:]]
+            marks = [mark for file in self._files for mark in self._marks(file)]
+            return [entry._replace(t=entry.t + self._offset) for entry in marks[-MAX_MARKS:]]
 
     def at(self, t: float) -> RecordedMoment | None:
         """Return the state at ``t`` [s], or the first one after it; None without states.
@@ -220,11 +220,11 @@ class PlaybackRun:
         with self._lock:
             t -= self._offset
             for file in reversed(self._files):
-                number = bisect_right(file.chunks, t, key=lambda each: each.start) - 1
+                number = bisect_right(file.chunks, t, key=lambda chunk: chunk.start) - 1
                 for chunk in reversed(file.chunks[: number + 1]):
                     if file.index.has(chunk, STATE):
                         states = file.index.messages(chunk, STATE)
-                        before = [each for each in states if each.t <= t]
+                        before = [state for state in states if state.t <= t]
                         if before:
                             return content_of(before[-1], StateRow)
             return None
@@ -259,19 +259,19 @@ class PlaybackRun:
         descriptions: list[Description] = []
         for number in range(place.first, place.last + 1):
             messages = file.index.messages(file.chunks[number], STATE, CHECKPOINTS)
-            complete = [each for each in messages if each.topic == CHECKPOINTS]
+            complete = [message for message in messages if message.topic == CHECKPOINTS]
             descriptions += map(file.describer.description, complete)
             first = complete[0].number if complete else None
-            for each in messages:
-                if each.topic != STATE:
+            for message in messages:
+                if message.topic != STATE:
                     continue
-                before = first is not None and each.number < first
+                before = first is not None and message.number < first
                 if number == place.first and before:
                     continue
                 if number > place.first and first is not None and not before:
                     break
-                states.append(each)
-            if sum(STATE_BYTES + len(each.data) for each in states) > MAX_BLOCK_BYTES:
+                states.append(message)
+            if sum(STATE_BYTES + len(message.data) for message in states) > MAX_BLOCK_BYTES:
                 raise InputError(
                     f"The recording has more than {MAX_BLOCK_BYTES} bytes between two complete "
                     "states."

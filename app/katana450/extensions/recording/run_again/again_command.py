@@ -60,14 +60,14 @@ def script_of_part(
 
 def check_same_arm(client: Client, arm: ArmModel, file: Path) -> None:
     """Raise InputError if the arm of the server is not ``arm``, that of the recording ``file``."""
-    there = client.query(answers.Arm)
-    pairs = [(there.lower, arm.chain.lower), (there.upper, arm.chain.upper)]
+    other_arm = client.query(answers.Arm)
+    pairs = [(other_arm.lower, arm.chain.lower), (other_arm.upper, arm.chain.upper)]
     for one, other in (
         *((np.array(row), own) for row, own in pairs),
-        *((np.array(there.tools.get(name, [])), M) for name, M in arm.tools.items()),
+        *((np.array(other_arm.tools.get(name, [])), M) for name, M in arm.tools.items()),
     ):
         if one.shape != other.shape or not np.allclose(one, other, 0.0, SAME):
             raise InputError(
-                f"{file} is not a recording of {there.name}, the arm of the server: its joint "
+                f"{file} is not a recording of {other_arm.name}, the arm of the server: its joint "
                 "limits or tool frames differ."
             )

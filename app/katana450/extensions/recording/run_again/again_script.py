@@ -91,29 +91,29 @@ def read_part(
             f"{end:g} s has nothing of it."
         )
     check_whole(file, first, last)
-    found = list(rows_from(file, first, last))
-    if not found or found[0].position is None:
+    states = list(rows_from(file, first, last))
+    if not states or states[0].position is None:
         raise InputError(f"{file.path} is not a recording of an arm with a tool.")
-    part = _part(file, found, name)
+    part = _part(file, states, name)
     if bool(part.rests.all()):
         raise InputError(f"Nothing moves in this part of {file.path}.")
     return part
 
 
-def _part(file: RecordingFile, found: list[StateRow], name: str) -> RecordedPart:
-    count = len(found)
-    t = np.array([row.t for row in found])
-    shape = count, len(found[0].setpoint)
-    setpoint = finite_array([row.setpoint for row in found], shape, f"setpoint of {file.path}")
-    fingers = np.array([row.gripper_setpoint for row in found])
-    waiting = np.array([row.status in WAITING for row in found])
-    held, tools = tuple(_held(found)), tuple(row.tool for row in found)
+def _part(file: RecordingFile, states: list[StateRow], name: str) -> RecordedPart:
+    count = len(states)
+    t = np.array([row.t for row in states])
+    shape = count, len(states[0].setpoint)
+    setpoint = finite_array([row.setpoint for row in states], shape, f"setpoint of {file.path}")
+    fingers = np.array([row.gripper_setpoint for row in states])
+    waiting = np.array([row.status in WAITING for row in states])
+    held, tools = tuple(_held(states)), tuple(row.tool for row in states)
     # The last of several states at nearly one time is kept, and always the first one.
-    kept = np.append(np.diff(t) >= MIN_STEP, True)
-    kept[0] = True
-    if count > 1 and t[np.flatnonzero(kept)[1]] - t[0] < MIN_STEP:
-        kept[np.flatnonzero(kept)[1]] = False
-    t, numbers = _with_rests(t[kept], np.flatnonzero(kept))
+    mask = np.append(np.diff(t) >= MIN_STEP, True)
+    mask[0] = True
+    if count > 1 and t[np.flatnonzero(mask)[1]] - t[0] < MIN_STEP:
+        mask[np.flatnonzero(mask)[1]] = False
+    t, numbers = _with_rests(t[mask], np.flatnonzero(mask))
     return RecordedPart(
         t - file.start,
         setpoint[numbers],
@@ -137,10 +137,10 @@ def _with_rests(t: FloatArray, numbers: IntArray) -> tuple[FloatArray, IntArray]
     )
 
 
-def _held(found: list[StateRow]) -> Iterator[str]:
+def _held(states: list[StateRow]) -> Iterator[str]:
     """Yield the name of the object that the fingers hold in each state; "" for none."""
     held = ""
-    for row in found:
+    for row in states:
         for pose in row.objects:
             if pose.held:
                 held = pose.name
@@ -212,7 +212,7 @@ def again_script(part: RecordedPart, gripper: GripperModel, *, bare: bool = Fals
     of_row = EVENTS_OF_ROW + part.setpoint.shape[1]
     for tolerance in TOLERANCES:
         steps = [*_to_start(part, gripper), *_steps(part, pieces, tolerance)]
-        counts = [len(each[TRAJECTORY]["through"]) for each in steps if TRAJECTORY in each]
+        counts = [len(step[TRAJECTORY]["through"]) for step in steps if TRAJECTORY in step]
         events = of_row * (sum(counts) + len(steps) + 5)
         text = _text(part, steps, bare=bare)
         if (
@@ -290,13 +290,13 @@ def _runs(flags: Any) -> Iterator[tuple[int, int]]:
 
 def _merged(t: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Return ``runs`` with those joined that have less than FINGER_REST between them."""
-    found: list[tuple[int, int]] = []
+    ranges: list[tuple[int, int]] = []
     for first, last in runs:
-        if found and t[first] - t[found[-1][1]] < FINGER_REST:
-            found[-1] = found[-1][0], last
+        if ranges and t[first] - t[ranges[-1][1]] < FINGER_REST:
+            ranges[-1] = ranges[-1][0], last
         else:
-            found.append((first, last))
-    return found
+            ranges.append((first, last))
+    return ranges
 
 
 def _to_start(part: RecordedPart, gripper: GripperModel) -> Iterator[Step]:
@@ -341,8 +341,8 @@ def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
     wanted = np.linspace(t[0], t[-1], max(math.ceil((t[-1] - t[0]) / FIRST_SPACING), 1) + 1)
     chosen = np.unique(np.append(np.minimum(np.searchsorted(t, wanted), count - 1), (0, count - 1)))
     while len(chosen) < count:
-        found = CubicSpline(t[chosen], q[chosen]).values_at(t - t[0])
-        excess = np.abs(found - q).max(axis=1) - allowed
+        points = CubicSpline(t[chosen], q[chosen]).values_at(t - t[0])
+        excess = np.abs(points - q).max(axis=1) - allowed
         added = [
             first + 1 + int(np.argmax(excess[first + 1 : last]))
             for first, last in zip(chosen[:-1].tolist(), chosen[1:].tolist(), strict=True)
@@ -355,11 +355,11 @@ def postures(t: FloatArray, q: FloatArray, tolerance: float) -> IntArray:
 
 
 def _degrees(q: FloatArray, digits: int) -> list[float]:
-    return [round(each, digits) + 0.0 for each in np.degrees(q).tolist()]
+    return [round(angle, digits) + 0.0 for angle in np.degrees(q).tolist()]
 
 
 def _text(part: RecordedPart, steps: list[Step], *, bare: bool) -> str:
-    name = "".join(each for each in f"Again {part.name}" if each.isprintable())
+    name = "".join(letter for letter in f"Again {part.name}" if letter.isprintable())
     about = (
         f"{part.name}, {part.t[0]:.2f} to {part.t[-1]:.2f} s, run again. Times are those of the "
         "recording."

@@ -62,14 +62,14 @@ class Leaderboard:
         measures = tuple(
             name
             for name in MEASURES
-            if any(each.values[name] is not None for each in scores)
-            or (name == PLACING and any(each.missing for each in scores))
+            if any(row.values[name] is not None for row in scores)
+            or (name == PLACING and any(row.missing for row in scores))
         )
         return Leaderboard(tuple(sorted(scores, key=place)), measures)
 
     def is_best(self, score: Scored, measure: str) -> bool:
         """Return whether ``score`` has the best value of ``measure``, and another a worse one."""
-        known = [value for each in self.rows if (value := each.values[measure]) is not None]
+        known = [value for row in self.rows if (value := row.values[measure]) is not None]
         value = score.values[measure]
         # Values that differ by rounding are equal.
         if value is None or len(set(map(shown, known))) < 2:
@@ -79,13 +79,14 @@ class Leaderboard:
     @property
     def lines(self) -> list[str]:
         """The table as text: a line for each measure, a column for each recording."""
-        table = [["", *(f"{place}. {each.name}" for place, each in enumerate(self.rows, 1))]]
+        table = [["", *(f"{place}. {score.name}" for place, score in enumerate(self.rows, 1))]]
         if len(self.rows) == 1:
             table = [["", self.rows[0].name]]
         for measure in self.measures:
             cells = [
-                shown(each.values[measure]) + (f" {BEST}" if self.is_best(each, measure) else "  ")
-                for each in self.rows
+                shown(score.values[measure])
+                + (f" {BEST}" if self.is_best(score, measure) else "  ")
+                for score in self.rows
             ]
             table.append([f"{name_of(measure)} {unit_of(measure)}".rstrip(), *cells])
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -98,9 +99,9 @@ class Leaderboard:
     def notes(self) -> list[str]:
         """A sentence about each recording that lacks objects with a target."""
         return [
-            f"{each.name} has no object {', '.join(each.missing)}, so its placing error is unknown."
-            for each in self.rows
-            if each.missing
+            f"{row.name} has no object {', '.join(row.missing)}, so its placing error is unknown."
+            for row in self.rows
+            if row.missing
         ]
 
     @property
@@ -108,15 +109,15 @@ class Leaderboard:
         """The scores as JSON values, with units in the names, in their order."""
         return [
             {
-                "name": each.name,
-                **each.values,
-                "missing_objects": list(each.missing),
+                "name": row.name,
+                **row.values,
+                "missing_objects": list(row.missing),
                 "places_mm": {
                     name: [round(1e3 * number, 3) for number in place.tolist()]
-                    for name, place in each.places.items()
+                    for name, place in row.places.items()
                 },
             }
-            for each in self.rows
+            for row in self.rows
         ]
 
 
@@ -149,15 +150,15 @@ def score_files(options: Namespace) -> int:
     if options.like is not None:
         targets |= score_file(options.like, urdf=options.urdf).places
     targets |= {name: np.array(place) for name, place in options.target}
-    found = [
+    scores = [
         score_file(path, options.start, options.end, targets, options.urdf)
         for path in options.files
     ]
-    missing = [name for name, _ in options.target if all(name not in s.places for s in found)]
+    missing = [name for name, _ in options.target if all(name not in s.places for s in scores)]
     if missing:
-        known = ", ".join(sorted({name for each in found for name in each.places})) or "none"
+        known = ", ".join(sorted({name for score in scores for name in score.places})) or "none"
         raise InputError(f"--target: there is no object {missing[0]!r}. Known objects: {known}.")
-    board = Leaderboard.of(found, options.sort)
+    board = Leaderboard.of(scores, options.sort)
     if options.json:
         print(json.dumps(board.json, indent=2))
     else:
@@ -165,7 +166,7 @@ def score_files(options: Namespace) -> int:
             print(printable(line))
         for line in board.notes:
             print(printable(line))
-        if len(found) > 1:
+        if len(scores) > 1:
             print(f"Sorted by {options.sort}; {BEST} marks the best.")
     return 0
 

@@ -285,8 +285,8 @@ def _tool_points(robot: DescribedRobot, states: Sequence[State]) -> tuple[FloatA
     times = np.concatenate((times, held))[order]
     points = np.concatenate((points, points[numbers]))[order]
     t = np.arange(0.0, times[-1] + 0.5 / RATE, 1.0 / RATE)
-    found = CubicSpline(times, points).values_at(np.minimum(t, times[-1]))
-    return t, _in_base(robot, found)
+    positions = CubicSpline(times, points).values_at(np.minimum(t, times[-1]))
+    return t, _in_base(robot, positions)
 
 
 def _in_base(robot: DescribedRobot, points: FloatArray) -> FloatArray:
@@ -300,7 +300,7 @@ def _commanded_error(states: Sequence[State]) -> float | None:
     for state in states:
         if (path := path_of(state)) is not None:
             on.setdefault(id(path), []).append(state)
-    errors = [commanded_errors(path, of) for of in on.values() if (path := path_of(of[0]))]
+    errors = [commanded_errors(path, rows) for rows in on.values() if (path := path_of(rows[0]))]
     return 1e3 * float(np.concatenate(errors).max()) if errors else None
 
 
@@ -322,12 +322,12 @@ def _clearance(session: Session, states: Sequence[State]) -> float | None:
 
 def _of_held(state: State, contact: Contact) -> bool:
     """Return whether an object takes part that fingers may touch, as when it is grasped."""
-    return any(each.can_be_held and each.name in contact.parts for each in state.objects)
+    return any(body.can_be_held and body.name in contact.parts for body in state.objects)
 
 
 def _places(session: Session, state: State) -> dict[str, FloatArray]:
     pose = session.environment.pose
-    return {each.name: frozen(pose(each, state.x_setpoint)[:3, 3]) for each in state.objects}
+    return {body.name: frozen(pose(body, state.x_setpoint)[:3, 3]) for body in state.objects}
 
 
 def _placing_error(places: Places, targets: Places) -> float | None:
@@ -344,7 +344,7 @@ def _placing_error(places: Places, targets: Places) -> float | None:
 
 
 def _waits_before_contact(state: State) -> bool:
-    return state.blocked or any(each.reason is Reason.CONTACT for each in state.findings)
+    return state.blocked or any(finding.reason is Reason.CONTACT for finding in state.findings)
 
 
 def _begins(flags: Sequence[bool]) -> int:
