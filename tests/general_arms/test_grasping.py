@@ -159,10 +159,10 @@ def test_preview_shows_the_object_in_the_hand(tmp_path: Path) -> None:
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         preview = Preview(server, plan.robot, lambda: plan.session)
-        assert preview.show(plan.program, plan.start, ghosts=True) > 0.0
+        assert preview.show(plan.program, plan.start) > 0.0
+        preview.look(lifted.t)
         for thread in [each for each in threading.enumerate() if each.name == "preview"]:
             thread.join(60.0)
-        preview.look(lifted.t)
         shown = preview._shown
         seen = None if shown is None else shown.at(lifted.t)
         assert seen is not None

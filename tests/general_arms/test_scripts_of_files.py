@@ -49,9 +49,11 @@ def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         preview = Preview(server, plan.robot, lambda: plan.session)
-        span = preview.show(plan.program, plan.start, ghosts=True)
+        span = preview.show(plan.program, plan.start)
         assert span == pytest.approx(states[-1].t, abs=0.3)
         preview.look(0.5 * span)
+        for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+            thread.join(30.0)
         traces = Traces(server, plan.robot.require_arm())
         for state in states:
             traces.follow(state)
@@ -66,9 +68,6 @@ def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
         down = shown.points.reshape(-1, 3)[:, 2].min()
         assert down == pytest.approx(0.2, abs=1e-3)
         preview.begin()
-        for thread in threading.enumerate():
-            if thread.name == "preview":
-                thread.join(30.0)
     finally:
         with redirect_stdout(StringIO()):
             server.stop()
