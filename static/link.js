@@ -23,7 +23,7 @@ let pace; // timer of the queries for states, while they are shown
 /** @type {Map<number | string, number>} */
 const looks = new Map();
 
-/** @param {Page.LinkMessage} message */
+/** @param {Page.LinkEvent} message */
 const post = (message) => postMessage(message);
 
 function connect() {

@@ -158,7 +158,7 @@ function take(answer) {
   }
 }
 
-/** @param {MessageEvent<Page.LinkMessage>} message */
+/** @param {MessageEvent<Page.LinkEvent>} message */
 worker.onmessage = ({ data }) => {
   parts.panel?.hear(data);
   if (data.link === "up") store.connect();

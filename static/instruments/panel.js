@@ -55,7 +55,7 @@ export class Panel {
     this.#draw();
   }
 
-  /** Handle each event of the page's connection. @param {Page.LinkMessage} message */
+  /** Handle each event of the page's connection. @param {Page.LinkEvent} message */
   hear({ heard, took, link }) {
     if (link === "down") this.#spring();
     if (heard?.is === "arm" && !this.#board) this.#build(heard);

@@ -89,9 +89,13 @@ def test_page_offers_its_scene(page: ViserPage) -> None:
         place = "{ contentWindow: window }, 640, 400, 300, 96, 72"
         assert ask(page, f"Viser.thumbnail({place})").startswith("data:image/jpeg;base64,")
         assert ask(page, "Viser.thumbnail({}, 0, 0, 9, 9, 9)") == ""
+    with part("drawing"):
+        assert ask(page, "Viser.drawing() === Viser.viewer()")
     with part("node"):
         assert ask(page, "Viser.node('/box').isObject3D && Viser.node('').isObject3D")
         assert ask(page, "Viser.node('/none') === undefined")
+    with part("world"):
+        assert ask(page, "Viser.world() === Viser.node('')")
 
 
 def test_page_publishes_its_decoder(page: ViserPage) -> None:
@@ -153,7 +157,7 @@ def test_page_finds_what_is_under_a_pixel(page: ViserPage) -> None:
 
 
 def test_page_speaks_to_its_worker_as_expected(page: ViserPage, server: AppServer) -> None:
-    with part("tap"):
+    with part("interceptMessages"):
         assert ask(page, "tapped.address") == server.url.replace("http", "ws", 1)
         assert ask(page, "tapped.connected") == 1
         assert "ViewerCameraMessage" in ask(page, "tapped.sends")
@@ -217,11 +221,11 @@ def test_page_shows_a_hidden_node_by_itself(page: ViserPage) -> None:
 
 
 def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
-    with part("veil"):
+    with part("hideNodes"):
         for hides, shown in (("(name) => name === '/box'", False), ("null", True)):
             ask(page, f"Viser.hideNodes({hides})")
             page.wait_until(lambda wanted=shown: page.shows("/box") is wanted, "the node")  # type: ignore[misc]
-            with part("isVeiled"):
+            with part("hasHidden"):
                 assert ask(page, "Viser.hasHidden()") is not shown
     with part("handles"):
         sent = {each["type"] for each in ask(page, "harness.sent")}

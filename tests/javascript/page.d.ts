@@ -51,7 +51,7 @@ declare namespace Page {
   type Answer = Api.Answer | StatusMessage | StoppedMessage;
 
   /** A message of the worker `link.js`. */
-  interface LinkMessage {
+  interface LinkEvent {
     link?: "up" | "down"; code?: number; trip?: number; silent?: number; unsaid?: Api.Act["do"]; heard?: Answer; took?: number;
   }
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LIST = ROOT / "docs" / "viser.md"
 BRIDGE = ROOT / "app" / "katana450" / "server" / "viser_bridge"
 STATIC = ROOT / "static"
-OURS = STATIC / "viser.js"
+OURS = (STATIC / "viser.js", *sorted((STATIC / "viser").glob("*.js")))
 SERVER_TESTS = "tests/viser_bridge/test_server_parts.py"
 PAGE_TESTS = "tests/browser/test_viser_page.py"
 
@@ -156,28 +156,18 @@ def test_private_parts_in_tests_are_listed_and_in_one_folder() -> None:
             assert not modules | used, f"{path}: use tests.viser_bridge.internals"
 
 
-def test_only_one_script_names_private_parts_of_the_page() -> None:
+def test_only_these_scripts_name_private_parts_of_the_page() -> None:
     for path in sorted(STATIC.rglob("*")):
-        if path.is_file() and path != OURS:
-            found = PRIVATE_IN_SCRIPTS.findall(path.read_text(encoding="utf-8"))
-            assert not found, f"{path} names {found}: move that into {OURS.name}"
+        if path.is_file() and path not in OURS:
+            names = PRIVATE_IN_SCRIPTS.findall(path.read_text(encoding="utf-8"))
+            assert not names, f"{path} names {names}: move that into {OURS[0].name}"
 
 
-def test_functions_of_that_script_are_listed() -> None:
-    text = OURS.read_text(encoding="utf-8")
-    offered = text[text.rindex("return {") :]
-    offered = re.sub(r"//.*", "", offered)
-    found = set(re.findall(r"^\s+(\w+):", offered, re.MULTILINE))
-    found |= {
-        name.strip()
-        for line in offered.splitlines()
-        if "=>" not in line and ":" not in line
-        for name in line.split(",")
-        if re.fullmatch(r"\s*\w+", name)
-    }
-    found -= {"viser"}
+def test_exports_of_these_scripts_are_listed() -> None:
+    text = "".join(path.read_text(encoding="utf-8") for path in OURS)
+    exports = re.findall(r"^export (?:const|(?:async )?function) (\w+)", text, re.MULTILINE)
     rows = {name for row in listed("Page, as our scripts") for name in row.names}
-    assert found == rows
+    assert set(exports) == rows
 
 
 def test_private_parts_in_browser_tests_are_listed() -> None:
