@@ -12,7 +12,6 @@ from katana450.assembly.log_output import printable
 from katana450.client.asynchronous import AsyncClient, aconnect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import InputError, KatanaError
-from katana450.extensions.experiments.keyboard import Keyboard
 from katana450.extensions.leader.follower import (
     Action,
     Ease,
@@ -32,6 +31,7 @@ from katana450.extensions.leader.joint_map import (
     read_calibration,
     read_layout,
 )
+from katana450.extensions.leader.keyboard import Keyboard
 from katana450.extensions.leader.motor_bus import (
     BAUD,
     HOMING_OFFSET,

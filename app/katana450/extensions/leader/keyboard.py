@@ -1,13 +1,10 @@
-"""The lines that a person types at the terminal while a program runs."""
+"""The lines that a person types at the terminal while a leader drives the arm."""
 
 from __future__ import annotations
 
 import queue
 import sys
 import threading
-
-EVERY = 0.2
-"""[s] Interval in which Ctrl-C is noticed."""
 
 
 class Keyboard:
@@ -20,7 +17,7 @@ class Keyboard:
     def __init__(self) -> None:
         """Start the thread if standard input is a terminal."""
         self.present = sys.stdin is not None and sys.stdin.isatty()
-        self._lines: queue.Queue[str | None] = queue.Queue()
+        self._lines: queue.Queue[str] = queue.Queue()
         if self.present:
             threading.Thread(target=self._read, name="keyboard", daemon=True).start()
 
@@ -31,15 +28,6 @@ class Keyboard:
         except queue.Empty:
             return None
 
-    def wait(self) -> str | None:
-        """Wait for the next line and return it; None at the end of the input."""
-        while True:
-            try:
-                return self._lines.get(timeout=EVERY)
-            except queue.Empty:
-                continue
-
     def _read(self) -> None:
         for line in sys.stdin:
             self._lines.put(line.strip())
-        self._lines.put(None)
