@@ -53,7 +53,7 @@ class Bench:
                 self.values["sent"] = self.t
             given = posture(self.angle, self.finger) if self.answers else None
             state = msgspec.convert(self.values, ServerState)
-            found += self.follower.step(self.t, given, state, self.heard, asked=asked)  # type: ignore[arg-type]
+            found += self.follower.step(self.t, given, state, self.heard, confirmed=asked)  # type: ignore[arg-type]
         return found
 
     def arrive(self, angle: float) -> None:

@@ -36,8 +36,6 @@ AVOIDED = frozenset(
 """Names that say nothing about the quantity: `candidate`, `posture` or `match` says what it is."""
 
 NOT_YET = (
-    "extensions/leader",
-    "extensions/real_arm",
     # Its keyword `at` is the word of scripts.
     "library/script_writer.py",
 )

@@ -82,9 +82,9 @@ class PostureHistory:
     def rates(self) -> FloatArray:
         """Return the rates (n,) of ``newest.q``: the slope of the line through the last ones."""
         end = self._postures[-1][0]
-        found = [each for each in self._postures if end - each[0] <= RATE_WINDOW]
-        t = np.array([each[0] for each in found])
-        q = np.array([each[1].q for each in found])
+        recent = [posture for posture in self._postures if end - posture[0] <= RATE_WINDOW]
+        t = np.array([posture[0] for posture in recent])
+        q = np.array([posture[1].q for posture in recent])
         t -= t.mean()
         spread = float(t @ t)
         slope: FloatArray = t @ q / spread if spread > 0.0 else np.zeros(q.shape[1])
@@ -208,7 +208,7 @@ class Follower:
         state: answers.State,
         heard: float,
         *,
-        asked: bool = False,
+        confirmed: bool = False,
     ) -> list[Action]:
         """Return what is to be done now.
 
@@ -217,15 +217,15 @@ class Follower:
             posture: posture of the leader; None if it did not answer.
             state: newest state of the server.
             heard: time [s] at which it arrived, on the clock of ``t``.
-            asked: whether a person asks to begin, or to end.
+            confirmed: whether a person asks to begin, or to end.
         """
         if self.phase is not LeadPhase.WAITING and (ended := self._ended(t, state, heard)):
             return ended
         accepted = posture is not None and self.history.add(t, posture)
         match self.phase:
             case LeadPhase.WAITING:
-                return self._begun(t, state) if asked else self._released(t, state, heard)
-            case _ if asked:
+                return self._begun(t, state) if confirmed else self._released(t, state, heard)
+            case _ if confirmed:
                 return self.rest("You have ended it.")
             case LeadPhase.EASING:
                 return self._arrived(state)

@@ -75,11 +75,11 @@ def decoded_calibration(data: bytes) -> Calibration:
     if len(data) > MAX_BYTES:
         raise InputError(f"it has more than {MAX_BYTES} bytes.")
     try:
-        found = msgspec.json.decode(data, type=Calibration)
+        calibration = msgspec.json.decode(data, type=Calibration)
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise InputError(f"{error}.") from error
     owners: dict[int, str] = {}
-    for name, motor in found.items():
+    for name, motor in calibration.items():
         if motor.range_min >= motor.range_max:
             raise InputError(
                 f"{name}: range_min {motor.range_min} is not below range_max {motor.range_max}."
@@ -87,7 +87,7 @@ def decoded_calibration(data: bytes) -> Calibration:
         if motor.id in owners:
             raise InputError(f"{name} and {owners[motor.id]} have the same id {motor.id}.")
         owners[motor.id] = name
-    return found
+    return calibration
 
 
 class AxisSource(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -197,14 +197,14 @@ class JointMap:
                 f"layout of the leader names {len(layout.axes)} that turn. Give another one by "
                 "--layout."
             )
-        self._axes = [(_of(calibration, each), each) for each in layout.axes]
+        self._axes = [(_of(calibration, axis), axis) for axis in layout.axes]
         self._finger: tuple[MotorCalibration, FingerSource] | None = None
         self.finger_range: tuple[float, float] | None = None
         if layout.gripper is not None and arm.gripper is not None:
             self._finger = _of(calibration, layout.gripper), layout.gripper
             self.finger_range = arm.gripper[:2]
-        found = [motor.id for motor, _ in self._axes]
-        self.motors = tuple(found if self._finger is None else [*found, self._finger[0].id])
+        motors = [motor.id for motor, _ in self._axes]
+        self.motors = tuple(motors if self._finger is None else [*motors, self._finger[0].id])
         if len(set(self.motors)) < len(self.motors):
             raise InputError("The layout of the leader names a motor twice. Each moves one joint.")
         self._lower = np.array(arm.lower) + LIMIT_MARGIN
@@ -215,8 +215,8 @@ class JointMap:
         raw = frozen(
             np.array(
                 [
-                    each.sign * motor.angle(ticks[motor.id]) + math.radians(each.offset)
-                    for motor, each in self._axes
+                    axis.sign * motor.angle(ticks[motor.id]) + math.radians(axis.offset)
+                    for motor, axis in self._axes
                 ]
             )
         )

@@ -91,10 +91,10 @@ def prepare(bus: MotorBus, calibration: Calibration, motors: tuple[int, ...]) ->
     """
     names = {motor.id: name for name, motor in calibration.items()}
     for motor in motors:
-        found, expected = bus.read(motor, HOMING_OFFSET), calibration[names[motor]].homing_offset
-        if found != expected:
+        offset, expected = bus.read(motor, HOMING_OFFSET), calibration[names[motor]].homing_offset
+        if offset != expected:
             raise InputError(
-                f"The homing offset of {names[motor]} is {found} in the motor and {expected} in "
+                f"The homing offset of {names[motor]} is {offset} in the motor and {expected} in "
                 "the calibration file. The file is that of another leader, or the leader was "
                 "calibrated again. Choose its newest file."
             )
@@ -134,7 +134,7 @@ class LeaderRun:
     async def _drive(self, watching: asyncio.Task[None]) -> int:
         """Follow until nobody can ask for it again. Raises KatanaError."""
         # The person who starts the program asks for the first motion.
-        asked, due = True, time.monotonic()
+        confirmed, due = True, time.monotonic()
         while True:
             posture = await asyncio.to_thread(self._posture)
             for task in (watching, self._easing):
@@ -144,12 +144,12 @@ class LeaderRun:
             if self._state is not None:
                 state, heard = self._state
                 now = time.monotonic()
-                for action in self._follower.step(now, posture, state, heard, asked=asked):
+                for action in self._follower.step(now, posture, state, heard, confirmed=confirmed):
                     await self._perform(action)
-                asked = False
+                confirmed = False
                 if self._follower.phase is LeadPhase.WAITING and not self._keyboard.present:
                     return 1
-            asked = asked or self._keyboard.line() is not None
+            confirmed = confirmed or self._keyboard.line() is not None
             due = max(due + PERIOD, time.monotonic())
             await asyncio.sleep(due - time.monotonic())
 
@@ -233,5 +233,5 @@ class LeaderRun:
 
 def ease_script(q: FloatArray) -> str:
     """Return the script that moves the arm to ``q`` (n,) [rad], around obstacles if necessary."""
-    angles = ", ".join(f"{math.degrees(each):.4f}" for each in q)
+    angles = ", ".join(f"{math.degrees(angle):.4f}" for angle in q)
     return f"name: Leader\nsteps:\n  - joints: [{angles}]\n"

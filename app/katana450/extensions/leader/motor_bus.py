@@ -152,23 +152,23 @@ class PacketReader:
     def feed(self, data: bytes) -> list[Packet]:
         """Return the packets that ``data`` completes."""
         self._rest += data
-        found, at, rest = [], 0, self._rest
-        while (at := rest.find(HEADER, at)) >= 0 and len(rest) - at >= FIXED_BYTES:
-            motor, length = rest[at + 2], rest[at + 3]
-            end = at + 4 + length
+        packets, place, rest = [], 0, self._rest
+        while (place := rest.find(HEADER, place)) >= 0 and len(rest) - place >= FIXED_BYTES:
+            motor, length = rest[place + 2], rest[place + 3]
+            end = place + 4 + length
             if motor <= BROADCAST and 2 <= length <= MAX_LENGTH:
                 if end > len(rest):
                     break
-                body = bytes(rest[at + 2 : end - 1])
+                body = bytes(rest[place + 2 : end - 1])
                 if rest[end - 1] == checksum(body):
-                    found.append(Packet(motor, body[2], body[3:]))
-                    at = end
+                    packets.append(Packet(motor, body[2], body[3:]))
+                    place = end
                     continue
             # The header may be part of garbage.
-            at += 1
+            place += 1
         # The last byte may be the first half of a header.
-        del rest[: at if at >= 0 else max(len(rest) - 1, 0)]
-        return found
+        del rest[: place if place >= 0 else max(len(rest) - 1, 0)]
+        return packets
 
 
 BAUD = 1_000_000
@@ -220,9 +220,9 @@ class MotorBus:
     def errors(self, motor: int) -> MotorError:
         """Return the errors that ``motor`` reports. Raises SilentLeaderError after some tries."""
         for _ in range(TRIES):
-            found = self._exchange(ping_request(motor), (motor,), 0)
-            if motor in found:
-                return MotorError(found[motor].code)
+            packets = self._exchange(ping_request(motor), (motor,), 0)
+            if motor in packets:
+                return MotorError(packets[motor].code)
         raise self._silent((motor,))
 
     def read_all(self, motors: tuple[int, ...], register: Register) -> dict[int, int]:
@@ -231,29 +231,29 @@ class MotorBus:
         Raises SilentLeaderError if one does not answer. The request is not repeated, because the
         next one asks for newer values.
         """
-        found = self._exchange(sync_read_request(motors, register), motors, register.size)
-        if missing := [motor for motor in motors if motor not in found]:
+        packets = self._exchange(sync_read_request(motors, register), motors, register.size)
+        if missing := [motor for motor in motors if motor not in packets]:
             raise self._silent(missing)
-        return {motor: register.decoded(found[motor].parameters) for motor in motors}
+        return {motor: register.decoded(packets[motor].parameters) for motor in motors}
 
     def _answer(self, request: Packet, size: int) -> bytes:
         for _ in range(TRIES):
-            found = self._exchange(request, (request.id,), size)
-            if request.id in found:
-                return found[request.id].parameters
+            packets = self._exchange(request, (request.id,), size)
+            if request.id in packets:
+                return packets[request.id].parameters
         raise self._silent((request.id,))
 
     def _exchange(self, request: Packet, motors: tuple[int, ...], size: int) -> dict[int, Packet]:
         """Send ``request``; return the answers of ``motors`` with ``size`` bytes, by their ids."""
         self._reader.clear()
         self._port.write(request.encoded, WRITE_TIMEOUT)
-        found: dict[int, Packet] = {}
+        packets: dict[int, Packet] = {}
         due = time.monotonic() + DEADLINE
-        while len(found) < len(motors) and time.monotonic() < due:
+        while len(packets) < len(motors) and time.monotonic() < due:
             for packet in self._reader.feed(self._port.read(READ_TIMEOUT)):
                 if packet.id in motors and len(packet.parameters) == size:
-                    found[packet.id] = packet
-        return found
+                    packets[packet.id] = packet
+        return packets
 
     @staticmethod
     def _silent(motors: Iterable[int]) -> SilentLeaderError:

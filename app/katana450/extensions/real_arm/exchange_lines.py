@@ -32,39 +32,39 @@ class ExchangeDecoder:
         """Return a line of text for each message that ``line`` completes."""
         parts = line.split(maxsplit=2)
         try:
-            at, mark = float(parts[0]), parts[1]
+            t, mark = float(parts[0]), parts[1]
             data = bytes.fromhex(parts[2]) if len(parts) > 2 else b""
         except (IndexError, ValueError):
             return [f"This is not a line of a log: {printable(line.strip())}"]
-        shown = time.strftime("%H:%M:%S", time.localtime(at)) + f"{at % 1.0:.3f}"[1:]
+        shown = time.strftime("%H:%M:%S", time.localtime(t)) + f"{t % 1.0:.3f}"[1:]
         match mark:
             case link.CONNECTED:
                 self._firmware, self._host = FirmwareCodec(), HostCodec()
-                found = ["connected"]
+                texts = ["connected"]
             case link.SENT:
-                self._sent_at = at
-                found = self._requests(data)
+                self._sent_at = t
+                texts = self._requests(data)
             case link.RECEIVED:
-                found = self._replies(data, at - self._sent_at)
+                texts = self._replies(data, t - self._sent_at)
             case _:
-                found = [f"unknown mark {mark}"]
-        return [f"{shown} {printable(each)}" for each in found]
+                texts = [f"unknown mark {mark}"]
+        return [f"{shown} {printable(text)}" for text in texts]
 
     def _requests(self, data: bytes) -> list[str]:
-        found = []
+        texts = []
         for event in self._firmware.receive(data):
             if isinstance(event, RequestReceived):
                 self._host = HostCodec()
                 self._host.send(event.request)
-                found.append(f"> {message_words(event.request)}")
+                texts.append(f"> {message_words(event.request)}")
             else:
-                found.append(f"> invalid request {data.hex(' ')}")
-        return found
+                texts.append(f"> invalid request {data.hex(' ')}")
+        return texts
 
     def _replies(self, data: bytes, took: float) -> list[str]:
         if not data:
             return [f"< nothing for {took:.3f} s"]
-        found = []
+        texts = []
         for event in self._host.receive(data):
             match event:
                 case ReplyReceived(reply=FirmwareError() as error):
@@ -75,8 +75,8 @@ class ExchangeDecoder:
                     words = "refused"
                 case OutOfStep(problem=problem):
                     words = problem
-            found.append(f"< {words}  [{1e3 * took:.1f} ms]")
-        return found
+            texts.append(f"< {words}  [{1e3 * took:.1f} ms]")
+        return texts
 
 
 def message_words(message: WireMessage) -> str:

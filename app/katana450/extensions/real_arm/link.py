@@ -155,8 +155,8 @@ class ArmUrl:
 
         Raises InputError.
         """
-        scheme, found, rest = text.partition("://")
-        if scheme == "serial" and found and rest:
+        scheme, separator, rest = text.partition("://")
+        if scheme == "serial" and separator and rest:
             return cls(rest, None)
         try:
             parts = urlsplit(text)
@@ -322,10 +322,10 @@ class ArmLink:
         if self._is_lost:
             raise LinkLostError("The connection to the arm was lost: connect again.")
         data = self._codec.send(request)
-        begun = self._clock()
+        start = self._clock()
         try:
             self._transport.write(data, timeout)
-            while not (events := self._codec.receive(self._read(begun + timeout))):
+            while not (events := self._codec.receive(self._read(start + timeout))):
                 pass
             for event in events:
                 if isinstance(event, OutOfStep):
@@ -334,8 +334,8 @@ class ArmLink:
             self._is_lost = True
             self.close()
             raise
-        self.heard_at = begun
-        self.round_trips.append(self._clock() - begun)
+        self.heard_at = start
+        self.round_trips.append(self._clock() - start)
         return events[0]
 
     def _read(self, deadline: float) -> bytes:

@@ -53,7 +53,7 @@ def _lines(report: Report) -> Iterator[str]:
     yield from _findings(readings)
     yield ""
     yield "Not learned, because it needs more than reading:"
-    yield from (f"  {each}" for each in NOT_LEARNED)
+    yield from (f"  {sentence}" for sentence in NOT_LEARNED)
 
 
 def _notes(reading: Report) -> str:
@@ -67,30 +67,32 @@ def _notes(reading: Report) -> str:
 
 def _findings(readings: Report) -> Iterator[str]:
     """Return a line for each reading that answers an open question."""
-    found = {name: each["fields"] for name, each in readings.items() if "fields" in each}
-    if "master firmware" in found:
-        master = found["master firmware"]
+    contents = {
+        name: reading["fields"] for name, reading in readings.items() if "fields" in reading
+    }
+    if "master firmware" in contents:
+        master = contents["master firmware"]
         yield f"Master firmware: {master['version']}.{master['revision']}"
-    if "identity" in found:
-        yield f"Identity: {found['identity']['text'].strip()}"
-    for name in found:
+    if "identity" in contents:
+        yield f"Identity: {contents['identity']['text'].strip()}"
+    for name in contents:
         if name.startswith("slave firmware"):
             yield f"{name.capitalize()}: {readings[name]['reply']} (bytes 2, 7 to 12: unknown)"
-    if "command table" in found:
+    if "command table" in contents:
         yield f"Command table: {readings['command table']['reply']}"
-    if "states" in found:
-        for axis, status in enumerate(found["states"]["states"], 1):
+    if "states" in contents:
+        for axis, status in enumerate(contents["states"]["states"], 1):
             yield f"State of axis {axis}: {status} ({status_words(status)})"
-    if "positions" in found:
-        yield f"Encoders: {found['positions']['positions']}"
-    for name, values in found.items():
+    if "positions" in contents:
+        yield f"Encoders: {contents['positions']['positions']}"
+    for name, values in contents.items():
         if name.startswith("axis "):
             drive = f"velocity {values['velocity']}, pwm {values['pwm']}"
             yield f"{name.capitalize()} at rest: {drive}"
-    if "sensors" in found:
-        yield f"Sensors without contact: {found['sensors']['values']}"
-    if "digital inputs" in found:
-        yield f"Digital inputs: {found['digital inputs']['bits']:08b}"
+    if "sensors" in contents:
+        yield f"Sensors without contact: {contents['sensors']['values']}"
+    if "digital inputs" in contents:
+        yield f"Digital inputs: {contents['digital inputs']['bits']:08b}"
 
 
 TIMEOUT = 2.0
@@ -156,22 +158,22 @@ def read_arm(link: ArmLink, repeats: int, readings: Report) -> None:
 def _read(link: ArmLink, request: req.ArmRequest, repeats: int) -> Report:
     """Return the first reply, how the others differ, and the times of all."""
     link.round_trips.clear()
-    found: list[ArmReply] = []
+    replies: list[ArmReply] = []
     refusals: list[str] = []
     times: list[float] = []
     for _ in range(repeats):
         try:
-            found.append(link.exchange(request, TIMEOUT))
+            replies.append(link.exchange(request, TIMEOUT))
         except ArmRefusalError as error:
             refusals.append(str(error))
         times.append(link.round_trips[0])
         link.round_trips.clear()
     reading: Report = {"request": request_bytes(request).hex(" "), "times_ms": times_of(times)}
-    if found:
-        payloads = [reply.payload for reply in found]
+    if replies:
+        payloads = [reply.payload for reply in replies]
         reading["reply"] = payloads[0].hex(" ")
         reading["fields"] = {
-            field.name: _plain(getattr(found[0], field.name)) for field in fields(found[0])
+            field.name: _plain(getattr(replies[0], field.name)) for field in fields(replies[0])
         }
         reading["bytes_that_changed"] = [
             place
@@ -185,7 +187,7 @@ def _read(link: ArmLink, request: req.ArmRequest, repeats: int) -> Report:
 
 def times_of(times: Sequence[float]) -> Report:
     """Return minimum, median, 95th percentile and maximum of ``times`` [s], in ms."""
-    ordered = sorted(1e3 * each for each in times)
+    ordered = sorted(1e3 * t for t in times)
     return {
         "min": round(ordered[0], 3),
         "median": round(statistics.median(ordered), 3),

@@ -112,8 +112,8 @@ _AXES = (
 
 VARIANTS: Mapping[str, Variant] = MappingProxyType(
     {
-        each.name: each
-        for each in (Variant("6M180_G", _AXES), Variant("6M180_F", _AXES, has_gripper=False))
+        arm.name: arm
+        for arm in (Variant("6M180_G", _AXES), Variant("6M180_F", _AXES, has_gripper=False))
     }
 )
 """Known variants by name: the straight arm with its angle gripper, and with a bare flange."""

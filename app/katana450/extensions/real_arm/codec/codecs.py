@@ -160,8 +160,8 @@ class HostCodec:
         return ReplyReceived(request, request.REPLY.read(payload))
 
     def _has_crc(self, length: int) -> bool:
-        found = int.from_bytes(self._buffer[length : length + CRC_BYTES], "big")
-        return found == crc16(bytes(self._buffer[:length]))
+        crc = int.from_bytes(self._buffer[length : length + CRC_BYTES], "big")
+        return crc == crc16(bytes(self._buffer[:length]))
 
     def _out_of_step(self, problem: str, length: int = 1) -> OutOfStep:
         shown = bytes(self._buffer[: min(length, 8)]).hex(" ")
@@ -249,9 +249,9 @@ class FirmwareCodec:
         if len(buffer) < end + CRC_BYTES:
             return None
         payload = bytes(buffer[HEADER_BYTES:end])
-        found = int.from_bytes(buffer[end : end + CRC_BYTES], "big")
+        crc = int.from_bytes(buffer[end : end + CRC_BYTES], "big")
         del buffer[: end + CRC_BYTES]
-        if found != crc16(payload):
+        if crc != crc16(payload):
             return RequestInvalid(payload, CRC_ERROR)
         try:
             return RequestReceived(read_request(payload), address)

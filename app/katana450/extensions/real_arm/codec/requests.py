@@ -275,7 +275,7 @@ REQUESTS: tuple[type[ArmRequest], ...] = (
 
 def read_request(payload: bytes) -> ArmRequest:
     """Return the request in the payload of a frame. Raises InputError if there is none."""
-    known = [each for each in REQUESTS if payload.startswith(each.HEAD)]
+    known = [request for request in REQUESTS if payload.startswith(request.HEAD)]
     if not known:
         raise InputError(f"No request begins with {payload[:2].hex(' ') or 'nothing'}.")
     return known[0].read(payload)

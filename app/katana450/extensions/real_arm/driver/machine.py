@@ -136,8 +136,8 @@ class ArmMachine:
         again = " again" if self._was_connected else ""
         self._clear()
         self._has_sensors = self._variant.has_gripper
-        found = f"Connected{again} to {address}."
-        self._procedure = identify(self.arm, self._variant, found)
+        sentence = f"Connected{again} to {address}."
+        self._procedure = identify(self.arm, self._variant, sentence)
         self._resume_at = -np.inf
 
     def lost(self, problem: str) -> None:
@@ -269,7 +269,7 @@ class ArmMachine:
         order = self._motion.finger_order() if self._may_move else None
         if order is not None:
             due.append((order, FINGER_PERIOD))
-        overdue = [(now - self._polled.get(type(each), -math.inf)) / time for each, time in due]
+        overdue = [(now - self._polled.get(type(kind), -math.inf)) / time for kind, time in due]
         most = max(overdue)
         if most < 1.0:
             return None
@@ -325,9 +325,9 @@ class ArmMachine:
                 self._start(halt(self.arm, axes, self._encoders, now, MOVED_BY_ITSELF), now)
                 return
         if self._stop_asked is not None:
-            asked, self._stop_asked = self._stop_asked, None
+            press, self._stop_asked = self._stop_asked, None
             if self.mode.follows and self._motion.moves(now):
-                self._halt(asked)
+                self._halt(press)
             return
         while self._acts and self._procedure is None:
             act = self._acts.popleft()
@@ -346,16 +346,16 @@ class ArmMachine:
     def _start(self, procedure: Procedure, now: float) -> None:
         self._procedure, self._step, self._resume_at = procedure, None, now
 
-    def _halt(self, asked: float, cause: str = "") -> None:
+    def _halt(self, press: float, cause: str = "") -> None:
         """Begin to stop the arm, which counts as moving until it rests."""
         self.mode = ArmMode.MOVING
         if cause:
             self.note = cause
         axes = self._variant.driven
-        if not self._motion.finger_moves(asked):
+        if not self._motion.finger_moves(press):
             # Fingers at rest keep their order, and so what they hold.
             axes = self._motion.axes
-        self._start(halt(self.arm, axes, self._encoders, asked, cause, self._travel), asked)
+        self._start(halt(self.arm, axes, self._encoders, press, cause, self._travel), press)
 
     def _advance(self, now: float, error: ArmRefusalError | None = None) -> None:
         """Continue the procedure up to its next request or pause, or end it."""

@@ -178,10 +178,10 @@ Procedure = Generator[ArmRequest | float, None, ProcedureEnd]
 _Part = Generator[ArmRequest | float, None, None]
 
 
-def identify(arm: ArmReadings, variant: Variant, found: str) -> Procedure:
+def identify(arm: ArmReadings, variant: Variant, sentence: str) -> Procedure:
     """Read what the arm is and where it is. An arm that moves is stopped.
 
-    found: Sentence with which the note begins.
+    sentence: Sentence with which the note begins.
     """
     yield ReadMasterVersion()
     yield ReadArmIdentity()
@@ -194,14 +194,14 @@ def identify(arm: ArmReadings, variant: Variant, found: str) -> Procedure:
     if moving:
         yield from _flush()
         yield from _freeze(arm, moving)
-        found += " The arm moved and was stopped."
+        sentence += " The arm moved and was stopped."
     if arm.axes_in(AxisStatus.CALIBRATING):
-        found += " The arm is calibrating: wait until it has ended."
+        sentence += " The arm is calibrating: wait until it has ended."
     if arm.collided:
-        found += f" {collision_sentence(arm.collided)}"
+        sentence += f" {collision_sentence(arm.collided)}"
     return ProcedureEnd(
         ArmMode.UNCALIBRATED,
-        f"{found} Firmware {arm.version}. If the arm was calibrated since it was switched on, "
+        f"{sentence} Firmware {arm.version}. If the arm was calibrated since it was switched on, "
         "engage it; otherwise calibrate it.",
     )
 
@@ -228,8 +228,8 @@ def calibrate(arm: ArmReadings, variant: Variant) -> Procedure:
 
 def _calibrated(arm: ArmReadings, variant: Variant) -> Procedure:
     """Wait for the end of a calibration. Only single axes are asked for, as is known to work."""
-    begun = arm.newest_reply
-    while arm.newest_reply - begun < CALIBRATION_TIMEOUT:
+    start = arm.newest_reply
+    while arm.newest_reply - start < CALIBRATION_TIMEOUT:
         yield CALIBRATION_PAUSE
         for axis in reversed(variant.driven):
             # The first axis is known to answer meanwhile, and ends last.
@@ -256,7 +256,7 @@ def halt(
     arm: ArmReadings,
     axes: tuple[int, ...],
     encoders: EncoderMap,
-    begun: float,
+    start: float,
     cause: str = "",
     travel: Travel | None = None,
 ) -> Procedure:
@@ -269,11 +269,11 @@ def halt(
         arm: Readings.
         axes: Axes to freeze, from 1.
         encoders: Conversion to joints.
-        begun: Time of the request to stop [s].
+        start: Time of the request to stop [s].
         cause: Sentence on the fault that the stop follows; empty for a request of a person.
         travel: Travel of the tool between two postures; None if it is not measured.
     """
-    origin = arm.position_at(begun)
+    origin = arm.position_at(start)
     refusal = ""
     try:
         yield from _flush()
@@ -292,7 +292,7 @@ def halt(
                 yield from _freeze(arm, (axis,))
             except ArmRefusalError as error:
                 refusal = refusal or str(error)
-    resting = yield from _rest(arm, begun)
+    resting = yield from _rest(arm, start)
     arm.held = arm.positions
     yield ReadStates()
     moved = np.abs((arm.positions - origin) * encoders.scale)[: AXES - 1]
@@ -300,7 +300,7 @@ def halt(
     if resting is not None:
         ends = encoders.joints(origin), encoders.joints(arm.positions)
         distance = None if travel is None else travel(*ends)
-        stop = MeasuredStop(resting - begun, float(moved.max()), distance)
+        stop = MeasuredStop(resting - start, float(moved.max()), distance)
     collided = tuple(axis for axis in arm.collided if axis < AXES)
     if collided:
         return ProcedureEnd(ArmMode.COLLIDED, collision_sentence(collided), stop)
@@ -311,14 +311,14 @@ def halt(
     return ProcedureEnd(ArmMode.HOLDING, "", stop)
 
 
-def _rest(arm: ArmReadings, begun: float) -> Generator[ArmRequest | float, None, float | None]:
+def _rest(arm: ArmReadings, start: float) -> Generator[ArmRequest | float, None, float | None]:
     """Return the time at which the arm was first seen at rest [s]; None if it continues to move."""
-    while arm.t - begun < REST_TIMEOUT:
-        seen, before = arm.t, arm.positions
+    while arm.t - start < REST_TIMEOUT:
+        t, before = arm.t, arm.positions
         yield REST_PAUSE
         yield ReadPositions()
         if np.abs(arm.positions - before).max() <= STILL:
-            return seen
+            return t
     return None
 
 

@@ -102,8 +102,8 @@ def joined(start: SplineKnot, position: FloatArray, speed: FloatArray) -> Spline
     v1 = np.clip(wanted, start.speed - change, start.speed + change)
     # So slow that the axis can stop within the segment after this one, before its numbers end.
     half = SEGMENT_TICKS // 2
-    ahead = SPEED_UNIT * start.position + half * start.speed
-    least, most = ((SPEED_UNIT * end - ahead) // SEGMENT_TICKS for end in (-LARGEST, LARGEST))
+    forward = SPEED_UNIT * start.position + half * start.speed
+    least, most = ((SPEED_UNIT * end - forward) // SEGMENT_TICKS for end in (-LARGEST, LARGEST))
     v1 = np.clip(v1, least, most)
     mean = (start.speed + v1) * SEGMENT_TICKS // (2 * SPEED_UNIT)
     m = np.rint(position).astype(np.int64) - start.position

@@ -213,8 +213,8 @@ class EmulatedArm:
             calibration_scale: simulated seconds in a second during a calibration.
             object_width: width of an object between the fingers [mm]; None without one.
         """
-        at = [motor.sign * CALIBRATED_AT for motor in MOTORS]
-        places = at if calibrated else POWER_UP_POSTURE
+        posture = [motor.sign * CALIBRATED_AT for motor in MOTORS]
+        places = posture if calibrated else POWER_UP_POSTURE
         self.axes = tuple(
             EmulatedAxis(facts, profile, place) for facts, place in zip(MOTORS, places, strict=True)
         )
@@ -274,16 +274,16 @@ class EmulatedArm:
     def calibrate(self, axis: int) -> None:
         """Begin to calibrate ``axis``, from 1, or all with 0."""
         order = (axis,) if axis else CALIBRATION_ORDER
-        self._calibration = CalibrationRun([self.axes[each - 1] for each in order])
+        self._calibration = CalibrationRun([self.axes[number - 1] for number in order])
         self.collided = 0
         self.touch()
 
     def freeze(self, axis: int) -> None:
         """Brake and hold ``axis``, from 1, or all with 0. It ends a calibration."""
         self.end_calibration()
-        for each in self.chosen(axis):
-            each.freeze()
-        if all(each.status != AxisStatus.COLLIDED for each in self.axes[:GRIPPER]):
+        for joint in self.chosen(axis):
+            joint.freeze()
+        if all(joint.status != AxisStatus.COLLIDED for joint in self.axes[:GRIPPER]):
             self.collided = 0
         self.touch()
 
@@ -291,9 +291,9 @@ class EmulatedArm:
         """Stop a calibration and hold all axes."""
         if self._calibration is not None:
             self._calibration = None
-            for each in self.axes:
-                if each.mode is AxisMode.CALIBRATE:
-                    each.freeze()
+            for axis in self.axes:
+                if axis.mode is AxisMode.CALIBRATE:
+                    axis.freeze()
 
     def chosen(self, axis: int) -> tuple[EmulatedAxis, ...]:
         """Return the axis with the number ``axis``, from 1, or all for 0."""
@@ -301,8 +301,8 @@ class EmulatedArm:
 
     def block(self, axis: int) -> None:
         """Let ``axis``, from 1, stick where it is."""
-        at = self.axes[axis - 1].plant.position
-        self._set_stops(axis, at, at)
+        position = self.axes[axis - 1].plant.position
+        self._set_stops(axis, position, position)
 
     def obstruct(self, axis: int, encoder: float) -> None:
         """Put an obstacle in the way of ``axis``, from 1, at ``encoder`` [counts]."""

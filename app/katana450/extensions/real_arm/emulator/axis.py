@@ -121,10 +121,10 @@ class SplineBuffer:
 
     def flush(self) -> None:
         """Drop all polynomials but the one that is executed, which ends the motion then."""
-        kept = self._waiting[0][0] if self.is_running and self._waiting else None
+        current = self._waiting[0][0] if self.is_running and self._waiting else None
         self._waiting.clear()
-        if kept is not None:
-            self._waiting.append((kept, True))
+        if current is not None:
+            self._waiting.append((current, True))
         self._is_last = True
 
     def clear(self) -> None:

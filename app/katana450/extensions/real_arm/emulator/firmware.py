@@ -139,7 +139,7 @@ class Firmware:
         arm = self.arm
         if arm.is_calibrating:
             raise RequestError(STATE_MISMATCH, axis, "calibration is running")
-        if not all(each.is_calibrated for each in arm.chosen(axis)):
+        if not all(joint.is_calibrated for joint in arm.chosen(axis)):
             raise RequestError(STATE_MISMATCH, axis, "axis is not calibrated")
         if arm.collided:
             text = f"StopperThread: collision on axis: {arm.collided}"
@@ -185,7 +185,7 @@ class Firmware:
             raise RequestError(INVALID_ARGUMENT, 0, f"more must be 0, 1 or 2, not {request.more}")
         segments = request.segments[:GRIPPER]
         # All axes can take theirs, or none gets anything.
-        axes = [self._free_axis(number, each) for number, each in enumerate(segments, 1)]
+        axes = [self._free_axis(number, piece) for number, piece in enumerate(segments, 1)]
         for axis, segment in zip(axes, segments, strict=True):
             axis.splines.store(segment, request.more)
         if request.more != req.More.STORE:
@@ -213,6 +213,6 @@ class Firmware:
 def _command_table() -> bytes:
     """Return the table of commands. The meaning of its middle bytes is not known."""
     entries = bytearray()
-    for index, each in enumerate(req.REQUESTS[:TABLE_ENTRIES]):
-        entries += bytes((index, each.HEAD[0], 0, 0, 0, each.REPLY.HEAD[0]))
+    for index, request in enumerate(req.REQUESTS[:TABLE_ENTRIES]):
+        entries += bytes((index, request.HEAD[0], 0, 0, 0, request.REPLY.HEAD[0]))
     return bytes(entries).ljust(6 * TABLE_ENTRIES, b"\0")

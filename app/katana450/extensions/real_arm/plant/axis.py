@@ -86,15 +86,15 @@ KATANA450 = PlantProfile(
 """The Katana450. Only the cycle of its bus and its precision are known; the rest is assumed until
 an arm is measured."""
 
-PROFILES: Mapping[str, PlantProfile] = {each.name: each for each in (STIFF, KATANA450)}
+PROFILES: Mapping[str, PlantProfile] = {known.name: known for known in (STIFF, KATANA450)}
 
 
 def profile_named(name: str) -> PlantProfile:
     """Return the profile ``name``. Raises InputError with the names of all profiles."""
-    found = PROFILES.get(name)
-    if found is None:
+    profile = PROFILES.get(name)
+    if profile is None:
         raise InputError(f"There is no plant {name!r}; choose one of: {', '.join(PROFILES)}.")
-    return found
+    return profile
 
 
 STEP = 0.0025

@@ -129,8 +129,8 @@ class PlantDriver:
         """
         if self._t is None:
             raise InputError("The simulated arm is not started: call `start` first.")
-        asked = [*q.tolist(), gripper]
-        if not all(map(math.isfinite, asked)):
+        target = [*q.tolist(), gripper]
+        if not all(map(math.isfinite, target)):
             raise InputError(f"The setpoint must be finite, not {q}, {gripper}.")
         steps = min(int(max(t - self._t, 0.0) / STEP + ROUNDING), MAX_STEPS)
         # What is left of the time is simulated in the next tick.
@@ -139,9 +139,9 @@ class PlantDriver:
             self._turn(stopped, t)
         if stopped:
             self._brake(steps, t)
-        elif steps and (asked != self._asked or not self._rests):
-            self._follow(np.array(asked), steps)
-            self._asked = asked
+        elif steps and (target != self._asked or not self._rests):
+            self._follow(np.array(target), steps)
+            self._asked = target
         return self._answer(t)
 
     def perform(self, act: ArmAct, t: float) -> None:
@@ -161,29 +161,29 @@ class PlantDriver:
     def _turn(self, stopped: bool, t: float) -> None:
         """Begin to brake, or to follow setpoints from where the arm stands."""
         self._brakes, self._rests = stopped, False
-        at = np.array([axis.position for axis in self._axes])
+        posture = np.array([axis.position for axis in self._axes])
         if stopped:
             self._measured_stop = None
-            self._stopping = (t, at) if self._moves else None
+            self._stopping = (t, posture) if self._moves else None
             return
-        self._setpoint = at
-        self._waiting = deque([tuple(at.tolist())] * len(self._waiting))
+        self._setpoint = posture
+        self._waiting = deque([tuple(posture.tolist())] * len(self._waiting))
 
     def _follow(self, setpoint: FloatArray, steps: int) -> None:
         wanted = np.clip(setpoint, self._lower, self._upper)
         reach = self._speed * (steps * STEP)
         change = np.clip(wanted - self._setpoint, -reach, reach)
         waiting, begin = self._waiting, self._setpoint.tolist()
-        each = (change / steps).tolist()
+        step = (change / steps).tolist()
         changed = False
         for number in range(1, steps + 1):
-            ahead = [a + number * b for a, b in zip(begin, each, strict=True)]
-            waiting.append(tuple(ahead))
+            goal = [a + number * b for a, b in zip(begin, step, strict=True)]
+            waiting.append(tuple(goal))
             before, target = waiting.popleft(), waiting[0]
             for axis, old, new, load in zip(self._axes, before, target, self._weights, strict=True):
                 changed |= axis.follow(new, (new - old) / STEP, load)
         self._setpoint = self._setpoint + change
-        self._rests = not changed and all(each == before for each in waiting)
+        self._rests = not changed and all(row == before for row in waiting)
         self._take_over(np.array(waiting[0]))
 
     def _brake(self, steps: int, t: float) -> None:
@@ -194,15 +194,15 @@ class PlantDriver:
             for axis, load in zip(self._axes, self._weights, strict=True):
                 changed |= axis.brake(load)
         self._rests = not changed
-        at = np.array([axis.position for axis in self._axes])
+        posture = np.array([axis.position for axis in self._axes])
         if self._stopping is not None and not self._moves:
             began, places = self._stopping
-            angle = float(np.abs(at - places)[:-1].max())
-            distance = None if self._travel is None else self._travel(places, at)
+            angle = float(np.abs(posture - places)[:-1].max())
+            distance = None if self._travel is None else self._travel(places, posture)
             self._measured_stop = MeasuredStop(t - began, angle, distance)
             self._stopping = None
         # A braking arm is where it should be.
-        self._take_over(at)
+        self._take_over(posture)
 
     def _take_over(self, expected: FloatArray) -> None:
         """Keep the results of the steps; unchanged values keep their arrays."""
