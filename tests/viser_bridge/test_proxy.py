@@ -1,4 +1,4 @@
-"""The log about a page that cannot be connected with viser."""
+"""The line between page and viser: frames for a page that is behind, and the log without viser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 from uvicorn.protocols.utils import ClientDisconnected
 from websockets.asyncio.server import ServerConnection, serve
 
-from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy
+from katana450.server.viser_bridge.flow import MAX_IN_FLIGHT_BYTES
+from katana450.server.viser_bridge.proxy import SUBPROTOCOL, Proxy, _Line
 
 
 async def keep_open(connection: ServerConnection) -> None:
@@ -35,3 +36,23 @@ def test_page_that_leaves_at_once_is_not_taken_for_a_fault_of_viser(
 
     asyncio.run(visit())
     assert caplog.text.count("viser does not answer") == warnings
+
+
+def test_no_frame_is_taken_from_viser_while_the_page_is_behind() -> None:
+    """Viser replaces what waits meanwhile, so a thin line shows few frames instead of old ones."""
+    hub, browser = MagicMock(clock=lambda: 0.0), MagicMock(send_bytes=AsyncMock())
+    hub.pictures.watching, hub.lease.holder = 1, None
+
+    async def act() -> None:
+        line = _Line(hub, MagicMock(), browser, "")
+        line.slot = MagicMock(take=AsyncMock(return_value=bytes(MAX_IN_FLIGHT_BYTES)))
+        line._flow.sent(100, 0.0)
+        line._flow.seen(1, 0.0)
+        sending = asyncio.create_task(line._down())
+        for seen in (1, 2):
+            await asyncio.sleep(0.05)
+            assert line.slot.take.await_count == browser.send_bytes.await_count == seen
+            line._note(MagicMock(seen=seen + 1, made=None))
+        sending.cancel()
+
+    asyncio.run(act())
