@@ -319,15 +319,12 @@ class EpisodeFolder:
             with_episode(before.path, episode, kind)
         return episode
 
-    def discard(self, number: int) -> None:
-        """Move the file of a kept episode to the discarded ones. Raises InputError."""
-        self._move(number, discard=True)
+    def move(self, number: int, *, discard: bool) -> Episode:
+        """Move the file of an episode to the discarded ones, or back; return the episode.
 
-    def restore(self, number: int) -> None:
-        """Move the file of a discarded episode back. Raises InputError."""
-        self._move(number, discard=False)
-
-    def _move(self, number: int, *, discard: bool) -> None:
+        Raises InputError.
+        """
+        episode = self.find(number).episode
         source, target = (self.path(number, discarded=side) for side in (not discard, discard))
         if not source.exists():
             state = "kept" if discard else "discarded"
@@ -339,6 +336,7 @@ class EpisodeFolder:
             source.rename(target)
         except OSError as error:
             raise InputError(f"{source} cannot be moved: {error.strerror or error}.") from error
+        return episode
 
     # The marker of an episode that runs
 

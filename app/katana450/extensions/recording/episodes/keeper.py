@@ -96,7 +96,8 @@ class EpisodeKeeper:
         self._undoable: UndoableJudgement | None = None
         self._notice = ""
         self._revision = 0
-        self._running = RunningEpisode(folder, ring, ring_folder, run, self._note_change)
+        callbacks = self._note_change, self._move
+        self._running = RunningEpisode(folder, ring, ring_folder, run, *callbacks)
         interrupted, last = folder.markers(), folder.last()
         newest = interrupted[-1] if interrupted else last
         self._task = "" if newest is None else newest.episode.task
@@ -208,8 +209,7 @@ class EpisodeKeeper:
                 episode = self._discard(number, t)
             case RestoreEpisode(number=number):
                 self._undoable = None
-                self._folder.restore(number)
-                episode = self._described(self._folder.find(number).episode, "restored")
+                episode = self._move(number, discard=False)
             case UndoEpisode(number=number):
                 episode = self._undone(number)
             case RerecordEpisode(number=number):
@@ -237,9 +237,9 @@ class EpisodeKeeper:
         return episode
 
     def _start(self, task: str, by: EpisodeGiver, t: float) -> Episode:
-        before, replaces = self._running.episode, self._running.replaces
+        before = self._running.episode
         if before is not None and before.end is not None:
-            self._replacing(self._running.save(), replaces)
+            self._running.save()
         number = self._folder.next_number()
         episode = Episode(number, task.strip(), t, None, EpisodeOutcome.RUNNING, "", by)
         self._running.start(episode)
@@ -247,11 +247,10 @@ class EpisodeKeeper:
         return episode
 
     def _stop(self, outcome: EpisodeOutcome, t: float, number: int | None = None) -> Episode:
-        replaces = self._running.replaces
         self._check_running(number)
         if self._undoable is not None and self._undoable.replaced is not None:
             self._undoable = None
-        return self._replacing(self._running.stop(outcome, t), replaces)
+        return self._running.stop(outcome, t)
 
     def _check_running(self, number: int | None) -> None:
         """Raise InputError if another episode than that of ``number`` runs."""
@@ -261,19 +260,9 @@ class EpisodeKeeper:
                 f"Episode {running.number} runs now, not episode {number}, which has ended."
             )
 
-    def _replacing(self, episode: Episode, replaced: tuple[int, ...]) -> Episode:
-        """Return ``episode``, which is saved, after the ones that it replaces are discarded."""
-        if episode.outcome is not EpisodeOutcome.UNFINISHED:
-            for number in replaced:
-                # Somebody may have discarded it meanwhile.
-                with suppress(InputError):
-                    self._move_to_discarded(number)
-        return episode
-
-    def _move_to_discarded(self, number: int) -> Episode:
-        episode = self._folder.find(number).episode
-        self._folder.discard(number)
-        return self._described(episode, "discarded")
+    def _move(self, number: int, *, discard: bool = True) -> Episode:
+        kind = "discarded" if discard else "restored"
+        return self._described(self._folder.move(number, discard=discard), kind)
 
     def _last(self, number: int | None) -> Episode:
         """Return the episode of ``number``; for None the last one."""
@@ -302,7 +291,7 @@ class EpisodeKeeper:
             # What it was to replace stays.
             self._running.set_replaces(())
             number = self._stop(EpisodeOutcome.UNJUDGED, t).number
-        episode = self._move_to_discarded(self._last(number).number)
+        episode = self._move(self._last(number).number)
         self._make_undoable(episode.number, None)
         return episode
 
@@ -349,8 +338,7 @@ class EpisodeKeeper:
         if undo.replaced is not None:
             return self._running.set_replaces(undo.replaced)
         if undo.before is None:
-            self._folder.restore(undo.number)
-            return self._described(self._folder.find(undo.number).episode, "restored")
+            return self._move(undo.number, discard=False)
         return self._change(undo.number, "judged", outcome=undo.before)
 
     def _trim(self, number: int, start: float, end: float) -> Episode:
@@ -372,12 +360,12 @@ class EpisodeKeeper:
         if not self.active or self._running.saving is not None:
             return
         with self._requests:
-            episode, replaces = self._running.episode, self._running.replaces
+            episode = self._running.episode
             if episode is None:
                 return
             if self._running.retry_due:
                 with suppress(InputError):
-                    self._replacing(self._running.save(), replaces)
+                    self._running.save()
                     self._note_change(f"Episode {episode.number} is saved now.")
             elif episode.end is None and self._clock() - episode.start >= MAX_SECONDS:
                 notice = f"Episode {episode.number} ended after {MAX_SECONDS / 60:g} minutes."

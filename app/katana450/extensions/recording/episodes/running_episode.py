@@ -170,14 +170,16 @@ class RunningEpisode:
         ring_folder: Path,
         run: str,
         changed: Callable[[], None],
+        discard: Callable[[int], object],
     ) -> None:
-        """Begin without an episode. ``changed`` is called before one is saved.
+        """Begin without an episode.
 
-        The others are those of ``EpisodeKeeper``.
+        ``changed`` is called before one is saved, and ``discard`` afterwards with the number of
+        each one that it replaces. The others are those of ``EpisodeKeeper``.
         """
         # It may be finished by a program with another working directory.
         self._folder, self._ring, self._ring_folder = folder, ring, ring_folder.absolute()
-        self._run, self._changed = run, changed
+        self._run, self._changed, self._discard = run, changed, discard
         self._marker: EpisodeMarker | None = None
         self._size_before = 0
         self._retry_at: float | None = None
@@ -314,6 +316,11 @@ class RunningEpisode:
             log.error("%s", self._problem)
             raise InputError(f"{self._problem} It is tried again every few seconds.") from error
         self._forget(number)
+        if episode.outcome is not EpisodeOutcome.UNFINISHED:
+            for replaced in marker.replaces:
+                # Somebody may have discarded it meanwhile.
+                with suppress(InputError):
+                    self._discard(replaced)
         return episode
 
     @property
