@@ -19,6 +19,7 @@ from katana450.arm.runtime import planning_worker
 from katana450.arm.runtime.loop_timing import LoopTiming
 from katana450.arm.runtime.planning_worker import PlanningWorker
 from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.errors import InputError
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.planning.plan import Plan
 from tests.waiting import until
@@ -62,6 +63,16 @@ def test_bent_elbow_follows_a_plan(session: Session) -> None:
     (follow,) = commands
     assert isinstance(follow, cmd.Follow)
     assert follow.plan.duration > 0.1
+
+
+def test_unknown_branch_is_refused_before_a_path_is_planned(session: Session) -> None:
+    state = session.begin(session.ready, 0.0, 0.0)
+    sink = Sink()
+    worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
+    with pytest.raises(InputError, match="front-up, front-down"):
+        worker.deliver(cmd.Branch(name="sideways"), None)
+    assert not worker.busy
+    assert sink.commands == []
 
 
 def test_path_that_is_found_after_a_stop_is_not_followed(

@@ -19,6 +19,7 @@ from katana450.arm.control.tool_targets import branch_named, with_branch
 from katana450.arm.runtime.mailbox import CommandSink
 from katana450.arm.runtime.state_publisher import StatePublisher
 from katana450.errors import KatanaError
+from katana450.maths.planning.plan import Plan
 
 log = logging.getLogger(__name__)
 
@@ -27,10 +28,10 @@ REST_TIMEOUT = 5.0
 
 
 class PlanningWorker:
-    """Command sink that plans branch changes and passes all other commands on at once.
+    """Command sink that plans the ``planned`` commands and passes all others on at once.
 
-    A branch change follows a planned path that is clear from end to end. Every other command that
-    is not passive ends the planning.
+    A planned command, such as a branch change, follows a path that is clear from end to end. Every
+    other command that is not passive ends the planning.
     """
 
     def __init__(self, session: Session, state_publisher: StatePublisher, arm: CommandSink) -> None:
@@ -72,7 +73,8 @@ class PlanningWorker:
         left = actor is not None and actor.grounds is Grounds.SERVER and command == cmd.Hold()
         if any(part.supersedes for part in traits) and not left:
             self.redirected()
-        if isinstance(command, cmd.Branch):
+        if command.traits.planned:
+            self._session.check(command)
             self._plan(command, actor)
             return self.last_ticket
         return self._arm.deliver(command, actor)
@@ -84,7 +86,7 @@ class PlanningWorker:
                 self._work.set()
                 self._work = None
 
-    def _plan(self, command: cmd.Branch, actor: Actor | None) -> None:
+    def _plan(self, command: cmd.Command, actor: Actor | None) -> None:
         cancelled = threading.Event()
         with self._lock:
             self._work = cancelled
@@ -92,18 +94,15 @@ class PlanningWorker:
             target=self._find, args=(command, actor, cancelled), name="planning", daemon=True
         ).start()
 
-    def _find(self, command: cmd.Branch, actor: Actor | None, cancelled: threading.Event) -> None:
+    def _find(self, command: cmd.Command, actor: Actor | None, cancelled: threading.Event) -> None:
         waited = self._state_publisher.snapshot.state.waits
         try:
             state = self._at_rest(actor, cancelled)
-            arm = self._session.require_arm()
-            goal = with_branch(arm, state, branch_named(arm, command.full_name)).goal
-            # At a stretched elbow two branches are one posture, but for rounding.
-            if (np.abs(goal - state.setpoint) > START_TOLERANCE).any():
-                plan = plan_to(arm, self._session.world_at(state), state, goal)
-                # An arm that the server has paused meanwhile moves only by a newer command.
-                if waited or not self._state_publisher.snapshot.state.waits:
-                    self._unless(cancelled, cmd.Follow(plan), actor)
+            plan = self._plan_of(command, state)
+            # An arm that the server has paused meanwhile moves only by a newer command.
+            may_move = waited or not self._state_publisher.snapshot.state.waits
+            if plan is not None and may_move:
+                self._unless(cancelled, cmd.Follow(plan), actor)
         except KatanaError as error:
             self._fail(str(error))
         except Exception:
@@ -113,6 +112,21 @@ class PlanningWorker:
             with self._lock:
                 if self._work is cancelled:
                     self._work = None
+
+    def _plan_of(self, command: cmd.Command, state: State) -> Plan | None:
+        """Return the plan of ``command`` from the rest of ``state``; None if nothing has to move.
+
+        Raises InputError if the arm cannot do it, and BlockedError without a clear path.
+        """
+        arm, world = self._session.require_arm(), self._session.world_at(state)
+        match command:
+            case cmd.Branch(full_name=name):
+                goal = with_branch(arm, state, branch_named(arm, name)).goal
+                # At a stretched elbow two branches are one posture, but for rounding.
+                if (np.abs(goal - state.setpoint) <= START_TOLERANCE).all():
+                    return None
+                return plan_to(arm, world, state, goal)
+        raise AssertionError(f"{type(command).__name__} is `planned`, and has no case here.")
 
     def _fail(self, why: str) -> None:
         self.failure = why
