@@ -106,12 +106,12 @@ class PlaybackWindows:
     def moving(self) -> list[str]:
         """The nodes of the present arm's links that move, which are drawn at another place."""
         paths: dict[str | None, str] = {None: "/arm"}
-        windows = []
+        nodes = []
         for link in self._robot.links:
             paths[link.name] = f"{paths[link.parent]}/{node_name(link.name)}"
             if link.name in self._robot.moving and link.parent not in self._robot.moving:
-                windows.append(paths[link.name])
-        return windows
+                nodes.append(paths[link.name])
+        return nodes
 
     def show(self, key: str, moments: tuple[RecordedMoment | None, ...]) -> None:
         """Show ``moments`` in the window of the participant ``key``, one for each run.
