@@ -110,7 +110,9 @@ export class Bar {
 
   /** @param {Page.Status} status */
   #drawOrders(status) {
-    const key = [status.planning, ...status.orders, ...status.continues].join();
+    // A button that is replaced while somebody presses it loses the press, so progress alone replaces none.
+    const place = status.orders.includes("continue") ? status.continues : [];
+    const key = [status.planning, ...status.orders, ...place].join();
     if (key === this.#orders) return;
     this.#orders = key;
     const [name, step, steps] = status.continues;

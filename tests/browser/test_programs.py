@@ -120,7 +120,11 @@ def test_steps_of_a_program_are_controlled_in_the_list(
         truth.wait(moving=False)
         clear_stop(page, truth)
         page.page.get_by_role("button", name="Continue ").click()
+        end = page.page.get_by_role("button", name="End", exact=True).element_handle()
         wait_progress(reader, lambda each: each.status == "paused" and each.step == 3)
+        # A button that is replaced with every step would lose a press.
+        page.wait_until(lambda: "step 3" in page.page.inner_text("#why"), "the step in the bar")
+        assert end.evaluate("each => each.isConnected")
         pause.click()
         wait_progress(reader, lambda each: each.breakpoints == ())
         resume(page)
