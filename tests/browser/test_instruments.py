@@ -43,10 +43,10 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     turn(page, "axis-1", 50.0)
     assert goal(page, "axis-1") == pytest.approx(start + 50.0, abs=2.0)
     early = table(page, "joint-angles")
-    truth.wait(10.0, mood="ok")
+    there = goal(page, "axis-1")
+    end = math.radians(there)
+    page.wait_until(lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn")
     page.page.wait_for_timeout(200)
-    there = math.degrees(truth.status()["q"][0])
-    assert there == pytest.approx(goal(page, "axis-1"), abs=0.01)
 
     grown = table(page, "joint-angles")
     t, angle = grown["t [s]"], grown["Axis 1 [deg]"]
@@ -78,8 +78,9 @@ def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -
     page.wait_until(
         lambda: goal(page, "axis-5") == pytest.approx(start + 10.0, abs=1e-6), "the wheel"
     )
-    truth.wait(10.0, mood="ok")
-    assert math.degrees(truth.status()["q"][4]) == pytest.approx(start + 10.0, abs=1e-3)
+    # The last command may still be on its way when the arm rests at the one before.
+    end = math.radians(start + 10.0)
+    page.wait_until(lambda: abs(truth.status()["q"][4] - end) < 1e-5, "the end of the wheel")
     dial(page, "gripper").focus()
     before = truth.status()["gripper_goal"]
     keyboard.press("PageDown")
