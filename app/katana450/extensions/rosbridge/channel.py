@@ -17,9 +17,9 @@ from katana450.extensions.rosbridge import names, ops
 from katana450.extensions.rosbridge.follow_goal import FollowGoal
 from katana450.extensions.rosbridge.goals import ERROR_TEXT, Goal, GoalHost, GripperGoal
 from katana450.extensions.rosbridge.messages import (
+    Fields,
     JointJog,
     NoArguments,
-    TriggerResponse,
     TwistStamped,
 )
 from katana450.extensions.rosbridge.publications import Publications, Subscriptions
@@ -228,7 +228,7 @@ class RosChannel(Channel):
         for goal in running:
             goal.cancel("The client called /hold.")
         if running:
-            self._respond(op, TriggerResponse(success=True, message="The goal is cancelled."))
+            self._respond(op, {"success": True, "message": "The goal is cancelled."})
         else:
             self._trigger(op, requests.Hold())
 
@@ -244,7 +244,7 @@ class RosChannel(Channel):
         try:
             answer = self._handle(request)
         except KatanaError as error:
-            self._respond(op, TriggerResponse(success=False, message=str(error)))
+            self._respond(op, {"success": False, "message": str(error)})
             return
         if isinstance(answer, PendingAnswer):
             self._later(self._conclude_trigger(op, answer))
@@ -353,9 +353,9 @@ class RosChannel(Channel):
         return self._dispatcher.handle(self.participant, request, self.budget)
 
 
-def _triggered(done: answers.Answer) -> TriggerResponse:
+def _triggered(done: answers.Answer) -> Fields:
     """Return the answer to a request as the response of a std_srvs/Trigger."""
     if isinstance(done, answers.Refused):
-        return TriggerResponse(success=False, message=done.why)
+        return {"success": False, "message": done.why}
     outcome = done.outcome if isinstance(done, answers.Done) else None
-    return TriggerResponse(success=True, message=outcome or "accepted")
+    return {"success": True, "message": outcome or "accepted"}

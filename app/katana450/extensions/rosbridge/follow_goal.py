@@ -25,12 +25,10 @@ from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.planning.trajectory_path import MIN_INTERVAL
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GoalStatus, Result
 from katana450.extensions.rosbridge.messages import (
+    Fields,
     FollowJointTrajectory,
-    FollowJointTrajectoryFeedback,
-    FollowJointTrajectoryResult,
     Header,
     JointTrajectoryPoint,
-    RosMessage,
     time_of,
 )
 from katana450.extensions.rosbridge.ops import SendActionGoal, read
@@ -343,7 +341,7 @@ class FollowGoal(Goal):
             return self._canceled(str(error))
         return _result(GoalStatus.ABORTED, ErrorCode.INVALID_GOAL, str(error))
 
-    def feedback(self) -> RosMessage:
+    def feedback(self) -> Fields:
         """Return the actual and the desired posture."""
         state = self.host.arm.state
         t = self.host.hub.clock()
@@ -355,13 +353,13 @@ class FollowGoal(Goal):
             )
 
         rates, none = state.motion.qd, np.zeros(len(state.q))
-        return FollowJointTrajectoryFeedback(
-            header=Header(stamp=time_of(time.time())),
-            joint_names=list(self.host.arm.arm.chain.names),
-            desired=point(state.setpoint, rates),
-            actual=point(state.q, rates),
-            error=point(state.setpoint - state.q, none),
-        )
+        return {
+            "header": Header(stamp=time_of(time.time())),
+            "joint_names": list(self.host.arm.arm.chain.names),
+            "desired": point(state.setpoint, rates),
+            "actual": point(state.q, rates),
+            "error": point(state.setpoint - state.q, none),
+        }
 
     @property
     def _actor(self) -> Actor:
@@ -384,4 +382,4 @@ class FollowGoal(Goal):
 
 
 def _result(status: GoalStatus, code: ErrorCode, why: str) -> Result:
-    return Result(status, FollowJointTrajectoryResult(error_code=int(code), error_string=why))
+    return Result(status, {"error_code": int(code), "error_string": why})

@@ -22,8 +22,7 @@ from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.messages import sentence
 from katana450.arm.control.stop_cause import pressed
 from katana450.extensions.rosbridge import names
-from katana450.extensions.rosbridge.messages import TFMessage
-from katana450.extensions.rosbridge.publications import SILENT_AFTER, Publications
+from katana450.extensions.rosbridge.publications import SILENT_AFTER, Publications, link_poses
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.hub import Hub
 
@@ -96,12 +95,7 @@ class FoxgloveServer:
     def _publish(self, arm: ArmHandle) -> None:
         state = arm.state
         if self._frames.has_sinks():
-            frames = [
-                self._publications.message(message) for message in (names.TF_STATIC, names.TF)
-            ]
-            self._frames.log(
-                _frame_transforms([message for message in frames if message is not None])
-            )
+            self._frames.log(_frame_transforms(arm, _stamp(self._publications.stamp(arm))))
         if self._joints.has_sinks():
             stamp = _stamp(self._publications.stamp(arm))
             values = arm.robot.joint_values(state.q, state.gripper)
@@ -132,30 +126,17 @@ def _stamp(seconds: float) -> Any:
     return messages.Timestamp.from_epoch_secs(seconds)
 
 
-def _frame_transforms(frames: list[Any]) -> Any:
-    """Return the poses of ROS messages as a message of Foxglove."""
+def _frame_transforms(arm: ArmHandle, stamp: Any) -> Any:
+    """Return the poses of all links in their parents at the time ``stamp``."""
     return messages.FrameTransforms(
         transforms=[
             messages.FrameTransform(
-                timestamp=_stamp(
-                    transform.header.stamp.sec + 1e-9 * transform.header.stamp.nanosec
-                ),
-                parent_frame_id=transform.header.frame_id,
-                child_frame_id=transform.child_frame_id,
-                translation=messages.Vector3(
-                    x=transform.transform.translation.x,
-                    y=transform.transform.translation.y,
-                    z=transform.transform.translation.z,
-                ),
-                rotation=messages.Quaternion(
-                    x=transform.transform.rotation.x,
-                    y=transform.transform.rotation.y,
-                    z=transform.transform.rotation.z,
-                    w=transform.transform.rotation.w,
-                ),
+                timestamp=stamp,
+                parent_frame_id=pose.parent,
+                child_frame_id=pose.child,
+                translation=messages.Vector3(**pose.translation),
+                rotation=messages.Quaternion(**pose.rotation),
             )
-            for message in frames
-            if isinstance(message, TFMessage)
-            for transform in message.transforms
+            for pose in (*link_poses(arm, moving=False), *link_poses(arm, moving=True))
         ]
     )

@@ -12,7 +12,7 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from katana450.errors import InputError, KatanaError
-from katana450.extensions.rosbridge.messages import GripperCommand, GripperCommandResult, RosMessage
+from katana450.extensions.rosbridge.messages import Fields, GripperCommand
 from katana450.extensions.rosbridge.ops import OpId, SendActionGoal, read
 from katana450.server.api import answers, requests
 from katana450.server.service.arm_handle import ArmHandle
@@ -40,7 +40,7 @@ class Result(NamedTuple):
     """The end of a goal. ``values``: the result of the action, or the reason of a refusal."""
 
     status: GoalStatus
-    values: RosMessage | str
+    values: Fields | str
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Goal(ABC):
         """Return the result of a goal that was refused or has failed."""
 
     @abstractmethod
-    def feedback(self) -> RosMessage:
+    def feedback(self) -> Fields:
         """Return the present feedback."""
 
     async def run(self) -> None:
@@ -183,7 +183,8 @@ class GripperGoal(Goal):
         if self.cancelled or end.how not in (*ARRIVED, CONTACT):
             return Result(GoalStatus.CANCELED, self.feedback())
         reached = abs(arm.state.gripper - command.position) <= REACHED
-        return Result(GoalStatus.SUCCEEDED, self._now(reached=reached, stalled=not reached))
+        ends = {"stalled": not reached, "reached_goal": reached}
+        return Result(GoalStatus.SUCCEEDED, self.feedback() | ends)
 
     def end(self, why: str) -> None:  # noqa: ARG002 - the result has no place for words
         """Stop the fingers where they are."""
@@ -195,12 +196,7 @@ class GripperGoal(Goal):
         """Return the reason: the result of this action has no place for it."""
         return Result(GoalStatus.ABORTED, str(error))
 
-    def feedback(self) -> RosMessage:
-        """Return where the fingers are."""
-        return self._now()
-
-    def _now(self, *, reached: bool = False, stalled: bool = False) -> GripperCommandResult:
+    def feedback(self) -> Fields:
+        """Return where the fingers are; they have not come to rest yet."""
         position = self.host.arm.state.gripper
-        return GripperCommandResult(
-            position=position, effort=0.0, stalled=stalled, reached_goal=reached
-        )
+        return {"position": position, "effort": 0.0, "stalled": False, "reached_goal": False}

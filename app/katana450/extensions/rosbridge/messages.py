@@ -1,11 +1,14 @@
-"""Messages of ROS 2 as they are in JSON. Fields that a client leaves out are zero, as in ROS.
+"""Messages of ROS 2 as they are in JSON.
+
+Those that clients send are read by the classes below. Fields that a client leaves out are zero, as
+in ROS. Those that the server sends are mappings of their fields.
 
 Source: the .msg and .action files of common_interfaces and control_msgs.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
@@ -18,8 +21,12 @@ Names = Annotated[list[Annotated[str, Meta(max_length=200)]], Meta(max_length=64
 Numbers = Annotated[list[float], Meta(max_length=64)]
 
 
+Fields = dict[str, Any]
+"""A message that the server sends."""
+
+
 class RosMessage(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Base of the messages of this module."""
+    """Base of the messages that clients send."""
 
 
 class Time(RosMessage, frozen=True, kw_only=True):
@@ -47,76 +54,6 @@ class Vector3(RosMessage, frozen=True, kw_only=True):
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
-
-
-class Quaternion(RosMessage, frozen=True, kw_only=True):
-    """geometry_msgs/Quaternion."""
-
-    x: float = 0.0
-    y: float = 0.0
-    z: float = 0.0
-    w: float = 1.0
-
-
-class RosTransform(RosMessage, frozen=True, kw_only=True):
-    """geometry_msgs/Transform."""
-
-    translation: Vector3
-    rotation: Quaternion
-
-
-class TransformStamped(RosMessage, frozen=True, kw_only=True):
-    """geometry_msgs/TransformStamped."""
-
-    header: Header
-    child_frame_id: str
-    transform: RosTransform
-
-
-class TFMessage(RosMessage, frozen=True, kw_only=True):
-    """tf2_msgs/TFMessage."""
-
-    transforms: list[TransformStamped]
-
-
-class JointState(RosMessage, frozen=True, kw_only=True):
-    """sensor_msgs/JointState."""
-
-    header: Header
-    name: list[str]
-    position: list[float]
-    velocity: list[float]
-    effort: list[float]
-
-
-class KeyValue(RosMessage, frozen=True, kw_only=True):
-    """diagnostic_msgs/KeyValue."""
-
-    key: str
-    value: str
-
-
-class DiagnosticStatus(RosMessage, frozen=True, kw_only=True):
-    """diagnostic_msgs/DiagnosticStatus. ``level``: 0 ok, 1 warning, 2 error, 3 stale."""
-
-    level: int
-    name: str
-    message: str
-    hardware_id: str
-    values: list[KeyValue]
-
-
-class DiagnosticArray(RosMessage, frozen=True, kw_only=True):
-    """diagnostic_msgs/DiagnosticArray."""
-
-    header: Header
-    status: list[DiagnosticStatus]
-
-
-class String(RosMessage, frozen=True, kw_only=True):
-    """std_msgs/String."""
-
-    data: str
 
 
 class Twist(RosMessage, frozen=True, kw_only=True):
@@ -184,23 +121,6 @@ class FollowJointTrajectory(RosMessage, frozen=True, kw_only=True):
     goal_time_tolerance: Time = Time()
 
 
-class FollowJointTrajectoryResult(RosMessage, frozen=True, kw_only=True):
-    """The result of control_msgs/FollowJointTrajectory."""
-
-    error_code: int
-    error_string: str
-
-
-class FollowJointTrajectoryFeedback(RosMessage, frozen=True, kw_only=True):
-    """The feedback of control_msgs/FollowJointTrajectory."""
-
-    header: Header
-    joint_names: list[str]
-    desired: JointTrajectoryPoint
-    actual: JointTrajectoryPoint
-    error: JointTrajectoryPoint
-
-
 class GripperPosition(RosMessage, frozen=True, kw_only=True):
     """control_msgs/GripperCommand, the message."""
 
@@ -212,22 +132,6 @@ class GripperCommand(RosMessage, frozen=True, kw_only=True):
     """The goal of the action control_msgs/GripperCommand."""
 
     command: GripperPosition = GripperPosition()
-
-
-class GripperCommandResult(RosMessage, frozen=True, kw_only=True):
-    """The result of the action control_msgs/GripperCommand, and its feedback."""
-
-    position: float
-    effort: float
-    stalled: bool
-    reached_goal: bool
-
-
-class TriggerResponse(RosMessage, frozen=True, kw_only=True):
-    """The response of std_srvs/Trigger."""
-
-    success: bool
-    message: str
 
 
 class NoArguments(RosMessage, frozen=True, kw_only=True):

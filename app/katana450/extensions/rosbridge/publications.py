@@ -4,31 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.robot.link import Link
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.rosbridge import names
-from katana450.extensions.rosbridge.messages import (
-    DiagnosticArray,
-    DiagnosticStatus,
-    Header,
-    JointState,
-    KeyValue,
-    Quaternion,
-    RosMessage,
-    RosTransform,
-    String,
-    TFMessage,
-    Time,
-    TransformStamped,
-    Vector3,
-    time_of,
-)
+from katana450.extensions.rosbridge.messages import Fields, Header, Time, time_of
 from katana450.extensions.rosbridge.ops import OpId, Subscribe
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -58,7 +42,7 @@ class Publications(NamedTuple):
     hub: Hub
     description: Callable[[], str]
 
-    def message(self, topic: str) -> RosMessage | None:
+    def message(self, topic: str) -> Fields | None:
         """Return the present message of ``topic``; None while there is none.
 
         Raises LeaseError until there is an arm.
@@ -66,12 +50,11 @@ class Publications(NamedTuple):
         arm = self.hub.present()
         match topic:
             case names.ROBOT_DESCRIPTION:
-                return String(data=self.description())
+                return {"data": self.description()}
             case names.DIAGNOSTICS:
                 return diagnostics(self.hub)
             case names.TF_STATIC:
-                fixed = [link for link in arm.robot.links if link.joint is None]
-                return transforms(fixed, {}, time_of(time.time()))
+                return transforms(arm, time_of(time.time()), moving=False)
         if arm.age > SILENT_AFTER:
             return None
         stamp = time_of(self.stamp(arm))
@@ -79,10 +62,8 @@ class Publications(NamedTuple):
             case names.JOINT_STATES:
                 return joint_state(arm, stamp)
             case names.TF:
-                moving = [link for link in arm.robot.links if link.joint is not None]
-                values = arm.robot.joint_values(arm.state.q, arm.state.gripper)
-                return transforms(moving, values, stamp)
-        return String(data=answers.encoded(serialize.state(self.hub)))
+                return transforms(arm, stamp, moving=True)
+        return {"data": answers.encoded(serialize.state(self.hub))}
 
     def stamp(self, arm: ArmHandle) -> float:
         """Return the time of the newest state [s since the epoch]; an arm at rest has it now."""
@@ -90,7 +71,7 @@ class Publications(NamedTuple):
         return now - max(self.hub.clock() - arm.state.t, 0.0) if arm.state.moving else now
 
 
-def joint_state(arm: ArmHandle, stamp: Time) -> JointState:
+def joint_state(arm: ArmHandle, stamp: Time) -> Fields:
     """Return all movable joints: positions [rad or m], and the rates of the arm's setpoints.
 
     The rate of a joint beside the arm's axes is 0. There are no efforts.
@@ -98,13 +79,13 @@ def joint_state(arm: ArmHandle, stamp: Time) -> JointState:
     now, robot = arm.state, arm.robot
     values = robot.joint_values(now.q, now.gripper)
     rates = dict(zip(axis_names(robot), now.motion.qd.tolist(), strict=True))
-    return JointState(
-        header=Header(stamp=stamp),
-        name=list(values),
-        position=list(values.values()),
-        velocity=[rates.get(name, 0.0) for name in values],
-        effort=[],
-    )
+    return {
+        "header": Header(stamp=stamp),
+        "name": list(values),
+        "position": list(values.values()),
+        "velocity": [rates.get(name, 0.0) for name in values],
+        "effort": [],
+    }
 
 
 def axis_names(robot: Robot) -> tuple[str, ...]:
@@ -112,40 +93,54 @@ def axis_names(robot: Robot) -> tuple[str, ...]:
     return robot.driven if robot.arm is None else robot.arm.chain.names
 
 
-def transforms(links: list[Link], values: Mapping[str, float], stamp: Time) -> TFMessage:
-    """Return the poses of ``links`` in their parents with the joints at ``values`` [rad or m]."""
-    stamped: list[TransformStamped] = []
-    for link in links:
-        if link.parent is None:
+class LinkPose(NamedTuple):
+    """The pose of a link in its parent.
+
+    Attributes:
+        parent, child: names of the links.
+        translation: x, y and z [m].
+        rotation: unit quaternion x, y, z and w.
+    """
+
+    parent: str
+    child: str
+    translation: dict[str, float]
+    rotation: dict[str, float]
+
+
+def link_poses(arm: ArmHandle, *, moving: bool) -> Iterator[LinkPose]:
+    """Yield the poses of the links that joints move, or else those of the fixed ones."""
+    values = arm.robot.joint_values(arm.state.q, arm.state.gripper)
+    for link in arm.robot.links:
+        if link.parent is None or (link.joint is not None) is not moving:
             continue
-        T = link.T_parent_link
-        if link.joint is not None:
-            T = T @ link.joint.motion(values[link.joint.name])
-        header = Header(stamp=stamp, frame_id=link.parent)
-        stamped.append(
-            TransformStamped(header=header, child_frame_id=link.name, transform=_transform(T))
-        )
-    return TFMessage(transforms=stamped)
+        T = link.at_rest(values)
+        translation = dict(zip("xyz", T[:3, 3].tolist(), strict=True))
+        rotation = dict(zip("wxyz", so3.to_quaternion(T[:3, :3]).tolist(), strict=True))
+        yield LinkPose(link.parent, link.name, translation, rotation)
 
 
-def _transform(T: FloatArray) -> RosTransform:
-    x, y, z = T[:3, 3].tolist()
-    qw, qx, qy, qz = so3.to_quaternion(T[:3, :3]).tolist()
-    return RosTransform(
-        translation=Vector3(x=x, y=y, z=z), rotation=Quaternion(x=qx, y=qy, z=qz, w=qw)
-    )
+def transforms(arm: ArmHandle, stamp: Time, *, moving: bool) -> Fields:
+    """Return the poses of ``link_poses`` at ``stamp``."""
+    return {
+        "transforms": [
+            {
+                "header": Header(stamp=stamp, frame_id=pose.parent),
+                "child_frame_id": pose.child,
+                "transform": {"translation": pose.translation, "rotation": pose.rotation},
+            }
+            for pose in link_poses(arm, moving=moving)
+        ]
+    }
 
 
-def diagnostics(hub: Hub) -> DiagnosticArray:
+def diagnostics(hub: Hub) -> Fields:
     """Return the condition of the arm."""
-    now = serialize.state(hub)
-    return DiagnosticArray(
-        header=Header(stamp=time_of(time.time())),
-        status=[_arm_status(now)],
-    )
+    header = Header(stamp=time_of(time.time()))
+    return {"header": header, "status": [_arm_status(serialize.state(hub))]}
 
 
-def _arm_status(now: answers.State) -> DiagnosticStatus:
+def _arm_status(now: answers.State) -> Fields:
     if now.age > SILENT_AFTER:
         level, message = STALE, f"The arm's process has not answered for {now.age:.1f} s."
     elif now.stopped is not None:
@@ -161,10 +156,13 @@ def _arm_status(now: answers.State) -> DiagnosticStatus:
         values[f"finding {number}"] = finding.text
     if now.arm is not None:
         values |= {"mode": now.arm.mode, "note": now.arm.note}
-    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
-    return DiagnosticStatus(
-        level=level, name="katana450: arm", message=message, hardware_id="katana450", values=pairs
-    )
+    return {
+        "level": level,
+        "name": "katana450: arm",
+        "message": message,
+        "hardware_id": "katana450",
+        "values": [{"key": key, "value": value} for key, value in values.items()],
+    }
 
 
 def frames(robot: Robot, values: Mapping[str, float]) -> dict[str, FloatArray]:
