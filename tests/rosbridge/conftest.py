@@ -1,13 +1,14 @@
-"""Fixture: the server of the test modules."""
+"""Fixtures: the server of the test modules, and a client of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 
 import pytest
 
 from tests.browser.server import APP, AppServer
 from tests.browser.shared_server import SharedServer
+from tests.rosbridge.ros_client import RosClient, ros
 
 
 @pytest.fixture(scope="package")
@@ -21,3 +22,16 @@ def shared_server() -> Iterator[SharedServer]:
 def server(shared_server: SharedServer) -> AppServer:
     """Return the server in the state of a new one."""
     return shared_server.as_new()
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    """Return the event loop of the tests that are coroutines."""
+    return "asyncio"
+
+
+@pytest.fixture
+async def client(server: AppServer) -> AsyncIterator[RosClient]:
+    """Return a client that watches the state."""
+    async with ros(server.url) as client:
+        yield client

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import re
 from pathlib import Path
 
@@ -15,82 +14,76 @@ from tests.gateway.client import ask
 from tests.gateway.site import open_site
 from tests.rosbridge.ros_client import FOLLOW, TWIST, ros, trajectory, twist
 
+pytestmark = pytest.mark.anyio
+
 ELSEWHERE = "http://robots.test:3000"
 
 
-def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
-    async def act() -> None:
-        with open_site(tmp_path) as site:
-            url = site.server.url
-            for query in ("", "?token=wrong"):
-                async with ros(url, query, watches=False) as client:
-                    assert "A token is required" in await client.refusal()
-                    await client.socket.wait_closed()
-                    assert client.socket.close_code == 4401
-            viewer, operator = (
-                site.link(each.value, each) for each in (Role.VIEWER, Role.OPERATOR)
-            )
-            headers = {"Authorization": f"Bearer {operator}"}
-            async with (
-                ros(url, f"?token={viewer}&name=Onlooker") as onlooker,
-                ros(url, headers=headers) as driver,
-            ):
-                await onlooker.say("publish", id="t", topic=TWIST, msg=twist(vx=0.2))
-                assert "watch" in await onlooker.refusal("t")
-                goal = trajectory((1.0, [0.1, -1.2, 1.4, 0.1, 0.0]))
-                result = await onlooker.result(await onlooker.goal(FOLLOW, goal))
-                assert (result["status"], result["values"]["error_code"]) == (6, -1)
-                assert "watch" in result["values"]["error_string"]
-                number = await driver.goal(FOLLOW, trajectory((5.0, [0.5, -1.2, 1.4, 0.1, 0.0])))
-                await driver.when(lambda state: state["moving"])
-                # Everybody may stop the arm.
-                response = await onlooker.call("/stop")
-                assert response["values"]["success"] is True
-                assert (await driver.result(number))["status"] == 5
-                state = await driver.when(lambda state: state["stop"] == "confirmed")
-                assert "Onlooker" in state["stopped"]
-            # Neither an accepted nor a refused address is printed.
-            with pytest.raises(InvalidStatus):
-                async with ros(url, f"?token={viewer}", origin=ELSEWHERE):
-                    pass
-            assert viewer not in site.server.output
-
-    asyncio.run(act())
+async def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
+    with open_site(tmp_path) as site:
+        url = site.server.url
+        for query in ("", "?token=wrong"):
+            async with ros(url, query, watches=False) as client:
+                assert "A token is required" in await client.refusal()
+                await client.socket.wait_closed()
+                assert client.socket.close_code == 4401
+        viewer, operator = (site.link(each.value, each) for each in (Role.VIEWER, Role.OPERATOR))
+        headers = {"Authorization": f"Bearer {operator}"}
+        async with (
+            ros(url, f"?token={viewer}&name=Onlooker") as onlooker,
+            ros(url, headers=headers) as driver,
+        ):
+            await onlooker.say("publish", id="t", topic=TWIST, msg=twist(vx=0.2))
+            assert "watch" in await onlooker.refusal("t")
+            goal = trajectory((1.0, [0.1, -1.2, 1.4, 0.1, 0.0]))
+            result = await onlooker.result(await onlooker.goal(FOLLOW, goal))
+            assert (result["status"], result["values"]["error_code"]) == (6, -1)
+            assert "watch" in result["values"]["error_string"]
+            number = await driver.goal(FOLLOW, trajectory((5.0, [0.5, -1.2, 1.4, 0.1, 0.0])))
+            await driver.when(lambda state: state["moving"])
+            # Everybody may stop the arm.
+            response = await onlooker.call("/stop")
+            assert response["values"]["success"] is True
+            assert (await driver.result(number))["status"] == 5
+            state = await driver.when(lambda state: state["stop"] == "confirmed")
+            assert "Onlooker" in state["stopped"]
+        # Neither an accepted nor a refused address is printed.
+        with pytest.raises(InvalidStatus):
+            async with ros(url, f"?token={viewer}", origin=ELSEWHERE):
+                pass
+        assert viewer not in site.server.output
 
 
 @pytest.mark.long
-def test_pages_of_named_sites_alone_may_connect() -> None:
-    async def act() -> None:
-        with AppServer((*APP, "--ros-page", ELSEWHERE)) as server:
-            for origin in ("http://evil.test", "http://robots.test", "null"):
-                with pytest.raises(InvalidStatus):
-                    async with ros(server.url, origin=origin):
-                        pass
-            async with ros(server.url, origin=ELSEWHERE) as client:
-                await client.state()
-                await client.say("subscribe", topic="/robot_description")
-                text = (await client.message("/robot_description"))["data"]
-            # That site gets no more than a websocket.
-            status, *_ = ask(f"{server.url}/api/v1/stop", data=b"", Origin=ELSEWHERE)
-            assert status == 403
-            # Such pages, and programs, draw the meshes whose addresses they know.
-            meshes = re.findall(r'<mesh filename="([^"]+)"', text)
-            assert len(meshes) > 50
-            assert all(mesh.startswith(f"{server.url}/rosbridge/meshes/") for mesh in meshes)
-            for mesh in meshes[:3]:
-                assert ask(mesh, Origin="http://evil.test")[0] == 403
-                status, headers, content = ask(mesh, Origin=ELSEWHERE)
-                assert status == 200
-                assert headers["access-control-allow-origin"] == "*"
-                assert headers["cross-origin-resource-policy"] == "cross-origin"
-                assert content.startswith(b"mtllib") or b"\nv " in content or len(content) > 84
-            base, name = meshes[0].split("/katana450_description/")
-            for wrong in (
-                f"{base}x/katana450_description/{name}",
-                f"{base}/katana450_description/no.obj",
-                f"{base}/{name}",
-                f"{server.url}/rosbridge/meshes//katana450_description/{name}",
-            ):
-                assert ask(wrong)[0] == 404, wrong
-
-    asyncio.run(act())
+async def test_pages_of_named_sites_alone_may_connect() -> None:
+    with AppServer((*APP, "--ros-page", ELSEWHERE)) as server:
+        for origin in ("http://evil.test", "http://robots.test", "null"):
+            with pytest.raises(InvalidStatus):
+                async with ros(server.url, origin=origin):
+                    pass
+        async with ros(server.url, origin=ELSEWHERE) as client:
+            await client.state()
+            await client.say("subscribe", topic="/robot_description")
+            text = (await client.message("/robot_description"))["data"]
+        # That site gets no more than a websocket.
+        status, *_ = ask(f"{server.url}/api/v1/stop", data=b"", Origin=ELSEWHERE)
+        assert status == 403
+        # Such pages, and programs, draw the meshes whose addresses they know.
+        meshes = re.findall(r'<mesh filename="([^"]+)"', text)
+        assert len(meshes) > 50
+        assert all(mesh.startswith(f"{server.url}/rosbridge/meshes/") for mesh in meshes)
+        for mesh in meshes[:3]:
+            assert ask(mesh, Origin="http://evil.test")[0] == 403
+            status, headers, content = ask(mesh, Origin=ELSEWHERE)
+            assert status == 200
+            assert headers["access-control-allow-origin"] == "*"
+            assert headers["cross-origin-resource-policy"] == "cross-origin"
+            assert content.startswith(b"mtllib") or b"\nv " in content or len(content) > 84
+        base, name = meshes[0].split("/katana450_description/")
+        for wrong in (
+            f"{base}x/katana450_description/{name}",
+            f"{base}/katana450_description/no.obj",
+            f"{base}/{name}",
+            f"{server.url}/rosbridge/meshes//katana450_description/{name}",
+        ):
+            assert ask(wrong)[0] == 404, wrong

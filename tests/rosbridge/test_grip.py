@@ -13,6 +13,8 @@ from katana450.server.api.program_requests import Program, ProgramOrder, Steer
 from tests.browser.server import AppServer
 from tests.rosbridge.ros_client import GRIPPER, ros
 
+pytestmark = pytest.mark.anyio
+
 
 def hold_the_cup(url: str) -> float:
     """Let a script grasp the cup; return the finger joint [rad]."""
@@ -30,16 +32,13 @@ def hold_the_cup(url: str) -> float:
 
 
 @pytest.mark.long
-def test_fingers_stall_at_an_object(server: AppServer) -> None:
-    async def act() -> None:
-        width = await asyncio.to_thread(hold_the_cup, server.url)
-        async with ros(server.url) as client:
-            number = await client.goal(GRIPPER, {"command": {"position": 0.0}})
-            result = await client.result(number)
-            assert result["status"] == 4
-            assert result["values"]["stalled"] is True
-            assert result["values"]["reached_goal"] is False
-            assert result["values"]["position"] == pytest.approx(width, abs=0.02)
-            assert width > 0.01
-
-    asyncio.run(act())
+async def test_fingers_stall_at_an_object(server: AppServer) -> None:
+    width = await asyncio.to_thread(hold_the_cup, server.url)
+    async with ros(server.url) as client:
+        number = await client.goal(GRIPPER, {"command": {"position": 0.0}})
+        result = await client.result(number)
+        assert result["status"] == 4
+        assert result["values"]["stalled"] is True
+        assert result["values"]["reached_goal"] is False
+        assert result["values"]["position"] == pytest.approx(width, abs=0.02)
+        assert width > 0.01

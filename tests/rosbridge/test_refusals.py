@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import time
 from typing import Any
+
+import pytest
 
 from katana450.extensions.rosbridge.ops import MAX_OP_BYTES
 from tests.browser.server import AppServer
@@ -20,6 +21,8 @@ from tests.rosbridge.ros_client import (
     trajectory,
     twist,
 )
+
+pytestmark = pytest.mark.anyio
 
 HOME = [0.0, -1.19, 1.48, 0.14, 0.0]
 
@@ -169,86 +172,68 @@ async def moved(client: RosClient, before: dict[str, Any]) -> float:
     return float(max(abs(a - b) for a, b in q))
 
 
-def test_text_that_is_no_operation_is_refused_in_words(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            before = await client.state()
-            for name, (text, why) in TEXTS.items():
-                await client.socket.send(text)
-                assert why in await client.refusal(), name
-            await client.socket.send(b"\x00\x01")
-            assert "not a valid message" in await client.refusal()
-            # The connection still serves, and an id is repeated.
-            await client.say("teleport", id="x")
-            assert "teleport" in await client.refusal("x")
-            assert await moved(client, before) == 0.0
-
-    asyncio.run(act())
+async def test_text_that_is_no_operation_is_refused_in_words(client: RosClient) -> None:
+    before = await client.state()
+    for name, (text, why) in TEXTS.items():
+        await client.socket.send(text)
+        assert why in await client.refusal(), name
+    await client.socket.send(b"\x00\x01")
+    assert "not a valid message" in await client.refusal()
+    # The connection still serves, and an id is repeated.
+    await client.say("teleport", id="x")
+    assert "teleport" in await client.refusal("x")
+    assert await moved(client, before) == 0.0
 
 
-def test_operation_that_is_not_possible_is_refused_in_words(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            before = await client.state()
-            for number, (name, (op, why)) in enumerate(OPS.items()):
-                await client.say(**op, id=f"op {number}")
-                assert why in await client.refusal(f"op {number}"), name
-                if op["op"] in ("call_service", "send_action_goal"):
-                    ended = await client.answer_to(f"op {number}")
-                    assert ended["result"] is False, name
-                    assert why in ended["values"], name
-            assert await moved(client, before) == 0.0
-
-    asyncio.run(act())
+async def test_operation_that_is_not_possible_is_refused_in_words(client: RosClient) -> None:
+    before = await client.state()
+    for number, (name, (op, why)) in enumerate(OPS.items()):
+        await client.say(**op, id=f"op {number}")
+        assert why in await client.refusal(f"op {number}"), name
+        if op["op"] in ("call_service", "send_action_goal"):
+            ended = await client.answer_to(f"op {number}")
+            assert ended["result"] is False, name
+            assert why in ended["values"], name
+    assert await moved(client, before) == 0.0
 
 
-def test_goal_that_is_not_possible_is_aborted_with_its_code(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            before = await client.state()
-            for name, (goal, code, why) in GOALS.items():
-                result = await client.result(await client.goal(FOLLOW, goal))
-                assert (result["status"], result["values"]["error_code"]) == (6, code), name
-                assert why in result["values"]["error_string"], name
-            old = trajectory((1.0, HOME))
-            old["trajectory"]["header"] = {"stamp": {"sec": int(time.time()) - 60}}
-            result = await client.result(await client.goal(FOLLOW, old))
-            assert result["values"]["error_code"] == -3
-            for command, why in (
-                ({"position": 9.0}, "is not between"),
-                ({"position": 0.1, "max_effort": 5.0}, "max_effort"),
-            ):
-                result = await client.result(await client.goal(GRIPPER, {"command": command}))
-                assert (result["status"], result["result"]) == (6, False)
-                assert why in result["values"]
-            await client.say("send_action_goal", action=GRIPPER, args={})
-            assert "needs an `id`" in await client.refusal()
-            assert await moved(client, before) == 0.0
-
-    asyncio.run(act())
+async def test_goal_that_is_not_possible_is_aborted_with_its_code(client: RosClient) -> None:
+    before = await client.state()
+    for name, (goal, code, why) in GOALS.items():
+        result = await client.result(await client.goal(FOLLOW, goal))
+        assert (result["status"], result["values"]["error_code"]) == (6, code), name
+        assert why in result["values"]["error_string"], name
+    old = trajectory((1.0, HOME))
+    old["trajectory"]["header"] = {"stamp": {"sec": int(time.time()) - 60}}
+    result = await client.result(await client.goal(FOLLOW, old))
+    assert result["values"]["error_code"] == -3
+    for command, why in (
+        ({"position": 9.0}, "is not between"),
+        ({"position": 0.1, "max_effort": 5.0}, "max_effort"),
+    ):
+        result = await client.result(await client.goal(GRIPPER, {"command": command}))
+        assert (result["status"], result["result"]) == (6, False)
+        assert why in result["values"]
+    await client.say("send_action_goal", action=GRIPPER, args={})
+    assert "needs an `id`" in await client.refusal()
+    assert await moved(client, before) == 0.0
 
 
-def test_client_of_many_invalid_messages_is_disconnected_with_the_reason(
+async def test_client_of_many_invalid_messages_is_disconnected_with_the_reason(
     server: AppServer,
 ) -> None:
-    async def act() -> None:
+    async with ros(server.url, watches=False) as client:
+        for _ in range(40):
+            await client.say("teleport")
+        await client.until(lambda each: "Too many invalid" in each.get("msg", ""))
+        await client.socket.wait_closed()
+        assert client.socket.close_code == 1008
+
+
+async def test_message_beyond_all_limits_closes_the_connection_alone(server: AppServer) -> None:
+    async with ros(server.url) as other:
         async with ros(server.url, watches=False) as client:
-            for _ in range(40):
-                await client.say("teleport")
-            await client.until(lambda each: "Too many invalid" in each.get("msg", ""))
+            await client.socket.send("x" * 600_000)
             await client.socket.wait_closed()
-            assert client.socket.close_code == 1008
-
-    asyncio.run(act())
-
-
-def test_message_beyond_all_limits_closes_the_connection_alone(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url) as other:
-            async with ros(server.url, watches=False) as client:
-                await client.socket.send("x" * 600_000)
-                await client.socket.wait_closed()
-                assert client.socket.close_code == 1009
-            await other.state()
-
-    asyncio.run(act())
+            assert client.socket.close_code == 1009
+        await other.state()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 from typing import Any
 
@@ -16,8 +15,11 @@ from tests.rosbridge.ros_client import (
     FOLLOW,
     GRIPPER,
     JOINTS,
+    RosClient,
     ros,
 )
+
+pytestmark = pytest.mark.anyio
 
 
 def pose(message: dict[str, Any]) -> np.ndarray[Any, Any]:
@@ -29,45 +31,38 @@ def pose(message: dict[str, Any]) -> np.ndarray[Any, Any]:
     return T
 
 
-def test_topics_describe_the_arm_as_it_is(server: AppServer, robot: Robot) -> None:
-    async def act() -> None:
-        async with ros(server.url) as client:
-            at_home = await client.home()
-            found = {}
-            for topic in ("/joint_states", "/tf", "/tf_static", "/robot_description"):
-                await client.say("subscribe", topic=topic)
-                found[topic] = await client.message(topic)
-            joints = found["/joint_states"]
-            assert joints["name"][:5] == JOINTS
-            assert joints["position"][:5] == pytest.approx(at_home["q"])
-            assert abs(joints["header"]["stamp"]["sec"] - time.time()) < 5.0
-            # Frames on the way from the root to the tool give the pose that the API reports.
-            edges = {
-                each["child_frame_id"]: (each["header"]["frame_id"], pose(each["transform"]))
-                for topic in ("/tf", "/tf_static")
-                for each in found[topic]["transforms"]
-            }
-            T, frame = np.eye(4), at_home["tool"]
-            while frame != robot.links[0].name:
-                frame, step = edges[frame]
-                T = step @ T
-            T_base_shoulder = robot.require_arm().T_base_shoulder
-            assert T_base_shoulder @ np.array(at_home["T"]) == pytest.approx(T, abs=1e-9)
-            assert f'<robot name="{robot.name}">' in found["/robot_description"]["data"]
-
-    asyncio.run(act())
+async def test_topics_describe_the_arm_as_it_is(client: RosClient, robot: Robot) -> None:
+    at_home = await client.home()
+    found = {}
+    for topic in ("/joint_states", "/tf", "/tf_static", "/robot_description"):
+        await client.say("subscribe", topic=topic)
+        found[topic] = await client.message(topic)
+    joints = found["/joint_states"]
+    assert joints["name"][:5] == JOINTS
+    assert joints["position"][:5] == pytest.approx(at_home["q"])
+    assert abs(joints["header"]["stamp"]["sec"] - time.time()) < 5.0
+    # Frames on the way from the root to the tool give the pose that the API reports.
+    edges = {
+        each["child_frame_id"]: (each["header"]["frame_id"], pose(each["transform"]))
+        for topic in ("/tf", "/tf_static")
+        for each in found[topic]["transforms"]
+    }
+    T, frame = np.eye(4), at_home["tool"]
+    while frame != robot.links[0].name:
+        frame, step = edges[frame]
+        T = step @ T
+    T_base_shoulder = robot.require_arm().T_base_shoulder
+    assert T_base_shoulder @ np.array(at_home["T"]) == pytest.approx(T, abs=1e-9)
+    assert f'<robot name="{robot.name}">' in found["/robot_description"]["data"]
 
 
-def test_topics_services_and_actions_are_listed(server: AppServer) -> None:
-    async def act() -> None:
-        async with ros(server.url, watches=False) as client:
-            topics = (await client.call("/rosapi/topics"))["values"]
-            assert dict(zip(topics["topics"], topics["types"], strict=True))["/tf"] == (
-                "tf2_msgs/msg/TFMessage"
-            )
-            services = (await client.call("/rosapi/services"))["values"]["services"]
-            assert {"/stop", "/hold", "/clear_stop", "/rosapi/topics"} <= set(services)
-            servers = (await client.call("/rosapi/action_servers"))["values"]["action_servers"]
-            assert servers == [FOLLOW, GRIPPER]
-
-    asyncio.run(act())
+async def test_topics_services_and_actions_are_listed(server: AppServer) -> None:
+    async with ros(server.url, watches=False) as client:
+        topics = (await client.call("/rosapi/topics"))["values"]
+        assert dict(zip(topics["topics"], topics["types"], strict=True))["/tf"] == (
+            "tf2_msgs/msg/TFMessage"
+        )
+        services = (await client.call("/rosapi/services"))["values"]["services"]
+        assert {"/stop", "/hold", "/clear_stop", "/rosapi/topics"} <= set(services)
+        servers = (await client.call("/rosapi/action_servers"))["values"]["action_servers"]
+        assert servers == [FOLLOW, GRIPPER]
