@@ -2,34 +2,44 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
+import numpy as np
 import numpy.typing as npt
 
 from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.nearest import NearestPose, nearest_pose
+from katana450.extensions.programs.building.plan_state import (
+    PlanContext,
+    PlanState,
+    UntimedPath,
+)
 from katana450.extensions.programs.language.places import ROOMIEST
+from katana450.extensions.programs.language.step_target import Angles, StepTarget
+from katana450.extensions.programs.steps.tool_moves import Circle, Line
 from katana450.extensions.reachability.map import ReachabilityMap, reachability_map
 from katana450.library.motion_plan import MotionPlan
-from katana450.library.planner import Planner
 from katana450.library.pose_frame import PoseFrame, dimensions
 from katana450.library.solutions import IKSolutions
 from katana450.maths.geometry import se3
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics import priority as kinematics_priority
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
-from katana450.maths.planning.plan import Plan
+from katana450.maths.kinematics.pose_units import check_radians
 
 if TYPE_CHECKING:
     from katana450.library.viewer import Viewer
@@ -44,6 +54,9 @@ PRIORITIES = {
 
 FIVE_FREEDOMS: Final = 5
 """Number of freedoms of a tool that has the pitch of the plane of its arm."""
+
+MAX_TURNS: Final = 20.0
+"""Maximum number of turns of a circle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +292,14 @@ class Arm:
             ...
         katana450.errors.InputError: ...
         """
-        return self._plan(self._planner.to(goal, start, seed))
+        plan = self._plan_from(start, seed)
+        if dimensions(goal) == 2:
+            plan = self._to_pose(plan, goal)
+        else:
+            plan = plan.move_to(self.chain.check_q(goal), "plan")
+        if not plan.actions:
+            raise InputError("The arm is at the goal already; there is nothing to plan.")
+        return self._timed(plan)
 
     def line(
         self,
@@ -310,7 +330,15 @@ class Arm:
         >>> round(plan.length, 6)
         0.070711
         """
-        return self._plan(self._planner.line(to, by, start, (pitch, roll, yaw)))
+        if to is not None and by is not None:
+            raise InputError("Give a line either `to`, its end, or `by`, its length and direction.")
+        in_base, end = self.pose_frame.in_base, None
+        if to is not None:
+            position = finite_array(to, (3,), "The end of the line")
+            end = StepTarget(position=position, in_base=in_base)
+        vector = None if by is None else finite_array(by, (3,), "The vector `by` of the line")
+        line = Line(end, vector, _checked((pitch, roll, yaw)), in_base=in_base)
+        return self._timed(line.build(self._plan_from(start)))
 
     def circle(  # noqa: PLR0913
         self,
@@ -349,11 +377,34 @@ class Arm:
         >>> bool(abs(plan.length - 2.0 * np.pi * 0.1) < 1e-5)
         True
         """
-        if pitch == ROOMIEST and self.mounted.kinematics.freedoms != FIVE_FREEDOMS:
-            pitch = None
-        angles = pitch, roll, yaw
-        planner = self._planner
-        return self._plan(planner.circle(centre, radius, normal, start, angles, turns, branch))
+        axis = finite_array(normal, (3,), "The normal of the circle")
+        length = math.hypot(*axis)
+        if length == 0.0:
+            raise InputError("The normal of the circle is zero; give it a direction.")
+        size = float(finite_array(radius, (), "The radius of the circle"))
+        if size <= 0.0:
+            raise InputError(f"The radius of the circle is {size:g} m; it must be above 0.")
+        count = float(finite_array(turns, (), "The number of turns"))
+        if not 0.0 < abs(count) <= MAX_TURNS:
+            raise InputError(
+                f"The number of turns is {count:g}; it must be at most {MAX_TURNS:g} and not 0."
+            )
+        is_roomiest = pitch == ROOMIEST
+        angles = _checked((None if is_roomiest else pitch, roll, yaw))
+        can_choose = self.mounted.kinematics.freedoms == FIVE_FREEDOMS
+        circle = Circle(
+            centre=finite_array(centre, (3,), "The centre of the circle"),
+            axis=axis / length,
+            pitch=ROOMIEST if is_roomiest and can_choose else angles.pitch,
+            roll=angles.roll,
+            yaw=angles.yaw,
+            in_base=self.pose_frame.in_base,
+            radius=size,
+            turns=count,
+            branch=branch,
+        )
+        plan = circle.build(self._plan_from(start))
+        return self._timed(plan if start is not None else replace(plan, actions=plan.actions[-1:]))
 
     def reachability(
         self,
@@ -412,17 +463,56 @@ class Arm:
 
         if what is not None and not isinstance(what, MotionPlan):
             self.chain.check_q(what)
-        viewer = Viewer(self.robot, self._planner, self.T_base_frame, port, host)
+        viewer = Viewer(self, port, host)
         if isinstance(what, MotionPlan):
             viewer.play(what)
         elif what is not None:
             viewer.move(what)
         return viewer
 
-    @cached_property
-    def _planner(self) -> Planner:
-        T = self.mounted.T_base_shoulder
-        return Planner(self._kinematics, self.session, T, self.pose_frame, self.objects)
+    def standing(self, q: npt.ArrayLike) -> State:
+        """Return the state of the arm at rest at ``q`` (n,) [rad], with its objects.
 
-    def _plan(self, core: Plan) -> MotionPlan:
-        return MotionPlan(core, self.chain, self.pose_frame)
+        Raises InputError if ``q`` is not n finite angles.
+        """
+        gripper = self.session.require_arm().gripper.clamp(0.0)
+        state = self.session.begin(self.chain.check_q(q), gripper, 0.0)
+        return replace(state, objects=self.objects)
+
+    def _plan_from(self, start: npt.ArrayLike | None, seed: int = 0) -> PlanState:
+        """Return a plan without steps that begins at ``start`` (n,) [rad]; None for `ready`."""
+        plan_context = PlanContext(self.session, self.mounted.T_base_shoulder, seed)
+        return PlanState(plan_context, self.standing(self.ready if start is None else start))
+
+    def _to_pose(self, plan: PlanState, goal: npt.ArrayLike) -> PlanState:
+        """Plan to the nearest reachable posture that takes the pose ``goal`` (4, 4)."""
+        q = plan.q
+        solutions = self.ik(goal, q).feasible
+        if not solutions:
+            why = self.nearest(goal, q_hint=q).reason or "only the nearest pose is"
+            raise InputError(
+                f"The arm cannot take this pose: {why}. `Arm.nearest` returns the nearest feasible "
+                "pose."
+            )
+        nearest_first = sorted(solutions, key=lambda solution: float(np.abs(solution.q - q).max()))
+        return plan.first(nearest_first, lambda plan, posture: plan.move_to(posture.q, "plan"))
+
+    def _timed(self, plan: PlanState) -> MotionPlan:
+        """Time the paths of ``plan``, one after another."""
+        untimed_paths = [action for _, action in plan.actions if isinstance(action, UntimedPath)]
+        paths = tuple(path for untimed in untimed_paths for path in untimed.paths)
+        timed = replace(untimed_paths[0], paths=paths).timed().plan
+        return MotionPlan(timed, self.chain, self.pose_frame)
+
+
+def _checked(angles: Sequence[float | str | None]) -> Angles:
+    """Return pitch, roll and yaw as floats. Raises InputError, which names a wrong one."""
+    checked = Angles(*map(_angle, angles, Angles._fields))
+    check_radians((angle for angle in checked if angle is not None), "The orientation")
+    return checked
+
+
+def _angle(value: float | str | None, name: str) -> float | None:
+    if isinstance(value, str):
+        raise InputError(f"The {name} is {value!r}; give an angle in rad.")
+    return None if value is None else float(finite_array(value, (), f"The {name}"))

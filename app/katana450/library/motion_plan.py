@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from katana450.errors import InputError
@@ -111,9 +112,17 @@ class MotionPlan:
             LostError: the connection is lost.
             InputError: as `sample`, or an invalid speed.
         """
-        from katana450.library.streaming import stream
+        from katana450.server.api import answers, requests
 
         if not 0.0 < speed <= 1.0:
             raise InputError(f"The speed is {speed!r}; it must be above 0 and up to 1.")
         samples = self.sample(dt * speed)
-        return stream(replace(samples, t=samples.t / speed, qd=samples.qd * speed), client)
+        # After a stop, even one that was cleared at once, the server refuses all that follows.
+        revocations = client.query(answers.State).revocations
+        client.go(requests.Joints(q=samples.q[0], revocations=revocations))
+        started = time.monotonic()
+        for t, q, qd in zip(samples.t / speed, samples.q, samples.qd * speed, strict=True):
+            time.sleep(max(started + t - time.monotonic(), 0.0))
+            # Each command is answered before the next is sent, so that a refusal ends the stream.
+            client.ask(requests.Servo(q=q, qd=qd, revocations=revocations))
+        return client.go(requests.Joints(q=samples.q[-1], revocations=revocations))

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -28,16 +28,11 @@ from katana450.extensions.recording.files.simulation import (
 )
 from katana450.extensions.recording.files.table import columns
 from katana450.extensions.recording.messages import COMMANDS, EVENTS, PLANS, SOLIDS, TickMessage
-from katana450.extensions.recording.run_again.again_command import (
-    script_of_part,
-)
+from katana450.extensions.recording.run_again.again_command import script_of_part
 from katana450.extensions.recording.scoring.score_command import score_file
 from katana450.extensions.recording.scoring.scored import Scored
 from katana450.extensions.recording.ticks import Verification
 from katana450.maths.geometry.arrays import FloatArray
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,12 +18,11 @@ import viser
 
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
-from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.water import WaterLayer
+from katana450.library.arm import Arm
 from katana450.library.motion_plan import MotionPlan
-from katana450.library.planner import Planner
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
 from katana450.server.view.scenery import Scenery
@@ -47,21 +46,12 @@ class Viewer:
     nothing in it moves a simulated or real arm.
     """
 
-    def __init__(
-        self, robot: Robot, planner: Planner, T_base_frame: FloatArray, port: int, host: str
-    ) -> None:
-        """Serve a scene of ``robot`` at ``host``, on ``port`` or the next free one above it.
-
-        Args:
-            robot: the arm and its shapes.
-            planner: gives the states in which it stands.
-            T_base_frame: (4, 4) maps coordinates of the frame of poses into the base [m].
-            port: TCP port.
-            host: address.
+    def __init__(self, arm: Arm, port: int, host: str) -> None:
+        """Serve a scene of ``arm`` at ``host``, on ``port`` or the next free one above it.
 
         Raises ConfigurationError if no port can be opened.
         """
-        self._planner, self._T_base_frame = planner, T_base_frame
+        self._arm = arm
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 self._server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -74,8 +64,7 @@ class Viewer:
         look = CAMERA_POSES[Preset.FREE]
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
-        session = planner.session
-        parts = (self._server, robot, session, load_props(), NoGestures(), Meshes())
+        parts = (self._server, arm.robot, arm.session, load_props(), NoGestures(), Meshes())
         self._scenery = Scenery(*parts, layers=(ConduitLayer(), WaterLayer()))
         self._path = scene.add_line_segments(
             "/path", np.zeros((1, 2, 3), np.float32), PATH_COLOUR, thickness=0.003, visible=False
@@ -83,7 +72,7 @@ class Viewer:
         self._player: threading.Thread | None = None
         self._stopped = threading.Event()
         self._closed = threading.Event()
-        self._show(session.ready)
+        self._show(arm.ready)
         # Runs before viser's own exit handler, so that the player never uses a stopped server.
         atexit.register(self.close)
 
@@ -92,9 +81,9 @@ class Viewer:
 
         Raises InputError if ``q`` is not n finite angles.
         """
-        angles = self._planner.kinematics.chain.check_q(q)
+        state = self._arm.standing(q)
         self.pause()
-        self._show(angles)
+        self._scenery.show(state)
 
     def play(self, plan: MotionPlan, speed: float = 1.0) -> None:
         """Draw the tool's path and show the motion repeatedly, in a separate thread.
@@ -104,7 +93,7 @@ class Viewer:
         if not (np.isfinite(speed) and speed > 0.0):
             raise InputError(f"The speed is {speed!r}; give a number above 0.")
         samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
-        T_base_frame = self._T_base_frame
+        T_base_frame = self._arm.T_base_frame
         points = plan.sample(plan.duration / PATH_POINTS).points
         points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
         self._play(samples.t / speed, points, lambda number: self._show(samples.q[number]))
@@ -177,4 +166,4 @@ class Viewer:
             stopped.wait(PAUSE)
 
     def _show(self, q: FloatArray) -> None:
-        self._scenery.show(self._planner.standing(q))
+        self._scenery.show(self._arm.standing(q))

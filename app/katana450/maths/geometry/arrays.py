@@ -38,7 +38,8 @@ def finite_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
     result = real_array(value, shape, name)
     if not np.isfinite(result).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise InputError(f"{name} has {result[where]} at {list(where)}; {_HINT}.")
+        place = f" at {list(where)}" if where else ""
+        raise InputError(f"{name} has {result[where]}{place}; {_HINT}.")
     return result
 
 
