@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from katana450.extensions.media.figures import AXES, STYLE, TIME, equal_axes
+from katana450.extensions.media.figures import AXES, STYLE, TIME, draw_joints, equal_axes
 from katana450.library.trajectory import Trajectory
 
 
@@ -25,8 +25,7 @@ def figure_of(samples: Trajectory) -> Any:
         space.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
         space.legend(loc="upper left", fontsize=8.0)
         panel = figure.add_subplot(1, 2, 2)
-        for axis, angles in enumerate(np.degrees(samples.q).T):
-            panel.plot(samples.t, angles, color=AXES[axis % len(AXES)], label=f"θ{axis + 1}")
+        draw_joints(panel, samples.t, np.degrees(samples.q))
         panel.set_title("Joint angles")
         panel.set_xlabel(TIME)
         panel.set_ylabel("angle (deg)")

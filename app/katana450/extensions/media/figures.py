@@ -5,8 +5,9 @@ from __future__ import annotations
 import importlib
 import io
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 
@@ -28,106 +29,6 @@ RIGHT: dict[str, Any] = {"ha": "right", "va": "top"}
 
 SAMPLES = 400
 """Number of intervals of a drawn path."""
-
-
-def measured_figure(run: MeasuredRun) -> bytes:
-    """Return a PNG of path, distances from it and errors of the joints; of these without paths."""
-    plt = pyplot()
-    deviations = run.deviations
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(7.2, 5.2 if deviations else 3.0))
-        if deviations:
-            space = figure.add_axes((-0.02, 0.06, 0.53, 0.9), projection="3d")
-            _draw_paths(plt, space, deviations)
-            figure.text(0.02, 0.935, "Path of the tool", fontsize=10.0, fontweight="bold")
-            upper = figure.add_axes((0.6, 0.57, 0.38, 0.35))
-            _draw_distances(upper, deviations)
-            lower = figure.add_axes((0.6, 0.1, 0.38, 0.34), sharex=upper)
-        else:
-            lower = figure.add_axes((0.1, 0.16, 0.88, 0.72))
-        _draw_joint_errors(lower, run)
-        return to_png(plt, figure)
-
-
-def magnification(deviations: tuple[Deviation, ...]) -> float:
-    """Return the round number, at least 1, by which distances from paths are best drawn."""
-    points = np.concatenate([deviation.nearest for deviation in deviations])
-    size = float((points.max(axis=0) - points.min(axis=0)).max())
-    worst = max(float(deviation.error.max()) for deviation in deviations)
-    if worst <= 0.0 or size <= 0.0:
-        return 1.0
-    most = max(DRAWN * size / worst, 1.0)
-    power = 10.0 ** math.floor(math.log10(most))
-    return power * max(step for step in (1.0, 2.0, 5.0) if power * step <= most)
-
-
-def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None:
-    times = magnification(deviations)
-    by = f", distances × {times:g}" if times > 1.0 else ""
-    drawn: list[FloatArray] = []
-    for number, deviation in enumerate(deviations):
-        desired = 1e3 * point_derivatives(deviation.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
-        magnified = 1e3 * (deviation.nearest + times * (deviation.measured - deviation.nearest))
-        names = ("desired", f"measured{by}") if number == 0 else (None, None)
-        space.plot(*desired.T, color=DESIRED, linewidth=3.0, alpha=0.7, label=names[0])
-        space.plot(*magnified.T, color=ERROR, linewidth=1.1, label=names[1])
-        space.scatter(*desired[0], color=INK, s=12)
-        drawn += [desired, magnified]
-    _frame(plt, space, np.concatenate(drawn))
-    space.legend(loc="upper center", bbox_to_anchor=(0.54, 0.06), fontsize=8.0)
-
-
-def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
-    """Draw the distances of setpoints and measured tool from the paths over time."""
-    measured = commanded = 0.0
-    for deviation in deviations:
-        off = 1e3 * deviation.error
-        panel.plot(*_broken(deviation.t, off), color=ERROR, linewidth=1.0)
-        sent = _broken(deviation.t_commanded, 1e3 * deviation.commanded)
-        panel.plot(*sent, color=AXES[0], linewidth=1.6)
-        measured = max(measured, float(off.max()))
-        commanded = max(commanded, 1e3 * float(deviation.commanded.max()))
-    panel.set_title("Distance from the path")
-    panel.set_ylabel("distance (mm)")
-    panel.set_ylim(0.0, 1.5 * measured or 1.0)
-    for text, colour, y in (
-        (f"measured: up to {measured:.2g} mm", ERROR, 0.98),
-        (f"setpoints: up to {commanded:.1g} mm", AXES[0], 0.88),
-    ):
-        panel.text(0.99, y, text, transform=panel.transAxes, color=colour, fontsize=8.0, **RIGHT)
-
-
-def _broken(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the points of a line that is broken while the arm is on another path."""
-    gaps = np.flatnonzero(np.diff(t) > GAP) + 1
-    return np.insert(t, gaps, math.nan), np.insert(values, gaps, math.nan)
-
-
-def _draw_joint_errors(panel: Any, run: MeasuredRun) -> None:
-    """Draw measured joints minus where they should have been over time."""
-    off = np.degrees(run.q - run.due)
-    for axis in range(off.shape[1]):
-        panel.plot(
-            run.t,
-            off[:, axis],
-            color=AXES[axis % len(AXES)],
-            linewidth=0.9,
-            label=f"θ{axis + 1}",
-        )
-    panel.set_title("Tracking error of the joints")
-    panel.set_ylabel("error (deg)")
-    panel.set_xlabel(TIME)
-    panel.set_xlim(run.t[0], run.t[-1])
-    panel.margins(y=0.25)
-    panel.legend(
-        loc="upper right",
-        ncols=off.shape[1],
-        fontsize=7.0,
-        handlelength=0.8,
-        columnspacing=0.7,
-        handletextpad=0.4,
-    )
-
 
 INK, FAINT, DESIRED, ERROR = "#1f2933", "#cbd2d9", "#9aa5b1", "#c2410c"
 """Colours of text, grid, desired paths and errors."""
@@ -173,38 +74,144 @@ TIME = "time (s)"
 """Label of a time axis."""
 
 
-def path_figure(paths: Sequence[PathTrace]) -> bytes:
-    """Return a PNG of desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
-    plt = pyplot()
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(7.2, 3.9))
-        space = figure.add_axes((0.0, 0.0, 0.52, 0.92), projection="3d")
-        panel = figure.add_axes((0.62, 0.15, 0.36, 0.76))
-        worst = 1e3 * max(float(path.error.max()) for path in paths)
-        power = math.floor(math.log10(worst)) if worst > 0.0 else 0
-        for number, path in enumerate(paths):
-            desired, traced = 1e3 * path.desired, 1e3 * path.traced
-            names = ("desired", "traced") if number == 0 else (None, None)
-            space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, label=names[0])
-            space.plot(*traced.T, color=AXES[0], linewidth=1.1, label=names[1])
-            space.scatter(*desired[0], color=INK, s=14)
-        sigma, errors = largest(paths)
-        errors = 1e3 * errors / 10.0**power
-        panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
-        panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
-        _frame(plt, space, 1e3 * np.concatenate([path.desired for path in paths]))
-        figure.text(0.02, 0.931, "Desired and traced path", fontsize=10.0, fontweight="bold")
-        space.legend(loc="upper left", bbox_to_anchor=(0.01, 1.0), ncols=2, fontsize=8.0)
-        panel.set_title("Position error of the kinematics")
-        panel.set_xlabel("along the path (%)")
-        panel.set_ylabel(f"error ($10^{{{power}}}$ mm)")
-        panel.set_xlim(0.0, 100.0)
-        top = worst / 10.0**power
-        panel.set_ylim(0.0, 1.25 * top or 1.0)
-        panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
-        caption = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
-        panel.annotate(caption, (99.0, 1.03 * top), ha="right", va="bottom")
-        return to_png(plt, figure)
+Drawing = ParamSpec("Drawing")
+
+
+def as_png(draw: Callable[Concatenate[Any, Drawing], Any]) -> Callable[Drawing, bytes]:
+    """Return the function that returns the figure of ``draw`` as a PNG.
+
+    ``draw`` gets matplotlib's module of figures, which draws without a display.
+    """
+
+    @wraps(draw)
+    def png(*args: Drawing.args, **options: Drawing.kwargs) -> bytes:
+        importlib.import_module("matplotlib").use("Agg")
+        plt = importlib.import_module("matplotlib.pyplot")
+        file = io.BytesIO()
+        with plt.rc_context(STYLE):
+            figure = draw(plt, *args, **options)
+            figure.savefig(file, format="png", metadata={"Software": None})
+            plt.close(figure)
+        return file.getvalue()
+
+    return png
+
+
+@as_png
+def measured_figure(plt: Any, run: MeasuredRun) -> Any:
+    """Draw path, distances from it and errors of the joints; of these without paths."""
+    deviations = run.deviations
+    figure = plt.figure(figsize=(7.2, 5.2 if deviations else 3.0))
+    if deviations:
+        space = figure.add_axes((-0.02, 0.06, 0.53, 0.9), projection="3d")
+        _draw_paths(plt, space, deviations)
+        figure.text(0.02, 0.935, "Path of the tool", fontsize=10.0, fontweight="bold")
+        upper = figure.add_axes((0.6, 0.57, 0.38, 0.35))
+        _draw_distances(upper, deviations)
+        lower = figure.add_axes((0.6, 0.1, 0.38, 0.34), sharex=upper)
+    else:
+        lower = figure.add_axes((0.1, 0.16, 0.88, 0.72))
+    _draw_joint_errors(lower, run)
+    return figure
+
+
+def magnification(deviations: tuple[Deviation, ...]) -> float:
+    """Return the round number, at least 1, by which distances from paths are best drawn."""
+    points = np.concatenate([deviation.nearest for deviation in deviations])
+    size = float((points.max(axis=0) - points.min(axis=0)).max())
+    worst = max(float(deviation.error.max()) for deviation in deviations)
+    if worst <= 0.0 or size <= 0.0:
+        return 1.0
+    most = max(DRAWN * size / worst, 1.0)
+    power = 10.0 ** math.floor(math.log10(most))
+    return power * max(step for step in (1.0, 2.0, 5.0) if power * step <= most)
+
+
+def _draw_paths(plt: Any, space: Any, deviations: tuple[Deviation, ...]) -> None:
+    times = magnification(deviations)
+    by = f", distances × {times:g}" if times > 1.0 else ""
+    drawn: list[FloatArray] = []
+    for number, deviation in enumerate(deviations):
+        desired = 1e3 * point_derivatives(deviation.path, np.linspace(0.0, 1.0, SAMPLES + 1))[0]
+        magnified = 1e3 * (deviation.nearest + times * (deviation.measured - deviation.nearest))
+        names = ("desired", f"measured{by}") if number == 0 else (None, None)
+        _draw_path(space, desired, magnified, ERROR, names)
+        drawn += [desired, magnified]
+    _frame(plt, space, np.concatenate(drawn))
+    space.legend(loc="upper center", bbox_to_anchor=(0.54, 0.06), fontsize=8.0)
+
+
+def _draw_distances(panel: Any, deviations: tuple[Deviation, ...]) -> None:
+    """Draw the distances of setpoints and measured tool from the paths over time."""
+    measured = commanded = 0.0
+    for deviation in deviations:
+        off = 1e3 * deviation.error
+        panel.plot(*_broken(deviation.t, off), color=ERROR, linewidth=1.0)
+        sent = _broken(deviation.t_commanded, 1e3 * deviation.commanded)
+        panel.plot(*sent, color=AXES[0], linewidth=1.6)
+        measured = max(measured, float(off.max()))
+        commanded = max(commanded, 1e3 * float(deviation.commanded.max()))
+    panel.set_title("Distance from the path")
+    panel.set_ylabel("distance (mm)")
+    panel.set_ylim(0.0, 1.5 * measured or 1.0)
+    for text, colour, y in (
+        (f"measured: up to {measured:.2g} mm", ERROR, 0.98),
+        (f"setpoints: up to {commanded:.1g} mm", AXES[0], 0.88),
+    ):
+        panel.text(0.99, y, text, transform=panel.transAxes, color=colour, fontsize=8.0, **RIGHT)
+
+
+def _broken(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the points of a line that is broken while the arm is on another path."""
+    gaps = np.flatnonzero(np.diff(t) > GAP) + 1
+    return np.insert(t, gaps, math.nan), np.insert(values, gaps, math.nan)
+
+
+def _draw_joint_errors(panel: Any, run: MeasuredRun) -> None:
+    """Draw measured joints minus where they should have been over time."""
+    off = np.degrees(run.q - run.due)
+    draw_joints(panel, run.t, off, linewidth=0.9)
+    _label(panel, "Tracking error of the joints", "error (deg)", run.t)
+    panel.margins(y=0.25)
+    panel.legend(
+        loc="upper right",
+        ncols=off.shape[1],
+        fontsize=7.0,
+        handlelength=0.8,
+        columnspacing=0.7,
+        handletextpad=0.4,
+    )
+
+
+@as_png
+def path_figure(plt: Any, paths: Sequence[PathTrace]) -> Any:
+    """Draw desired and traced path in 3D, and the error along it (paper's Fig. 7)."""
+    figure = plt.figure(figsize=(7.2, 3.9))
+    space = figure.add_axes((0.0, 0.0, 0.52, 0.92), projection="3d")
+    panel = figure.add_axes((0.62, 0.15, 0.36, 0.76))
+    worst = 1e3 * max(float(path.error.max()) for path in paths)
+    power = math.floor(math.log10(worst)) if worst > 0.0 else 0
+    for number, path in enumerate(paths):
+        desired, traced = 1e3 * path.desired, 1e3 * path.traced
+        names = ("desired", "traced") if number == 0 else (None, None)
+        _draw_path(space, desired, traced, AXES[0], names)
+    sigma, errors = largest(paths)
+    errors = 1e3 * errors / 10.0**power
+    panel.fill_between(100.0 * sigma, errors, color=ERROR, alpha=0.15, linewidth=0.0)
+    panel.plot(100.0 * sigma, errors, color=ERROR, linewidth=0.8)
+    _frame(plt, space, 1e3 * np.concatenate([path.desired for path in paths]))
+    figure.text(0.02, 0.931, "Desired and traced path", fontsize=10.0, fontweight="bold")
+    space.legend(loc="upper left", bbox_to_anchor=(0.01, 1.0), ncols=2, fontsize=8.0)
+    panel.set_title("Position error of the kinematics")
+    panel.set_xlabel("along the path (%)")
+    panel.set_ylabel(f"error ($10^{{{power}}}$ mm)")
+    panel.set_xlim(0.0, 100.0)
+    top = worst / 10.0**power
+    panel.set_ylim(0.0, 1.25 * top or 1.0)
+    panel.axhline(top, color=INK, linewidth=0.7, linestyle=(0, (4, 3)))
+    caption = f"largest {top:.1f}$\\times10^{{{power}}}$ mm"
+    panel.annotate(caption, (99.0, 1.03 * top), ha="right", va="bottom")
+    return figure
 
 
 def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
@@ -220,93 +227,89 @@ def largest(paths: Sequence[PathTrace]) -> tuple[FloatArray, FloatArray]:
     return 0.5 * (edges[:-1] + edges[1:]), maximum
 
 
-def joints_figure(trace: Trace) -> bytes:
-    """Return a PNG of the joint variables over time (the paper's Fig. 8)."""
-    plt = pyplot()
-    with plt.rc_context(STYLE):
-        figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
-        degrees = np.degrees(trace.q)
-        for axis in range(degrees.shape[1]):
-            colour, name = AXES[axis % len(AXES)], f"θ{axis + 1}"
-            panel.plot(trace.t, degrees[:, axis], color=colour, linewidth=1.4, label=name)
-        if trace.measured is not None:
-            for axis, column in enumerate(np.degrees(trace.measured).T):
-                panel.plot(trace.t, column, **MEASURED, label=None if axis else "measured")
-        panel.legend(**ABOVE, ncols=degrees.shape[1] + 1, handlelength=1.1, columnspacing=1.0)
-        panel.set_title("Joint variables")
-        panel.set_xlabel(TIME)
-        panel.set_ylabel("angle (deg)")
-        panel.set_xlim(0.0, trace.t[-1])
-        return to_png(plt, figure)
+@as_png
+def joints_figure(plt: Any, trace: Trace) -> Any:
+    """Draw the joint variables over time (the paper's Fig. 8)."""
+    figure, panel = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
+    degrees = np.degrees(trace.q)
+    draw_joints(panel, trace.t, degrees, linewidth=1.4)
+    if trace.measured is not None:
+        for axis, column in enumerate(np.degrees(trace.measured).T):
+            panel.plot(trace.t, column, **MEASURED, label=None if axis else "measured")
+    panel.legend(**ABOVE, ncols=degrees.shape[1] + 1, handlelength=1.1, columnspacing=1.0)
+    _label(panel, "Joint variables", "angle (deg)", trace.t)
+    return figure
 
 
-def speeds_figure(arm: ArmModel, trace: Trace) -> bytes:
-    """Return a PNG of joint speeds as fractions of their limits, and of the speed of the tool."""
-    plt = pyplot()
-    with plt.rc_context(STYLE):
-        figure, (upper, lower) = plt.subplots(
-            2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
-        )
-        fractions = 100.0 * trace.qd / arm.chain.speed
-        for axis in range(fractions.shape[1]):
-            colour = AXES[axis % len(AXES)]
-            upper.plot(
-                trace.t, fractions[:, axis], color=colour, linewidth=1.2, label=f"θ{axis + 1}"
-            )
-        for limit in (-100.0, 100.0):
-            upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
-        upper.set_ylim(-115.0, 115.0)
-        upper.set_title("Joint speeds as fractions of their limits")
-        upper.set_ylabel("speed (% of limit)")
-        upper.legend(**ABOVE, ncols=fractions.shape[1], handlelength=1.1, columnspacing=1.0)
-        tools = [arm.kinematics_to(tool) for tool in trace.tools]
-        rows = zip(tools, trace.q, trace.qd, strict=True)
-        speeds = 1e3 * np.array([tool.tool_speed(q, qd) for tool, q, qd in rows])
-        lower.fill_between(trace.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
-        lower.plot(trace.t, speeds, color=AXES[0], linewidth=1.2)
-        lower.set_title("Speed of the tool point")
-        lower.set_ylabel("speed (mm/s)")
-        lower.set_xlabel(TIME)
-        lower.set_xlim(0.0, trace.t[-1])
-        lower.set_ylim(bottom=0.0)
-        return to_png(plt, figure)
+@as_png
+def speeds_figure(plt: Any, arm: ArmModel, trace: Trace) -> Any:
+    """Draw joint speeds as fractions of their limits, and of the speed of the tool."""
+    figure, (upper, lower) = plt.subplots(
+        2, 1, figsize=(7.2, 4.6), sharex=True, layout="constrained", height_ratios=(3, 2)
+    )
+    fractions = 100.0 * trace.qd / arm.chain.speed
+    draw_joints(upper, trace.t, fractions, linewidth=1.2)
+    for limit in (-100.0, 100.0):
+        upper.axhline(limit, color=ERROR, linewidth=0.8, linestyle=(0, (4, 3)))
+    upper.set_ylim(-115.0, 115.0)
+    upper.set_title("Joint speeds as fractions of their limits")
+    upper.set_ylabel("speed (% of limit)")
+    upper.legend(**ABOVE, ncols=fractions.shape[1], handlelength=1.1, columnspacing=1.0)
+    tools = [arm.kinematics_to(tool) for tool in trace.tools]
+    rows = zip(tools, trace.q, trace.qd, strict=True)
+    speeds = 1e3 * np.array([tool.tool_speed(q, qd) for tool, q, qd in rows])
+    lower.fill_between(trace.t, speeds, color=AXES[0], alpha=0.15, linewidth=0.0)
+    lower.plot(trace.t, speeds, color=AXES[0], linewidth=1.2)
+    _label(lower, "Speed of the tool point", "speed (mm/s)", trace.t)
+    lower.set_ylim(bottom=0.0)
+    return figure
 
 
-def water_figure(pour: PourRecord) -> bytes:
-    """Return a PNG of the volumes, the flow, the tilt of the cup and its lip above the water."""
-    plt = pyplot()
-    with plt.rc_context(STYLE):
-        figure, (upper, lower) = plt.subplots(
-            2, 1, figsize=(7.2, 5.0), sharex=True, layout="constrained"
-        )
-        volumes = (
-            ("in the cup", pour.cup),
-            ("in the basin", pour.basin),
-            ("spilled", pour.spilled),
-        )
-        lines = [
-            upper.plot(pour.t, values, color=colour, linewidth=1.4, label=name)[0]
-            for (name, values), colour in zip(volumes, (AXES[0], AXES[2], ERROR), strict=True)
-        ]
-        upper.set_title("Water")
-        upper.set_ylabel("volume (ml)")
-        upper.set_ylim(bottom=0.0)
-        flow = _second(upper, "flow (ml/s)")
-        lines += flow.plot(pour.t, pour.flow, color=AXES[4], linewidth=0.9, label="flow")
-        flow.set_ylim(bottom=0.0)
-        upper.legend(handles=lines, **ABOVE, ncols=len(lines))
-        lines = lower.plot(
-            pour.t, np.degrees(pour.tilt), color=AXES[3], linewidth=1.4, label="tilt of the cup"
-        )
-        lower.set_title("Cup")
-        lower.set_ylabel("tilt (deg)")
-        lower.set_xlabel(TIME)
-        lower.set_xlim(0.0, pour.t[-1])
-        lip = _second(lower, "height (mm)")
-        name = "lip above the water"
-        lines += lip.plot(pour.t, 1e3 * pour.lip, color=AXES[0], linewidth=1.2, label=name)
-        lower.legend(handles=lines, **ABOVE, ncols=len(lines))
-        return to_png(plt, figure)
+@as_png
+def water_figure(plt: Any, pour: PourRecord) -> Any:
+    """Draw the volumes, the flow, the tilt of the cup and its lip above the water."""
+    figure, (upper, lower) = plt.subplots(
+        2, 1, figsize=(7.2, 5.0), sharex=True, layout="constrained"
+    )
+    volumes = (
+        ("in the cup", pour.cup),
+        ("in the basin", pour.basin),
+        ("spilled", pour.spilled),
+    )
+    lines = [
+        upper.plot(pour.t, values, color=colour, linewidth=1.4, label=name)[0]
+        for (name, values), colour in zip(volumes, (AXES[0], AXES[2], ERROR), strict=True)
+    ]
+    upper.set_title("Water")
+    upper.set_ylabel("volume (ml)")
+    upper.set_ylim(bottom=0.0)
+    flow = _second(upper, "flow (ml/s)")
+    lines += flow.plot(pour.t, pour.flow, color=AXES[4], linewidth=0.9, label="flow")
+    flow.set_ylim(bottom=0.0)
+    upper.legend(handles=lines, **ABOVE, ncols=len(lines))
+    lines = lower.plot(
+        pour.t, np.degrees(pour.tilt), color=AXES[3], linewidth=1.4, label="tilt of the cup"
+    )
+    _label(lower, "Cup", "tilt (deg)", pour.t)
+    lip = _second(lower, "height (mm)")
+    name = "lip above the water"
+    lines += lip.plot(pour.t, 1e3 * pour.lip, color=AXES[0], linewidth=1.2, label=name)
+    lower.legend(handles=lines, **ABOVE, ncols=len(lines))
+    return figure
+
+
+def draw_joints(panel: Any, t: FloatArray, values: FloatArray, **line: Any) -> None:
+    """Draw the columns of ``values`` (N, n) over the times ``t`` (N,) [s], named as joints."""
+    for axis, column in enumerate(values.T):
+        panel.plot(t, column, color=AXES[axis % len(AXES)], label=f"θ{axis + 1}", **line)
+
+
+def _label(panel: Any, title: str, quantity: str, t: FloatArray) -> None:
+    """Name ``panel`` and its ``quantity`` over the times ``t`` (N,) [s]."""
+    panel.set_title(title)
+    panel.set_ylabel(quantity)
+    panel.set_xlabel(TIME)
+    panel.set_xlim(t[0], t[-1])
 
 
 def _second(panel: Any, label: str) -> Any:
@@ -316,6 +319,15 @@ def _second(panel: Any, label: str) -> Any:
     second.set_ylabel(label)
     second.grid(visible=False)
     return second
+
+
+def _draw_path(
+    space: Any, desired: FloatArray, traced: FloatArray, colour: str, names: Sequence[str | None]
+) -> None:
+    """Draw a desired path (k, 3) [mm], and the one that was traced, in ``colour``, over it."""
+    space.plot(*desired.T, color=DESIRED, linewidth=4.0, alpha=0.7, label=names[0])
+    space.plot(*traced.T, color=colour, linewidth=1.1, label=names[1])
+    space.scatter(*desired[0], color=INK, s=14)
 
 
 def _frame(plt: Any, space: Any, points: FloatArray) -> None:
@@ -337,17 +349,3 @@ def equal_axes(space: Any, points: FloatArray) -> None:
     for number, set_limits in enumerate((space.set_xlim, space.set_ylim, space.set_zlim)):
         set_limits(middle[number] - half, middle[number] + half)
     space.set_box_aspect((1.0, 1.0, 1.0), zoom=0.86)
-
-
-def pyplot() -> Any:
-    """Return matplotlib's module of figures, which draws without a display."""
-    importlib.import_module("matplotlib").use("Agg")
-    return importlib.import_module("matplotlib.pyplot")
-
-
-def to_png(plt: Any, figure: Any) -> bytes:
-    """Return ``figure`` as a PNG, and close it."""
-    file = io.BytesIO()
-    figure.savefig(file, format="png", metadata={"Software": None})
-    plt.close(figure)
-    return file.getvalue()
