@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.arm_options import add_arm_options
+from katana450.cli.option_values import number, port
 from katana450.extension import provided
 from katana450.settings import Settings
 
@@ -22,11 +23,11 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         "(default: %(default)s)",
     )
     parser.add_argument(
-        "--port", type=_port, default=Settings.port, help="TCP port (default: %(default)s)"
+        "--port", type=port, default=Settings.port, help="TCP port (default: %(default)s)"
     )
     parser.add_argument(
         "--silence",
-        type=_silence,
+        type=number(MIN_SILENCE, MAX_SILENCE, "s"),
         default=Settings.silence,
         metavar="SECONDS",
         help="heartbeat timeout of the driver, after which a moving arm brakes; the page of the "
@@ -61,13 +62,13 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--lines",
-        type=_port,
+        type=port,
         metavar="PORT",
         help="a TCP port of this machine for programs that send JSON lines",
     )
     parser.add_argument(
         "--stop-port",
-        type=_port,
+        type=port,
         metavar="PORT",
         help="TCP port that serves STOP alone, from a process of its own (default: the port after "
         "--port, or a free one)",
@@ -77,33 +78,3 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
         add_options(parser)
     # The real arm adds an option of that name, which takes an address too.
     add_arm_options(parser, names="--arm" not in parser.format_usage())
-
-
-def _silence(text: str) -> float:
-    return heartbeat_timeout(text, MAX_SILENCE)
-
-
-def heartbeat_timeout(text: str, longest: float) -> float:
-    """Return the number of seconds in ``text``, from MIN_SILENCE to ``longest``.
-
-    Raises ArgumentTypeError for any other text.
-    """
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not MIN_SILENCE <= seconds <= longest:
-        raise argparse.ArgumentTypeError(
-            f"a number of seconds from {MIN_SILENCE:g} to {longest:g}, not {text!r}"
-        )
-    return seconds
-
-
-def _port(text: str) -> int:
-    try:
-        port = int(text)
-    except ValueError:
-        port = -1
-    if not 0 <= port <= 65535:
-        raise argparse.ArgumentTypeError(f"a port is a number from 0 to 65535, not {text!r}")
-    return port

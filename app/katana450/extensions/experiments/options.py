@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
+from katana450.cli.option_values import add_server_options, speed
 from katana450.extensions.real_arm.plant.axis import PROFILES
 from katana450.resources import URDF_PATH
 
 DEMOS = ("circle", "pour")
 """Names of the scripts of the library that are the experiments of the paper."""
-
-URL = "http://127.0.0.1:8080"
-"""Default address of the server."""
 
 
 def add_run_options(parser: argparse.ArgumentParser) -> None:
@@ -41,24 +38,16 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         "--report", type=Path, metavar="DIR", help="write figures, measures and a table of the run"
     )
     parser.add_argument(
-        "--speed", type=_fraction, default=1.0, help="fraction of its own speed (default: 1)"
+        "--speed", type=speed, default=1.0, help="fraction of its own speed (default: 1)"
     )
     parser.add_argument(
         "--seed", type=int, default=0, help="seed of the paths round obstacles (default: 0)"
     )
-    parser.add_argument(
-        "--url",
-        default=URL,
-        help="address of the server (default: %(default)s); if none answers on this machine, "
-        "one is started",
-    )
+    add_server_options(parser, "; if none answers on this machine, one is started")
     parser.add_argument(
         "--unattended",
         action="store_true",
         help="let the program run on when this command is ended or loses its connection",
-    )
-    parser.add_argument(
-        "--token", default="", help="token of an access link, if the server needs one"
     )
     parser.add_argument(
         "--urdf", type=Path, default=URDF_PATH, metavar="FILE", help="another arm, for --headless"
@@ -76,23 +65,3 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         help="the scene in which it begins: a scene.yaml with its meshes beside it, or a .zip of "
         "both; for --headless, --dry-run, and a server that is started",
     )
-
-
-def _fraction(text: str) -> float:
-    # Imported here, because it loads numpy.
-    from katana450.arm.control.commands import MIN_SPEED
-
-    value = _number(text)
-    if not MIN_SPEED <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"expected a fraction from {MIN_SPEED} to 1, not {text!r}")
-    return value
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"expected a number, not {text!r}")
-    return value

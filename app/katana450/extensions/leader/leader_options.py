@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from katana450.cli.option_values import add_server_options
+
 
 def add_leader_options(parser: argparse.ArgumentParser) -> None:
     """Add port, calibration, layout, and the address and token of the server, to ``parser``."""
@@ -22,11 +24,4 @@ def add_leader_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="YAML file with the joints of another leader than the SO-101",
     )
-    parser.add_argument(
-        "--url",
-        default="http://127.0.0.1:8080",
-        help="address of the server (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--token", default="", help="token of an access link, if the server needs one"
-    )
+    add_server_options(parser)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from katana450.cli.arm_options import add_arm_options
+from katana450.cli.option_values import size
 from katana450.extensions.export.options import add_shown_options
 
 CAMERAS = ("free", "front", "side", "top", "tool")
@@ -27,7 +28,7 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--size",
-        type=_size,
+        type=size,
         default=(1280, 720),
         metavar="WxH",
         help="pixels (default: 1280x720)",
@@ -36,15 +37,3 @@ def add_render_options(parser: argparse.ArgumentParser) -> None:
         "--fps", type=float, default=25.0, help="pictures per second (default: %(default)g)"
     )
     add_arm_options(parser, tool=False)
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.split("x"))
-    except ValueError:
-        width = height = 0
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise argparse.ArgumentTypeError(
-            f"expected two numbers from 16 to 4096, such as 1280x720, not {text!r}"
-        )
-    return width, height

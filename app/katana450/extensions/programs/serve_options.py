@@ -5,7 +5,8 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
-from katana450.cli.serve_options import MIN_SILENCE, heartbeat_timeout
+from katana450.cli.option_values import number
+from katana450.cli.serve_options import MIN_SILENCE
 
 OWNER_SILENCE, LONGEST_OWNER_SILENCE = 1.0, 10.0
 """[s] Default and longest heartbeat timeout of a program's owner, after which the program ends."""
@@ -15,7 +16,7 @@ def add_serve_options(parser: ArgumentParser) -> None:
     """Add the options for programs to ``katana450 serve``."""
     parser.add_argument(
         "--owner-silence",
-        type=_owner_silence,
+        type=number(MIN_SILENCE, LONGEST_OWNER_SILENCE, "s"),
         default=OWNER_SILENCE,
         metavar="SECONDS",
         help="heartbeat timeout of a program's owner, after which the program ends "
@@ -32,7 +33,3 @@ def add_serve_options(parser: ArgumentParser) -> None:
         metavar="DIR",
         help="folder of scripts for the panel; taught scripts are saved there too",
     )
-
-
-def _owner_silence(text: str) -> float:
-    return heartbeat_timeout(text, LONGEST_OWNER_SILENCE)

@@ -6,11 +6,7 @@ import argparse
 import math
 from pathlib import Path
 
-URL = "http://127.0.0.1:8080"
-"""Default address of the server."""
-
-MIN_SPEED = 0.01
-"""[1] Smallest fraction of its speed at which a program runs."""
+from katana450.cli.option_values import add_server_options, number, size, speed
 
 FORMATS = {
     "csv": "t,theta1,...,gripper in s, rad and m, as `export html --trajectory` reads it",
@@ -26,9 +22,6 @@ OUTCOMES = ("success", "failure", "unjudged", "unfinished")
 
 VIEWS = ("free", "front", "side", "top", "tool")
 """Cameras, as `katana450 render` has them. Without that extension only pictures are missing."""
-
-MIN_SIDE, MAX_SIDE = 16, 4096
-"""[px] Range of width and height of pictures."""
 
 DEFAULT_SIZES = {"lerobot": (320, 240), "mp4": (1280, 720)}
 """Width and height of pictures [px] by format."""
@@ -68,7 +61,7 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
     )
     keep.add_argument(
         "--last",
-        type=_seconds,
+        type=number(0.0, unit="s"),
         default=math.inf,
         metavar="S",
         help="seconds before the end of the recording (default: all)",
@@ -97,12 +90,9 @@ def add_record_options(parser: argparse.ArgumentParser) -> None:
         "--out", type=Path, metavar="FILE", help="write the script instead of running it"
     )
     again.add_argument(
-        "--speed", type=_speed, default=1.0, help="fraction of the recorded speed (default: 1)"
+        "--speed", type=speed, default=1.0, help="fraction of the recorded speed (default: 1)"
     )
-    again.add_argument("--url", default=URL, help="address of the server (default: %(default)s)")
-    again.add_argument(
-        "--token", default="", help="token of an access link, if the server needs one"
-    )
+    add_server_options(again)
     _add_urdf_option(again)
     trim = acts.add_parser("trim", help="write a part of a recording, or join several")
     trim.add_argument("files", type=Path, nargs="+", metavar="FILE")
@@ -181,7 +171,7 @@ def _add_export_options(parser: argparse.ArgumentParser) -> None:
     )
     sizes = ", ".join(f"{w}x{h} for {name}" for name, (w, h) in DEFAULT_SIZES.items())
     parser.add_argument(
-        "--size", type=_size, metavar="WxH", help=f"pixels of pictures (default: {sizes})"
+        "--size", type=size, metavar="WxH", help=f"pixels of pictures (default: {sizes})"
     )
     rates = ", ".join(f"{fps} for {name}" for name, fps in DEFAULT_FPS.items())
     parser.add_argument(
@@ -199,7 +189,7 @@ def _add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False)
     parser.add_argument(
         "--from",
         dest="start",
-        type=_seconds,
+        type=number(0.0, unit="s"),
         default=None if episode else 0.0,
         metavar="S",
         help=f"start of the part, in seconds after the start of the recording (default: {whole})",
@@ -207,7 +197,7 @@ def _add_part_options(parser: argparse.ArgumentParser, *, episode: bool = False)
     parser.add_argument(
         "--to",
         dest="end",
-        type=_seconds,
+        type=number(0.0, unit="s"),
         default=None if episode else math.inf,
         metavar="S",
         help=f"end of the part, in seconds after the start of the recording (default: {whole})",
@@ -223,23 +213,6 @@ def _add_urdf_option(parser: argparse.ArgumentParser, use: str = "") -> None:
     )
 
 
-def _speed(text: str) -> float:
-    value = _seconds(text)
-    if not MIN_SPEED <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"a fraction from {MIN_SPEED:g} to 1, not {text!r}")
-    return value
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not value >= 0.0:
-        raise argparse.ArgumentTypeError(f"a number of seconds from 0, not {text!r}")
-    return value
-
-
 def _outcomes(text: str) -> tuple[str, ...]:
     outcomes = tuple(name.strip() for name in text.split(","))
     if not set(outcomes) <= set(OUTCOMES):
@@ -247,18 +220,6 @@ def _outcomes(text: str) -> tuple[str, ...]:
             f"expected some of {', '.join(OUTCOMES)}, separated by commas, not {text!r}"
         )
     return outcomes
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.split("x"))
-    except ValueError:
-        width = height = 0
-    if not (MIN_SIDE <= width <= MAX_SIDE and MIN_SIDE <= height <= MAX_SIDE):
-        raise argparse.ArgumentTypeError(
-            f"expected two numbers from {MIN_SIDE} to {MAX_SIDE}, such as 320x240, not {text!r}"
-        )
-    return width, height
 
 
 def _target(text: str) -> tuple[str, tuple[float, float, float]]:

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from katana450.cli.option_values import port
 from katana450.extras import require
 
 if TYPE_CHECKING:
@@ -28,17 +29,11 @@ def add_serve_options(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--foxglove",
-        type=_foxglove_port,
+        type=port,
         metavar="PORT",
         help="let Foxglove watch and stop the arm at this port, from this machine only and without "
         "an access link; needs the extra `foxglove`",
     )
-
-
-def _foxglove_port(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text) < 65536:
-        raise ArgumentTypeError(f"{text!r} is not a port")
-    return int(text)
 
 
 def _origin(text: str) -> str:
