@@ -463,7 +463,8 @@ class Arm:
 
         if what is not None and not isinstance(what, MotionPlan):
             self.chain.check_q(what)
-        viewer = Viewer(self, port, host)
+        parts = self.robot, self.session, self.standing, self.T_base_frame
+        viewer = Viewer(*parts, port, host)
         if isinstance(what, MotionPlan):
             viewer.play(what)
         elif what is not None:

@@ -16,12 +16,14 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from katana450.arm.control.session import Session
+from katana450.arm.control.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
+from katana450.arm.robot.robot import Robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.conduit.rings import ConduitLayer
 from katana450.extensions.water import WaterLayer
-from katana450.library.arm import Arm
 from katana450.library.motion_plan import MotionPlan
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.view.controls import NoGestures
@@ -46,12 +48,28 @@ class Viewer:
     nothing in it moves a simulated or real arm.
     """
 
-    def __init__(self, arm: Arm, port: int, host: str) -> None:
-        """Serve a scene of ``arm`` at ``host``, on ``port`` or the next free one above it.
+    def __init__(
+        self,
+        robot: Robot,
+        session: Session,
+        standing: Callable[[npt.ArrayLike], State],
+        T_base_frame: FloatArray,
+        port: int,
+        host: str,
+    ) -> None:
+        """Serve a scene of ``robot`` at ``host``, on ``port`` or the next free one above it.
+
+        Args:
+            robot: the arm and its shapes.
+            session: the rules of its motion.
+            standing: returns the state in which it stands at joint angles (n,) [rad].
+            T_base_frame: (4, 4) maps coordinates of the frame of poses into the base [m].
+            port: TCP port.
+            host: address.
 
         Raises ConfigurationError if no port can be opened.
         """
-        self._arm = arm
+        self._standing, self._T_base_frame = standing, T_base_frame
         try:
             with contextlib.redirect_stdout(io.StringIO()):
                 self._server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -64,7 +82,7 @@ class Viewer:
         look = CAMERA_POSES[Preset.FREE]
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.fov = look.position, look.target, FOV
-        parts = (self._server, arm.robot, arm.session, load_props(), NoGestures(), Meshes())
+        parts = (self._server, robot, session, load_props(), NoGestures(), Meshes())
         self._scenery = Scenery(*parts, layers=(ConduitLayer(), WaterLayer()))
         self._path = scene.add_line_segments(
             "/path", np.zeros((1, 2, 3), np.float32), PATH_COLOUR, thickness=0.003, visible=False
@@ -72,7 +90,7 @@ class Viewer:
         self._player: threading.Thread | None = None
         self._stopped = threading.Event()
         self._closed = threading.Event()
-        self._show(arm.ready)
+        self._show(session.ready)
         # Runs before viser's own exit handler, so that the player never uses a stopped server.
         atexit.register(self.close)
 
@@ -81,7 +99,7 @@ class Viewer:
 
         Raises InputError if ``q`` is not n finite angles.
         """
-        state = self._arm.standing(q)
+        state = self._standing(q)
         self.pause()
         self._scenery.show(state)
 
@@ -93,20 +111,16 @@ class Viewer:
         if not (np.isfinite(speed) and speed > 0.0):
             raise InputError(f"The speed is {speed!r}; give a number above 0.")
         samples = plan.sample(max(FRAME_TIME * speed, plan.duration / 100_000))
-        T_base_frame = self._arm.T_base_frame
+        T_base_frame = self._T_base_frame
         points = plan.sample(plan.duration / PATH_POINTS).points
         points = points @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
-        self._play(samples.t / speed, points, lambda number: self._show(samples.q[number]))
-
-    def _play(self, t: FloatArray, points: FloatArray, show: Callable[[int], None]) -> None:
-        """Draw a path through ``points`` (k, 3) [m] and ``show`` each frame at its time ``t``."""
         self.pause()
         self._path.points = np.stack((points[:-1], points[1:]), axis=1).astype(np.float32)
         self._path.visible = True
         self._stopped = threading.Event()
         self._player = threading.Thread(
             target=self._run,
-            args=(t, show, self._stopped),
+            args=(samples.t / speed, samples.q, self._stopped),
             name="katana450 viewer",
             daemon=True,
         )
@@ -156,14 +170,15 @@ class Viewer:
         source = html.escape(self.url)
         return f'<iframe src="{source}" width="100%" height="480" frameborder="0"></iframe>'
 
-    def _run(self, t: FloatArray, show: Callable[[int], None], stopped: threading.Event) -> None:
+    def _run(self, t: FloatArray, q: FloatArray, stopped: threading.Event) -> None:
+        """Show the postures ``q`` (N, n) [rad] at their times ``t`` (N,) [s] until ``stopped``."""
         while not stopped.is_set():
             started = time.monotonic()
             passed = 0.0
             while passed < t[-1] and not stopped.wait(FRAME_TIME):
                 passed = time.monotonic() - started
-                show(min(int(np.searchsorted(t, passed)), len(t) - 1))
+                self._show(q[min(int(np.searchsorted(t, passed)), len(t) - 1)])
             stopped.wait(PAUSE)
 
     def _show(self, q: FloatArray) -> None:
-        self._scenery.show(self._arm.standing(q))
+        self._scenery.show(self._standing(q))
