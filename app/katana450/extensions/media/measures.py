@@ -238,11 +238,6 @@ def _maximum(values: FloatArray) -> float | None:
 FLOW_TICKS = 10
 """Number of ticks over which the flow is averaged."""
 
-COLUMNS = (
-    "cup_ml", "film_ml", "basin_ml", "air_ml", "spilled_ml", "cup_tilt_deg", "lip_above_water_mm",
-)  # fmt: skip
-"""Columns of the water in the table of a run."""
-
 
 @dataclass(frozen=True, eq=False)
 class PourRecord:
@@ -285,22 +280,22 @@ class PourRecord:
         # The filling of the cup is no flow.
         return np.maximum(np.nan_to_num(rate), 0.0)
 
-    def cells(self, tick: int) -> list[str]:
-        """Return the values of COLUMNS at ``tick`` as text; what is not known is empty."""
-        values = (
-            self.cup[tick],
-            self.film[tick],
-            self.basin[tick],
-            self.air[tick],
-            self.spilled[tick],
-            math.degrees(self.tilt[tick]),
-            1e3 * self.lip[tick],
-        )
-        return ["" if math.isnan(value) else repr(float(value)) for value in values]
+    @property
+    def columns(self) -> dict[str, FloatArray]:
+        """The columns (N,) of the water in the table of a run, by their names."""
+        return {
+            "cup_ml": self.cup,
+            "film_ml": self.film,
+            "basin_ml": self.basin,
+            "air_ml": self.air,
+            "spilled_ml": self.spilled,
+            "cup_tilt_deg": np.degrees(self.tilt),
+            "lip_above_water_mm": 1e3 * self.lip,
+        }
 
 
 def _row(poured: MotionWithWater | None) -> tuple[float, ...]:
-    """Return the volumes of ``COLUMNS`` [ml] and the tilt [rad]."""
+    """Return the five volumes [ml] and the tilt [rad] of `PourRecord`."""
     if poured is None:
         return (math.nan,) * 6
     water = poured.water

@@ -7,7 +7,8 @@ import csv
 import html
 import io
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -22,7 +23,6 @@ from katana450.errors import InputError
 from katana450.extensions.media import figures
 from katana450.extensions.media.figures import measured_figure
 from katana450.extensions.media.measures import (
-    COLUMNS,
     Bound,
     PourRecord,
     alongs,
@@ -35,7 +35,6 @@ from katana450.extensions.programs.run.simulation import Trace
 from katana450.extensions.programs.script.measures import MEASURES, title_of, unit_of
 from katana450.extensions.programs.script.script import Script
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 
 NONE: Mapping[str, bytes] = {}
@@ -152,46 +151,43 @@ class Report:
     def csv(self) -> str:
         """Return one row per tick: time, step, line, task, joints, speeds, fingers, tool, path.
 
-        With water also COLUMNS; with a measured arm its joints and tool. Each number has all its
-        digits, so that reading gives the same.
+        With water also the columns of `PourRecord`; with a measured arm its joints and tool. Each
+        number has all its digits, so that reading gives the same.
         """
-        n = self.arm.chain.n
+        trace, pour = self.trace, self._pour
+        tasks = [self.program.tasks[number] for number in trace.task.tolist()]
+        slides = self.arm.gripper.slides
+        columns: dict[str, Iterable[Any]] = {
+            "t_s": trace.t,
+            "step": [task.number + 1 for task in tasks],
+            "line": [task.line for task in tasks],
+            "task": [task.name for task in tasks],
+            **_of_joints(trace.q, "theta{}_deg"),
+            **_of_joints(trace.qd, "theta{}_deg_s"),
+            "fingers_mm" if slides else "fingers_deg": (
+                1e3 * trace.fingers if slides else np.degrees(trace.fingers)
+            ),
+            "tool": trace.tools,
+            **self._of_tool(trace.q, ""),
+            "path_fraction": trace.sigma,
+            **({} if pour is None else pour.columns),
+        }
+        if trace.measured is not None:
+            columns |= _of_joints(trace.measured, "measured_theta{}_deg")
+            columns |= self._of_tool(trace.measured, "measured_")
         file = io.StringIO()
         rows = csv.writer(file, lineterminator="\n")
-        heads = ["t_s", "step", "line", "task"]
-        heads += [f"theta{axis}_deg" for axis in range(1, n + 1)]
-        heads += [f"theta{axis}_deg_s" for axis in range(1, n + 1)]
-        slides = self.arm.gripper.slides
-        heads.append("fingers_mm" if slides else "fingers_deg")
-        trace = self.trace
-        pour, measured = self._pour, trace.measured
-        more = list(() if pour is None else COLUMNS)
-        if measured is not None:
-            more += [f"measured_theta{axis}_deg" for axis in range(1, n + 1)]
-            more += ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
-        rows.writerow([*heads, "tool", "x_mm", "y_mm", "z_mm", "path_fraction", *more])
-        for tick in range(len(trace.t)):
-            task = self.program.tasks[int(trace.task[tick])]
-            numbers = [*np.degrees(trace.q[tick]), *np.degrees(trace.qd[tick])]
-            fingers = trace.fingers[tick]
-            numbers.append(float(1e3 * fingers if slides else np.degrees(fingers)))
-            chain = self.arm.chain_to(trace.tools[tick])
-            point = 1e3 * forward(chain, trace.q[tick])[:3, 3]
-            rows.writerow(
-                [
-                    repr(float(trace.t[tick])),
-                    task.number + 1,
-                    task.line,
-                    task.name,
-                    *(repr(float(value)) for value in numbers),
-                    trace.tools[tick],
-                    *(repr(float(value)) for value in point),
-                    repr(float(trace.sigma[tick])),
-                    *(() if pour is None else pour.cells(tick)),
-                    *(() if measured is None else _measured_cells(chain, measured[tick])),
-                ]
-            )
+        rows.writerow(columns)
+        for row in zip(*columns.values(), strict=True):
+            rows.writerow(map(_cell, row))
         return file.getvalue()
+
+    def _of_tool(self, q: FloatArray, prefix: str) -> dict[str, FloatArray]:
+        """Return the columns of the tool point at ``q`` (N, n) [rad]."""
+        chains = map(self.arm.chain_to, self.trace.tools)
+        points = [1e3 * forward(chain, row)[:3, 3] for chain, row in zip(chains, q, strict=True)]
+        x, y, z = np.transpose(points)
+        return {f"{prefix}x_mm": x, f"{prefix}y_mm": y, f"{prefix}z_mm": z}
 
     def write(
         self, directory: Path, written: datetime, pictures: Mapping[str, bytes] = NONE
@@ -359,9 +355,16 @@ footer {{ margin-top: 2rem; color: var(--soft); font-size: .85rem; }}
 """Template of the HTML page."""
 
 
-def _measured_cells(chain: Chain, q: FloatArray) -> list[str]:
-    numbers = [*np.degrees(q), *(1e3 * forward(chain, q)[:3, 3])]
-    return [repr(float(number)) for number in numbers]
+def _of_joints(values: FloatArray, name: str) -> dict[str, FloatArray]:
+    """Return the columns of ``values`` (N, n) [rad], in degrees, by ``name`` with the axis."""
+    return {name.format(axis): np.degrees(row) for axis, row in enumerate(values.T, 1)}
+
+
+def _cell(value: Any) -> Any:
+    """Return ``value`` for a table: all digits of a number, and nothing for an unknown one."""
+    if not isinstance(value, float):
+        return value
+    return "" if math.isnan(value) else repr(float(value))
 
 
 def _rows(values: Mapping[str, float | None]) -> str:

@@ -193,35 +193,35 @@ class ServoStream:
         pitched = None
         if mounted.kinematics_to(state.tool).freedoms == 5:
             pitched = pitched_frame(mounted.chain_to(state.tool), state.q)
-        self._tool(tool_rates(message.twist, R, pitched))
+        self._drive(ServoMotion.TOOL, tool_rates(message.twist, R, pitched))
 
     def jog(self, message: JointJog) -> None:
         """Move joints. Raises KatanaError if that is refused."""
         check_fresh(message.header, time.time())
         names = axis_names(self._hub.present().robot)
-        self._joints(joint_rates(message, names))
+        self._drive(ServoMotion.JOINTS, joint_rates(message, names))
 
-    def _tool(self, rates: FloatArray) -> None:
-        """Move the tool at ``rates``, see ``requests.Jog``. Raises KatanaError if refused."""
-        self._received()
-        if not rates.any():
-            self._end(ServoMotion.TOOL)
-            return
-        self._begin(ServoMotion.TOOL)
-        self._rates = rates
-        self._send(requests.Jog(rates=rates, revocations=self._revocations))
+    def _drive(self, motion: ServoMotion, rates: FloatArray) -> None:
+        """Move the tool at ``rates`` as `requests.Jog`, or the joints [rad/s or m/s].
 
-    def _joints(self, rates: FloatArray) -> None:
-        """Move the joints at ``rates`` (n,) [rad/s]. Raises KatanaError if refused."""
-        self._received()
+        Raises KatanaError if that is refused.
+        """
+        t = self._hub.clock()
+        if t - self._last > STREAM_GAP:
+            self._revocations = self._hub.gate.revocations
+        self._last = t
         if not rates.any():
-            self._end(ServoMotion.JOINTS)
+            self._end(motion)
             return
-        if self._motion is not ServoMotion.JOINTS:
-            self._begin(ServoMotion.JOINTS)
-            self._q, self._t = self._hub.present().state.setpoint.copy(), self._hub.clock()
+        if self._motion is not motion:
+            self._end(self._motion)
+            self._motion = motion
+            self._q, self._t = self._hub.present().state.setpoint.copy(), t
         self._rates = rates
-        self._follow()
+        if motion is ServoMotion.TOOL:
+            self._send(requests.Jog(rates=rates, revocations=self._revocations))
+        else:
+            self._follow()
 
     def tick(self) -> None:
         """Continue, or end the motion if the newest command is too old.
@@ -234,18 +234,6 @@ class ServoStream:
             self._end(self._motion)
         elif self._motion is ServoMotion.JOINTS:
             self._follow()
-
-    def _received(self) -> None:
-        """Note that a command was received now."""
-        t = self._hub.clock()
-        if t - self._last > STREAM_GAP:
-            self._revocations = self._hub.gate.revocations
-        self._last = t
-
-    def _begin(self, motion: ServoMotion) -> None:
-        if self._motion is not motion:
-            self._end(self._motion)
-        self._motion = motion
 
     def _follow(self) -> None:
         """Send the angles at which the joints should be now."""
