@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass, replace
-from typing import Annotated, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
@@ -50,23 +50,29 @@ class Bounded(Declared):
 
 
 class Condition(Declared):
-    """A condition on the measured state of an arm and its surroundings."""
+    """A condition on the measured state of an arm and its surroundings, or on the time.
+
+    Attributes:
+        phrase: template of the words for what is measured, with the condition as ``{0}``.
+    """
+
+    phrase: ClassVar[str]
 
     @property
-    @abstractmethod
     def words(self) -> str:
         """Words for what is measured, as in "if cup in the hand"."""
+        return self.phrase.format(self)
 
-    @abstractmethod
-    def checked(self, plan: PlanState) -> Self:
+    def checked(self, plan: PlanState) -> Self:  # noqa: ARG002
         """Return the condition for the arm of ``plan``.
 
         Raises InputError if it can never hold for that arm.
         """
+        return self
 
     @abstractmethod
-    def holds(self, state: State) -> bool:
-        """Return whether it holds in ``state``."""
+    def holds(self, state: State, elapsed: float) -> bool:
+        """Return whether it holds in ``state``, ``elapsed`` [s] after the program began."""
 
 
 @dataclass(frozen=True)
@@ -74,20 +80,16 @@ class Held(Condition):
     """The fingers hold this object."""
 
     short = "name"
+    phrase = "{0.name} in the hand"
 
     name: ObjectName
-
-    @property
-    def words(self) -> str:
-        """Words for what is measured."""
-        return f"{self.name} in the hand"
 
     def checked(self, plan: PlanState) -> Self:
         """Return itself. Raises InputError without such an object."""
         plan.scene_object(self.name)
         return self
 
-    def holds(self, state: State) -> bool:
+    def holds(self, state: State, elapsed: float) -> bool:  # noqa: ARG002
         """Return whether the fingers hold the object."""
         scene_object = named(state.objects, self.name)
         return scene_object is not None and scene_object.held
@@ -105,16 +107,12 @@ class Placed(Condition):
     """
 
     noun = "placed"
+    phrase = "{0.name} at its place"
 
     name: Object
     at: Point
     within: Annotated[float, millimetres(0.1, 1000.0, "Distance, mm; 10 unless given")] = 0.01
     in_base: bool = False
-
-    @property
-    def words(self) -> str:
-        """Words for what is measured."""
-        return f"{self.name} at its place"
 
     def checked(self, plan: PlanState) -> Self:
         """Return the condition in the base frame. Raises InputError without such an object."""
@@ -124,7 +122,7 @@ class Placed(Condition):
         T = plan.plan_context.T_base_shoulder
         return replace(self, at=frozen(T[:3, :3] @ self.at + T[:3, 3]), in_base=True)
 
-    def holds(self, state: State) -> bool:
+    def holds(self, state: State, elapsed: float) -> bool:  # noqa: ARG002
         """Return whether the object stands there; an object in the hand stands nowhere."""
         scene_object = named(state.objects, self.name)
         if scene_object is None or scene_object.carried:
@@ -137,15 +135,11 @@ class Volume(Bounded, Condition):
     """Water in the cup, the basin or another vessel, ml."""
 
     noun = "a volume"
+    phrase = "the water in the {0.of}"
 
     of: ObjectName
     at_least: Millilitres = -math.inf
     at_most: Millilitres = math.inf
-
-    @property
-    def words(self) -> str:
-        """Words for what is measured."""
-        return f"the water in the {self.of}"
 
     def checked(self, plan: PlanState) -> Self:
         """Return itself. Raises InputError without water, and for another object."""
@@ -157,7 +151,7 @@ class Volume(Bounded, Condition):
             )
         return self
 
-    def holds(self, state: State) -> bool:
+    def holds(self, state: State, elapsed: float) -> bool:  # noqa: ARG002
         """Return whether the volume is within the bounds."""
         if state.poured is None:
             return False
@@ -176,14 +170,10 @@ class FingerPlace(Bounded, Condition):
     """
 
     noun = "a gripper"
+    phrase = "the gripper"
 
     at_least: FingerBound = -math.inf
     at_most: FingerBound = math.inf
-
-    @property
-    def words(self) -> str:
-        """Words for what is measured."""
-        return "the gripper"
 
     def checked(self, plan: PlanState) -> Self:
         """Return the condition in rad or m. Raises InputError for an arm without fingers."""
@@ -193,28 +183,27 @@ class FingerPlace(Bounded, Condition):
         scale = 1e-3 if fingers.slides else math.radians(1.0)
         return replace(self, at_least=scale * self.at_least, at_most=scale * self.at_most)
 
-    def holds(self, state: State) -> bool:
+    def holds(self, state: State, elapsed: float) -> bool:  # noqa: ARG002
         """Return whether the fingers are within the bounds."""
         return self.has(state.gripper)
 
 
 @dataclass(frozen=True)
-class ProgramTime(Bounded):
+class ProgramTime(Bounded, Condition):
     """Time since the program began, with pauses, s."""
 
     noun = "a time"
+    phrase = "the time"
 
     at_least: Seconds = -math.inf
     at_most: Seconds = math.inf
 
-    @property
-    def words(self) -> str:
-        """Words for what is measured."""
-        return "the time"
+    def holds(self, state: State, elapsed: float) -> bool:  # noqa: ARG002
+        """Return whether the time is within the bounds."""
+        return self.has(elapsed)
 
 
-Choice = Condition | ProgramTime
-CONDITIONS: dict[str, Kind[Choice]] = {
+CONDITIONS: dict[str, Kind[Condition]] = {
     "held": record(Held),
     "placed": record(Placed),
     "volume": record(Volume),
@@ -223,5 +212,5 @@ CONDITIONS: dict[str, Kind[Choice]] = {
 }
 """The conditions, by their names in a script."""
 
-CHOICE: Group[Choice | None] = one_of({name: bound(kind) for name, kind in CONDITIONS.items()})
+CHOICE: Group[Condition | None] = one_of({name: bound(kind) for name, kind in CONDITIONS.items()})
 """One condition of an ``if``, in which names may stand for values."""

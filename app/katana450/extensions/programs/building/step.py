@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from katana450.extensions.programs.building.conditions import Condition, ProgramTime
+from katana450.extensions.programs.building.conditions import Condition
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared
 
@@ -41,7 +41,7 @@ class Conditional:
         otherwise: the steps if it does not; may be empty.
     """
 
-    condition: Condition | ProgramTime
+    condition: Condition
     then: tuple[LocatedStep, ...]
     otherwise: tuple[LocatedStep, ...]
 

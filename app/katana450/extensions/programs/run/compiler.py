@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.messages import part
-from katana450.arm.control.state import State
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, SetSpeed, Task
 from katana450.extensions.programs.building.conditions import Condition, Held, ProgramTime
@@ -47,16 +46,10 @@ class ConditionalJump(Action):
         then, otherwise: index of the task that follows if it holds, and if it does not.
     """
 
-    condition: Condition | ProgramTime
+    condition: Condition
     predicted: bool | None
     then: int
     otherwise: int
-
-    def holds(self, state: State, elapsed: float) -> bool:
-        """Return whether the condition holds, ``elapsed`` [s] after the program began."""
-        if isinstance(self.condition, ProgramTime):
-            return self.condition.has(elapsed)
-        return self.condition.holds(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +84,7 @@ class PlannedChoice:
 
     number: int
     located: LocatedStep
-    condition: Condition | ProgramTime
+    condition: Condition
     predicted: bool | None
     then: PlannedSteps
     otherwise: PlannedSteps
@@ -102,69 +95,8 @@ PlannedSteps = Sequence[PlannedStep | PlannedChoice]
 """Steps in their order; what follows the last one is the end, or what follows the ``if``."""
 
 
-AFTER, THEN, OTHERWISE = "after", "then", "otherwise"
-"""The ends of a task that lead to another one."""
-
-
 TimedActions = Callable[[PlannedStep], Iterable[tuple[str, Action]]]
 """A function that returns the actions of a step with all paths timed. It raises ScriptError."""
-
-
-class _Exit(NamedTuple):
-    """An end of a task whose next task is not known yet."""
-
-    task: int
-    end: str
-
-
-class _TaskList:
-    """The tasks so far, and the next tasks of their ends."""
-
-    def __init__(self, first: int, timed: TimedActions) -> None:
-        self.tasks: list[Task] = [Task(first, 1, "speed", SetSpeed(1.0))]
-        self._timed = timed
-        self.next: dict[_Exit, int] = {}
-
-    def add(self, task: Task, exits: Sequence[_Exit]) -> int:
-        """Append ``task``, to which ``exits`` lead, and return its index."""
-        self.join(exits)
-        self.tasks.append(task)
-        return len(self.tasks) - 1
-
-    def join(self, exits: Sequence[_Exit]) -> None:
-        """Let ``exits`` lead to the task that is appended next."""
-        self.next.update(dict.fromkeys(exits, len(self.tasks)))
-
-    def add_steps(self, steps: PlannedSteps, exits: Sequence[_Exit]) -> Sequence[_Exit]:
-        """Append the tasks of ``steps``, to which ``exits`` lead, and return the exits of these."""
-        for step in steps:
-            if isinstance(step, PlannedStep):
-                for name, action in self._timed(step):
-                    task = Task(step.number, step.located.line, name, action)
-                    exits = (_Exit(self.add(task, exits), AFTER),)
-            else:
-                exits = self._add_choice(step, exits)
-        return exits
-
-    def _add_choice(self, step: PlannedChoice, exits: Sequence[_Exit]) -> Sequence[_Exit]:
-        jump = ConditionalJump(step.condition, step.predicted, 0, 0)
-        name = f"if {step.condition.words}"
-        index = self.add(Task(step.number, step.located.line, name, jump), exits)
-        then = self.add_steps(step.then, (_Exit(index, THEN),))
-        return (*then, *self.add_steps(step.otherwise, (_Exit(index, OTHERWISE),)))
-
-    def linked(self) -> tuple[Task, ...]:
-        """Return the tasks with the indices of those that follow."""
-        tasks = []
-        for number, task in enumerate(self.tasks):
-            action = task.action
-            if isinstance(action, ConditionalJump):
-                then, otherwise = (self.next[_Exit(number, end)] for end in (THEN, OTHERWISE))
-                tasks.append(replace(task, action=replace(action, then=then, otherwise=otherwise)))
-            else:
-                after = self.next[_Exit(number, AFTER)]
-                tasks.append(task if after == number + 1 else replace(task, after=after))
-        return tuple(tasks)
 
 
 def task_list(steps: PlannedSteps, timed: TimedActions) -> tuple[Task, ...]:
@@ -172,9 +104,46 @@ def task_list(steps: PlannedSteps, timed: TimedActions) -> tuple[Task, ...]:
 
     A task leads only to later ones. The number of tasks stands for the end.
     """
-    tasks = _TaskList(steps[0].number, timed)
-    tasks.join(tasks.add_steps(steps, (_Exit(0, AFTER),)))
-    return tasks.linked()
+    first = Task(steps[0].number, 1, "speed", SetSpeed(1.0))
+    return (first, *_tasks(steps, 1, 1 + _task_count(steps), timed))
+
+
+def _tasks(steps: PlannedSteps, number: int, following: int, timed: TimedActions) -> Iterator[Task]:
+    """Yield the tasks of ``steps``, the first with the index ``number``.
+
+    ``following``: index of the task that follows the last one.
+    """
+    steps = [step for step in steps if _task_count((step,))]
+    for step in steps:
+        end = number + _task_count((step,))
+        after = following if step is steps[-1] else end
+        line = step.located.line
+        if isinstance(step, PlannedChoice):
+            otherwise = number + 1 + _task_count(step.then)
+            jump = ConditionalJump(
+                step.condition,
+                step.predicted,
+                number + 1 if _task_count(step.then) else after,
+                otherwise if _task_count(step.otherwise) else after,
+            )
+            yield Task(step.number, line, f"if {step.condition.words}", jump)
+            yield from _tasks(step.then, number + 1, after, timed)
+            yield from _tasks(step.otherwise, otherwise, after, timed)
+        else:
+            for index, (name, action) in enumerate(timed(step), number + 1):
+                leaps = index == end and after != end
+                yield Task(step.number, line, name, action, after if leaps else None)
+        number = end
+
+
+def _task_count(steps: PlannedSteps) -> int:
+    """Return the number of the tasks of ``steps``, with those of all alternatives."""
+    return sum(
+        1 + _task_count(step.then) + _task_count(step.otherwise)
+        if isinstance(step, PlannedChoice)
+        else len(step.actions)
+        for step in steps
+    )
 
 
 FINDING, TIMING = "finding paths", "timing paths"
@@ -339,14 +308,12 @@ class Compiler:
         copies: int,
     ) -> tuple[PlannedChoice, tuple[PlanState, ...]]:
         """Plan both alternatives of an ``if``, and steps of ``rest`` in each until they agree."""
-        condition: Condition | ProgramTime = step.condition
-        predicted = None
-        if not isinstance(condition, ProgramTime):
-            try:
-                condition = condition.checked(plan)
-            except InputError as error:
-                raise _at(located, error) from error
-            predicted = condition.holds(plan.state)
+        try:
+            condition = step.condition.checked(plan)
+        except InputError as error:
+            raise _at(located, error) from error
+        unknown = isinstance(condition, ProgramTime)
+        predicted = None if unknown else condition.holds(plan.state, 0.0)
         alternatives = (
             list(numbered(step.then, number + 1)),
             list(numbered(step.otherwise, number + 1 + count(step.then))),

@@ -93,7 +93,7 @@ class Program:
         """
         action = self.tasks[number].action
         if isinstance(action, ConditionalJump):
-            return action.then if action.holds(state, elapsed) else action.otherwise
+            return action.then if action.condition.holds(state, elapsed) else action.otherwise
         return self.next(number)[0]
 
     @cached_property

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from katana450.extensions.programs.building.conditions import CHOICE, Choice
+from katana450.extensions.programs.building.conditions import CHOICE, Condition
 from katana450.extensions.programs.building.step import Conditional, LocatedStep, Step, count
 from katana450.extensions.programs.language.declaration import (
     Declared,
@@ -124,7 +124,7 @@ class Until(Declared):
 
     noun = "an until"
 
-    condition: Annotated[Choice, CHOICE]
+    condition: Annotated[Condition, CHOICE]
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ class If(StepBlock):
 
     noun = "an if"
 
-    condition: Annotated[Choice, CHOICE]
+    condition: Annotated[Condition, CHOICE]
     then: Annotated[tuple[LocatedStep, ...], INNER_STEPS.about("Steps if the condition holds")]
     otherwise: Annotated[
         tuple[LocatedStep, ...], INNER_STEPS.about("Steps if it does not hold").named("else")
