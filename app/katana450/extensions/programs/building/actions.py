@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.following import Following
-from katana450.arm.control.scene_objects import SceneObject
 from katana450.arm.control.state import Reason, State
 from katana450.errors import InputError
 from katana450.maths.planning.plan import Plan
-from katana450.maths.water.units import ML
 
 ACTION_TIMEOUT = 10.0
 """[s] Timeout of a finger motion, and of an arm that is blocked."""
@@ -110,36 +109,25 @@ class MoveFingers(Action):
         return True
 
 
-@dataclass(frozen=True)
-class FillCup(Action):
-    """Fill the cup with ``volume`` [m^3] of water."""
-
-    volume: float
-
-    def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
-        """Return the command that fills the cup."""
-        return (cmd.Fill(self.volume / ML),)
-
-    def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
-        """Return True. Raises InputError if there is no cup."""
-        if state.poured is None:
-            raise InputError("There is no cup to fill.")
-        return True
-
-
 @dataclass(frozen=True, eq=False)
-class PutObject(Action):
-    """Place ``scene_object`` at its pose."""
+class GiveCommand(Action):
+    """Give one command, and wait for its effect.
 
-    scene_object: SceneObject
+    Attributes:
+        command: the command.
+        has_effect: whether a state shows the effect. It raises InputError if there can be none.
+    """
+
+    command: cmd.Command
+    has_effect: Callable[[State], bool]
 
     def commands(self, speed: float) -> tuple[cmd.Command, ...]:  # noqa: ARG002
-        """Return the command that places the object."""
-        return (cmd.PlaceObject(self.scene_object),)
+        """Return the command."""
+        return (self.command,)
 
     def done(self, state: State, waited: float) -> bool:  # noqa: ARG002
-        """Return whether an object has the requested pose."""
-        return any(np.array_equal(other.T, self.scene_object.T) for other in state.objects)
+        """Return whether the effect is there."""
+        return self.has_effect(state)
 
 
 @dataclass(frozen=True)

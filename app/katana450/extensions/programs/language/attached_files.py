@@ -7,6 +7,7 @@ all lines keep their numbers.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -123,13 +124,5 @@ def _root(text: str) -> Any:
 
 def _quoted(text: str) -> str:
     """Return ``text`` in quotes, on one line, as YAML reads it."""
-    shown = (
-        character if " " <= character <= "~" and character not in '"\\' else _escape(character)
-        for character in text
-    )
-    return f'"{"".join(shown)}"'
-
-
-def _escape(character: str) -> str:
-    simple = {"\n": "\\n", "\t": "\\t", '"': '\\"', "\\": "\\\\"}
-    return simple.get(character) or f"\\U{ord(character):08x}"
+    quoted: str = yaml.safe_dump(text, default_style='"', width=math.inf)
+    return quoted.rstrip("\n")

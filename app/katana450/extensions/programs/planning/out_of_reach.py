@@ -159,14 +159,6 @@ def unfollowed(
     """
     if isinstance(refused, BlockedError) or not isinstance(refused, PathError):
         return refused
-    text = refused.text + farthest(planning, q, curve, branch, frame)
-    return PathError(text, refused.point, parts=refused.parts)
-
-
-def farthest(
-    planning: ToolPlanning, q: FloatArray, curve: Curve, branch: AnyBranch, frame: ScriptFrame
-) -> str:
-    """Return a sentence on the place of ``curve`` that is farthest out of reach, or ""."""
     worst: tuple[float, NearestPlace] | None = None
     for sigma in np.linspace(0.0, 1.0, SAMPLES).tolist():
         checkpoint()
@@ -179,11 +171,13 @@ def farthest(
     sigma, place = worst
     missed = place.projection.position_error
     if missed <= _smallest(place.target):
-        return ""
-    return (
-        f" Farthest out of reach is {frame.words(place.target.position)}, {100.0 * sigma:.0f} % "
-        f"along it: {millimetres(missed)}, because {binding(planning, place)}."
+        return refused
+    text = (
+        f"{refused.text} Farthest out of reach is {frame.words(place.target.position)}, "
+        f"{100.0 * sigma:.0f} % along it: {millimetres(missed)}, "
+        f"because {binding(planning, place)}."
     )
+    return PathError(text, refused.point, parts=refused.parts)
 
 
 def binding(planning: ToolPlanning, nearest: NearestPlace) -> str:

@@ -92,8 +92,7 @@ class GhostScene:
 
     def hide(self) -> None:
         """Hide all ghosts."""
-        for frame, _ in self._shapes.values():
-            frame.visible = False
+        self.place(())
         if self._water is not None:
             self._water.hide()
 

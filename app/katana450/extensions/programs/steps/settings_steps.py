@@ -11,13 +11,13 @@ from katana450 import tolerances
 from katana450.arm.control import commands as cmd
 from katana450.arm.control.commands import MIN_SPEED
 from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state import State
 from katana450.arm.control.support import check_carried
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
 from katana450.extensions.programs.building.actions import (
-    FillCup,
+    GiveCommand,
     MoveFingers,
-    PutObject,
     SetSpeed,
     UseTool,
     Wait,
@@ -162,8 +162,15 @@ class Fill(Step, word="fill"):
         """Append the filling. Raises InputError if the cup is absent or too small."""
         command = cmd.Fill(self.water / ML)
         plan.plan_context.session.check(command)
-        filled = FillCup(self.water)
+        filled = GiveCommand(command, _has_cup)
         return plan.with_action("fill", filled, plan.after(command, ticks=1))
+
+
+def _has_cup(state: State) -> bool:
+    """Return True. Raises InputError without a cup."""
+    if state.poured is None:
+        raise InputError("There is no cup to fill.")
+    return True
 
 
 @dataclass(frozen=True)
@@ -190,9 +197,11 @@ class Put(Step, word="put"):
         for other in plan.state.objects:
             if other.name != scene_object.name and _overlap(put, other):
                 raise InputError(f"{self.name} would stand in {other.name}.")
-        return plan.with_action(
-            f"put {self.name}", PutObject(put), plan.after(cmd.PlaceObject(put), ticks=1)
+        command = cmd.PlaceObject(put)
+        placed = GiveCommand(
+            command, lambda state: any(np.array_equal(other.T, T) for other in state.objects)
         )
+        return plan.with_action(f"put {self.name}", placed, plan.after(command, ticks=1))
 
 
 def _overlap(one: SceneObject, other: SceneObject) -> bool:
