@@ -245,6 +245,7 @@ def test_names_do_not_depend_on_the_directions_of_the_axes_in_the_file(name: str
         assert name_of(turned, signs * q) == name_of(chain, q)
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("name", ARMS)
 def test_solution_of_each_branch_looks_as_its_name_says(name: str) -> None:
     chain = ARMS[name]

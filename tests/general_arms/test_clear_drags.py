@@ -120,6 +120,7 @@ SPEED, TICKS = 0.05, 80
 ARMS = {**FOUR, "UR5e": UR5E, "Panda": PANDA}
 
 
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("direction", [(0.0, 1.0, 0.0), (0.0, 0.0, -1.0)], ids=["y", "down"])
 @pytest.mark.parametrize("chain", [pytest.param(c, id=name) for name, c in ARMS.items()])
 def test_tool_stays_on_its_line_and_keeps_its_orientation(

@@ -105,6 +105,7 @@ def test_every_posture_is_found_again(name: str) -> None:
     check(chain, rng.uniform(chain.lower, chain.upper, (RANDOM, chain.n)))
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("name", KINDS)
 def test_postures_at_and_near_singularities_are_found_again(name: str) -> None:
     chain, function = KINDS[name]
@@ -173,6 +174,7 @@ def test_many_poses_with_a_wrist_in_line_are_solved_as_one() -> None:
         assert ((distance <= POSITION) & (angle <= ROTATION)).any(axis=1).all()
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", DOUBLE)
 def test_stretched_or_folded_arm_with_a_wrist_in_line_is_found_again(name: str) -> None:
     """Where both are singular, no solution that counts as exact is off by more than 1e-9 mm."""

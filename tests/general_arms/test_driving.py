@@ -165,7 +165,7 @@ def test_step_turns_about_an_axis_of_the_tool(chain: Chain) -> None:
     np.testing.assert_allclose(reached[:3, :3], T[:3, :3] @ so3.rotation_y(0.1), atol=1e-6)
 
 
-@pytest.mark.cases(6)
+@pytest.mark.cases(2)
 @every(SIX_AND_MORE)
 @pytest.mark.parametrize("frame", JogFrame)
 def test_jog_follows_all_six_rates(chain: Chain, frame: JogFrame) -> None:

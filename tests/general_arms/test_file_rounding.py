@@ -67,6 +67,7 @@ def test_kinematics_are_those_of_the_file(tmp_path: Path, name: str) -> None:
     assert not any("nearest exact arm" in note for note in arm.notes)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ARMS)
 def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: str) -> None:
     chain = chain_in(tmp_path, ARMS[name])
@@ -86,6 +87,7 @@ def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: st
     assert count >= 100
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["UR5e", "KR 6", "Puma 560"])
 def test_postures_near_singularities_are_taken_too(tmp_path: Path, name: str) -> None:
     chain = chain_in(tmp_path, ARMS[name])

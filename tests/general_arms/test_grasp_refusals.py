@@ -50,7 +50,7 @@ def test_six_axes_give_the_reason(steps: list[str], thing: str, why: str, tmp_pa
         planned(tmp_path, gripping_urdf("UR5e"), steps, thing)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("steps", "thing", "why"),
     [

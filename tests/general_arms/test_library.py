@@ -118,7 +118,7 @@ def test_two_axes_are_no_arm(tmp_path: Path) -> None:
         load(written(tmp_path, "two", PX100[:2]))
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("frame", ["shoulder", "base"])
 def test_line_of_the_library_is_straight(urdf: Urdf, name: str, frame: str) -> None:

@@ -92,6 +92,7 @@ def test_posture_nearest_to_the_hint_is_chosen() -> None:
             assert np.abs(best.q - q).max() < 0.15
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", SIX)
 def test_point_that_the_tool_can_take_is_not_out_of_reach(name: str) -> None:
     chain = SIX[name]
@@ -133,6 +134,7 @@ def test_plain_floats_are_the_forward_kinematics_and_the_jacobian(name: str) -> 
         np.testing.assert_allclose(R @ np.array(axes)[:, 3:].T, at_tool, atol=1e-13)
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("name", ARMS)
 def test_reachable_poses_are_reached_inside_the_limits_in_time(name: str) -> None:
     chain = ARMS[name]

@@ -59,6 +59,7 @@ def run_from(chain: Chain, q: FloatArray, text: str) -> tuple[Program, State, Pl
     return compiled(parse(f"frame: base\nsteps:\n  - {text}\n"), context, state), state, context
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", WRIST)
 def test_line_through_a_singularity_is_refused_with_its_axes(name: str) -> None:
     chain, angles = WRIST[name]

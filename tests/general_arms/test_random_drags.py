@@ -153,6 +153,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
     return Dragged(arrived, held, clear, beside, calls, seconds)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("name", ["UR5e", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 20)
