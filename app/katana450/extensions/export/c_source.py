@@ -68,19 +68,13 @@ def _kinematics_header(robot: Robot) -> str:
         arm = f"/* There is no robot_fk and no robot_ik. {comment(robot.why)} */"
     else:
         arm = _ARM_HEADER.replace("TOOL", comment(robot.arm.default_tool))
-    return f"""\
+    about = f"""\
 /* {comment(robot.name)}: the kinematics. Nothing is allocated, and there is no state.
  *
  * Poses are 4 x 4 matrices row by row that map coordinates of a frame into those of another.
  * Lengths in m, angles in rad.
- */
-#ifndef KINEMATICS_H
-#define KINEMATICS_H
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
+ */"""
+    declarations = f"""\
 #define ROBOT_LINKS {len(robot.links)}
 
 /* Sets T to the pose of each link in the root link. q: values of the driven joints, in the order of
@@ -90,7 +84,22 @@ void robot_frames(const double q[], double T[ROBOT_LINKS][16]);
 /* The name of a link by its number from 0, parents first; a null pointer for other numbers. */
 const char *robot_link_name(int link);
 
-{arm}
+{arm}"""
+    return header("KINEMATICS_H", about, declarations)
+
+
+def header(guard: str, about: str, declarations: str, includes: str = "") -> str:
+    """Return a header for C and C++ with the comment ``about``; ``guard``: its include guard."""
+    return f"""\
+{about}
+#ifndef {guard}
+#define {guard}
+{includes}
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+{declarations}
 
 #ifdef __cplusplus
 }}
@@ -296,41 +305,23 @@ def _part(link: Link, name: str) -> dict[str, str]:
     faces = surface.faces
     rows = np.column_stack((faces, surface.normal_faces, np.zeros_like(faces)))
     index = "unsigned short" if rows.max() < 1 << 16 else "unsigned int"
-    guard = f"{name.upper()}_H"
     arrays = (
         f"const float {name}_vertices[{len(surface.points)}][3]",
         f"const float {name}_normals[{len(surface.normals)}][3]",
         f"const {index} {name}_face_indices[{len(faces)}][9]",
     )
-    header = "\n".join(
-        (
-            f"/* The link {comment(link.name)}: metres in its own frame. */",
-            f"#ifndef {guard}",
-            f"#define {guard}",
-            "",
-            "#ifdef __cplusplus",
-            'extern "C" {',
-            "#endif",
-            "",
-            f"#define {name.upper()}_FACES {len(faces)}",
-            "",
-            f"extern {arrays[0]};",
-            f"extern {arrays[1]};",
-            "",
-            "/* Per triangle: 3 vertices, 3 normals, 3 texture points (unused). */",
-            f"extern {arrays[2]};",
-            "",
-            "/* Draws the link with its materials in the current frame. */",
-            f"void {name}_draw(void);",
-            "",
-            "#ifdef __cplusplus",
-            "}",
-            "#endif",
-            "",
-            "#endif",
-            "",
-        )
-    )
+    about = f"/* The link {comment(link.name)}: metres in its own frame. */"
+    declarations = f"""\
+#define {name.upper()}_FACES {len(faces)}
+
+extern {arrays[0]};
+extern {arrays[1]};
+
+/* Per triangle: 3 vertices, 3 normals, 3 texture points (unused). */
+extern {arrays[2]};
+
+/* Draws the link with its materials in the current frame. */
+void {name}_draw(void);"""
     surfaces, first = [], 0
     for shape in link.shapes:
         material = shape.material
@@ -342,35 +333,36 @@ def _part(link: Link, name: str) -> dict[str, str]:
             f"/* {comment(material.name)} */"
         )
         first += len(shape.faces)
-    source = "\n".join(
-        (
-            f'#include "{name}.h"',
-            "",
-            '#include "robot.h"',
-            "",
-            f"{arrays[0]} = {{",
-            *_float_rows(surface.points),
-            "};",
-            "",
-            f"{arrays[1]} = {{",
-            *_float_rows(surface.normals),
-            "};",
-            "",
-            f"{arrays[2]} = {{",
-            *(f"{{{','.join(map(str, row))}}}," for row in rows.tolist()),
-            "};",
-            "",
-            "static const struct {",
-            "    int first, count;",
-            "    float colour[4], gleam, shine;",
-            "} surfaces[] = {",
-            *surfaces,
-            "};",
-            "",
-            _DRAW.replace("NAME", name),
-        )
-    )
-    return {f"{name}.h": header, f"{name}.c": source}
+    rows_of = "\n".join
+    source = f"""\
+#include "{name}.h"
+
+#include "robot.h"
+
+{arrays[0]} = {{
+{rows_of(_float_rows(surface.points))}
+}};
+
+{arrays[1]} = {{
+{rows_of(_float_rows(surface.normals))}
+}};
+
+{arrays[2]} = {{
+{rows_of(f"{{{','.join(map(str, row))}}}," for row in rows.tolist())}
+}};
+
+static const struct {{
+    int first, count;
+    float colour[4], gleam, shine;
+}} surfaces[] = {{
+{rows_of(surfaces)}
+}};
+
+{_DRAW.replace("NAME", name)}"""
+    return {
+        f"{name}.h": header(f"{name.upper()}_H", about, declarations),
+        f"{name}.c": source,
+    }
 
 
 _DRAW = """\
@@ -405,21 +397,16 @@ void NAME_draw(void)
 
 
 def _header(robot: Robot) -> str:
-    return f"""\
-/* {comment(robot.name)}: its joints, and a function that draws the whole robot. */
-#ifndef ROBOT_H
-#define ROBOT_H
-
+    about = f"""\
+/* {comment(robot.name)}: its joints, and a function that draws the whole robot. */"""
+    includes = """
 #ifdef _WIN32
 #include <windows.h>
 #endif
 #include <GL/gl.h>
 #include <stddef.h>
-
-#ifdef __cplusplus
-extern "C" {{
-#endif
-
+"""
+    declarations = f"""\
 #define ROBOT_NAME {text(robot.name)}
 #define ROBOT_JOINTS {len(robot.driven)}
 
@@ -440,14 +427,8 @@ extern const double robot_start[ROBOT_JOINTS + 1];
 extern const double robot_eye[3], robot_target[3], robot_field_of_view;
 
 /* Draws every link at the given joint values. */
-void robot_draw(const double q[]);
-
-#ifdef __cplusplus
-}}
-#endif
-
-#endif
-"""
+void robot_draw(const double q[]);"""
+    return header("ROBOT_H", about, declarations, includes)
 
 
 def _source(robot: Robot, names: Mapping[str, str], values: Mapping[str, float]) -> str:

@@ -4,33 +4,34 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
+from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_files import read_robot
+from katana450.assembly.robot_session import find_arm
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.export.formats import FORMATS, ExportJob, named
+from katana450.extensions.export.c_source import c_files
+from katana450.extensions.export.formats import FORMATS, named
+from katana450.extensions.export.glb import glb_files
+from katana450.extensions.export.mjcf import mjcf_files
+from katana450.extensions.export.urdf_package import package_files
+from katana450.extensions.export.vrml import initial_objects, vrml_files, world_of, x3d_files
 
 LARGE_BYTES = 20_000_000
 """Size [bytes] of all files together above which the command says why."""
 
 
-def export(
-    options: argparse.Namespace, files_of: Callable[[ExportJob], Mapping[str, bytes]]
-) -> int:
-    """Write the files of one format; print their names and sizes. Raises InputError.
-
-    ``files_of`` returns names and contents of the files.
-    """
+def export(options: argparse.Namespace) -> int:
+    """Write the files of one format; print their names and sizes. Raises InputError."""
     _check(options)
     robot = read_robot(options.urdf)
     robot.check_complete()
     robot.read_shapes()
     for note in robot.notes:
         print(f"katana450: {note}", file=sys.stderr)
-    values = robot.values(options.pose)
-    files = files_of(ExportJob(options, robot, values))
+    files = _files(options, robot)
     folder: Path = options.out
     try:
         for path in {(folder / name).parent for name in files}:
@@ -49,6 +50,23 @@ def export(
             file=sys.stderr,
         )
     return 0
+
+
+def _files(options: argparse.Namespace, robot: Robot) -> Mapping[str, bytes]:
+    """Return names and contents of the files."""
+    values = robot.values(options.pose)
+    match options.format:
+        case "c":
+            return c_files(robot, values)
+        case "glb":
+            return glb_files(robot, values)
+        case "urdf":
+            return package_files(options.urdf)
+        case "mjcf":
+            return mjcf_files(read_robot(options.urdf, None, find_arm))
+    objects = initial_objects(robot) if options.objects else ()
+    world = world_of(robot, values, objects, plain=options.plain)
+    return (vrml_files if options.format == "vrml" else x3d_files)(robot, world)
 
 
 def _check(options: argparse.Namespace) -> None:

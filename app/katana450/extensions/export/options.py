@@ -71,13 +71,13 @@ def export_format(options: argparse.Namespace) -> int:
     if not row.scene and (options.plain or not options.objects):
         names = " or ".join(named(lambda listed: listed.scene))
         raise InputError(f"{options.format} has no Switch and no objects. Use {names}.")
-    if row.files is None:
+    if row.moves:
         from katana450.extensions.export.page import write_page
 
         return write_page(options)
     from katana450.extensions.export.export import export
 
-    return export(options, row.files)
+    return export(options)
 
 
 def _listed() -> str:
