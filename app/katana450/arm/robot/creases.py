@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.arm.robot.glb_file import GlbFile
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.srgb import to_light
 
@@ -19,9 +17,6 @@ Colours = npt.NDArray[np.uint8]
 
 CREASE = math.radians(40.0)
 """Faces that meet at a larger angle have separate normals."""
-
-FLOAT, UINT = 5126, 5125
-ARRAY, ELEMENT = 34962, 34963
 
 ROUGHNESS = 0.6
 
@@ -98,54 +93,25 @@ def glb(shape: Drawn, opacity: float = 1.0) -> bytes:
     alpha = shape.colours[:, 3:] / 255.0 * opacity
     # glTF stores vertex colours as linear light.
     linear = to_light(shape.colours[:, :3] / 255.0)
-    blocks = (
-        (shape.vertices, np.float32, FLOAT, "VEC3", ARRAY),
-        (smooth_normals(shape.vertices, shape.faces), np.float32, FLOAT, "VEC3", ARRAY),
-        (np.concatenate((linear, alpha), axis=1), np.float32, FLOAT, "VEC4", ARRAY),
-        (shape.faces.ravel(), np.uint32, UINT, "SCALAR", ELEMENT),
-    )
-    data, views, accessors = bytearray(), [], []
-    for number, (values, kind, component, shaped, target) in enumerate(blocks):
-        packed = np.ascontiguousarray(values, dtype=kind)
-        views.append(
-            {"buffer": 0, "byteOffset": len(data), "byteLength": packed.nbytes, "target": target}
-        )
-        accessor: dict[str, Any] = {
-            "bufferView": number,
-            "componentType": component,
-            "count": len(packed),
-            "type": shaped,
-        }
-        if number == 0:
-            accessor |= {"min": packed.min(axis=0).tolist(), "max": packed.max(axis=0).tolist()}
-        accessors.append(accessor)
-        data += packed.tobytes()
+    file = GlbFile()
+    attributes = {
+        "POSITION": file.add(shape.vertices),
+        "NORMAL": file.add(smooth_normals(shape.vertices, shape.faces)),
+        "COLOR_0": file.add(np.concatenate((linear, alpha), axis=1)),
+    }
+    indices = file.add(shape.faces.reshape(-1, 1))
     material = {
         "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS},
         "alphaMode": "BLEND" if alpha.min() < 1.0 else "OPAQUE",
         "doubleSided": True,
     }
-    primitive = {
-        "attributes": {"POSITION": 0, "NORMAL": 1, "COLOR_0": 2},
-        "indices": 3,
-        "material": 0,
-    }
-    document = {
-        "asset": {"version": "2.0", "generator": "katana450"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}],
-        "materials": [material],
-        "accessors": accessors,
-        "bufferViews": views,
-        "buffers": [{"byteLength": len(data)}],
-    }
-    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text
-    chunks += struct.pack("<I4s", len(data), b"BIN\0") + bytes(data)
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    primitive = {"attributes": attributes, "indices": indices, "material": 0}
+    return file.content(
+        scenes=[{"nodes": [0]}],
+        nodes=[{"mesh": 0}],
+        meshes=[{"primitives": [primitive]}],
+        materials=[material],
+    )
 
 
 def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

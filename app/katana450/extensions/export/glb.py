@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from katana450.arm.robot.glb_file import GlbFile
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
@@ -19,11 +17,6 @@ from katana450.extensions.export.files import distinct
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.srgb import to_light
-
-ARRAY, ELEMENT = 34962, 34963
-"""Targets of a buffer view."""
-FLOAT, USHORT, UINT = 5126, 5123, 5125
-"""Component types of an accessor."""
 
 Y_UP = (-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
 """Rotation (x, y, z, w) from the root's z up to glTF's y up."""
@@ -36,58 +29,37 @@ def glb_files(robot: Robot, values: Mapping[str, float]) -> dict[str, bytes]:
 
 
 class _Document:
-    """The JSON chunk and the binary chunk under construction."""
+    """The document under construction."""
 
     def __init__(self, robot: Robot, values: Mapping[str, float]) -> None:
-        self._data = bytearray()
-        self._views: list[dict[str, Any]] = []
-        self._accessors: list[dict[str, Any]] = []
+        self._file = GlbFile()
         self._meshes: list[dict[str, Any]] = []
         self._materials: dict[Material, int] = {}
+        self._robot, self._values = robot, values
         # Node 0 rotates z up to y up; the node of link k is node k + 1.
-        number = {link.name: place for place, link in enumerate(robot.links, start=1)}
-        nodes: list[dict[str, Any]] = [{"name": "z_up", "rotation": Y_UP, "children": [1]}]
-        nodes += [self._node(robot, link, values, number) for link in robot.links]
-        self._json: dict[str, Any] = {
-            "asset": {"version": "2.0", "generator": "katana450"},
-            "scene": 0,
-            "scenes": [{"name": robot.name, "nodes": [0]}],
-            "nodes": nodes,
-        }
+        self._number = {link.name: place for place, link in enumerate(robot.links, start=1)}
 
     def content(self) -> bytes:
         """Return the content of the file."""
-        parts = {
-            "meshes": self._meshes,
-            "materials": [_material(material) for material in self._materials],
-            "accessors": self._accessors,
-            "bufferViews": self._views,
-            "buffers": [{"byteLength": len(self._data)}] if self._data else [],
-        }
-        document = self._json | {name: part for name, part in parts.items() if part}
-        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        chunks = struct.pack("<I4s", len(text), b"JSON") + text
-        if self._data:
-            chunks += struct.pack("<I4s", len(self._data), b"BIN\0") + bytes(self._data)
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+        upright = {"name": "z_up", "rotation": Y_UP, "children": [1]}
+        nodes = [upright, *map(self._node, self._robot.links)]
+        return self._file.content(
+            scenes=[{"name": self._robot.name, "nodes": [0]}],
+            nodes=nodes,
+            meshes=self._meshes,
+            materials=[_material(material) for material in self._materials],
+        )
 
-    def _node(
-        self,
-        robot: Robot,
-        link: Link,
-        values: Mapping[str, float],
-        number: Mapping[str, int],
-    ) -> dict[str, Any]:
+    def _node(self, link: Link) -> dict[str, Any]:
         T, joint = link.T_parent_link, link.joint
         if joint is not None:
-            T = T @ joint.motion(values[joint.name])
+            T = T @ joint.motion(self._values[joint.name])
         node: dict[str, Any] = {
             "name": link.name,
             "translation": T[:3, 3].tolist(),
             "rotation": _xyzw(T[:3, :3]),
         }
-        children = [number[child.name] for child in robot.children(link)]
+        children = [self._number[child.name] for child in self._robot.children(link)]
         if children:
             node["children"] = children
         if joint is not None:
@@ -99,40 +71,16 @@ class _Document:
         return node
 
     def _primitive(self, shape: VisualMesh) -> dict[str, Any]:
-        index = shape.faces.reshape(-1, 1)
-        wide = len(shape.vertices) >= 1 << 16
+        if not (np.isfinite(shape.vertices).all() and np.isfinite(shape.normals).all()):
+            raise InputError("A shape has coordinates that are not finite numbers.")
         return {
             "attributes": {
-                "POSITION": self._vectors(shape.vertices, ARRAY),
-                "NORMAL": self._vectors(shape.normals, ARRAY),
+                "POSITION": self._file.add(shape.vertices),
+                "NORMAL": self._file.add(shape.normals),
             },
-            "indices": self._add(
-                index.astype("<u4" if wide else "<u2"), UINT if wide else USHORT, ELEMENT
-            ),
+            "indices": self._file.add(shape.faces.reshape(-1, 1)),
             "material": self._materials.setdefault(shape.material, len(self._materials)),
         }
-
-    def _vectors(self, rows: FloatArray, target: int | None = None) -> int:
-        if not np.isfinite(rows).all():
-            raise InputError("A shape has coordinates that are not finite numbers.")
-        return self._add(rows.astype("<f4"), FLOAT, target)
-
-    def _add(self, rows: npt.NDArray[Any], kind: int, target: int | None) -> int:
-        """Append rows (n, width) and return the number of their accessor."""
-        raw = rows.tobytes()
-        view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": len(raw)}
-        self._views.append(view if target is None else view | {"target": target})
-        self._data += raw + bytes(-len(raw) % 4)
-        accessor: dict[str, Any] = {
-            "bufferView": len(self._views) - 1,
-            "componentType": kind,
-            "count": len(rows),
-            "type": {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[rows.shape[1]],
-        }
-        if kind == FLOAT:
-            accessor |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
-        self._accessors.append(accessor)
-        return len(self._accessors) - 1
 
 
 def _xyzw(R: FloatArray) -> list[float]:
