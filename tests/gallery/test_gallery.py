@@ -104,7 +104,7 @@ def test_xacro_is_expanded_with_its_arguments_and_finds_its_meshes(
     robot = load(file)
     assert robot.name == "ur5e"
     (visual,) = robot.links[0].visuals
-    assert visual.source == (arms / "base.stl").resolve()
+    assert visual.file == (arms / "base.stl").resolve()
     np.testing.assert_allclose(robot.home["tool0"][:3, 3], (0.817, 0.23, 0.06), atol=1e-9)
     # The same file again, and the command takes it by name.
     assert file_of(robot_named("ur5e")) == file

@@ -102,12 +102,12 @@ def test_every_joint_is_that_of_yourdfpy(everything: Path, tmp_path: Path) -> No
 def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
     root = read(everything).links["root"]
     assert [visual.colour for visual in root.visuals] == [(51, 102, 255), (0, 255, 128), GREY]
-    box, ball, can = (shape.visual.mesh for shape in root.visuals)
+    box, ball, can = (shape.mesh for shape in root.visuals)
     assert box.volume == pytest.approx(0.1 * 0.2 * 0.3)
     assert ball.extents == pytest.approx((0.2, 0.2, 0.2), abs=2e-3)
     assert can.extents == pytest.approx((0.2, 0.2, 0.4), abs=2e-3)
     (collision,) = root.collisions
-    assert collision.visual.mesh.bounds.tolist() == [[0.5, 1.0, 1.5], [1.5, 3.0, 4.5]]
+    assert collision.mesh.bounds.tolist() == [[0.5, 1.0, 1.5], [1.5, 3.0, 4.5]]
     assert root.inertial is not None
     assert (root.inertial.mass, root.inertial.T_link_inertia[:3, 3].tolist()) == (
         2.5,

@@ -97,8 +97,8 @@ def _links_of(urdf: Urdf, path: Path) -> tuple[tuple[Link, ...], tuple[str, ...]
                 parent=None if parent_joint is None else parent_joint.parent,
                 T_parent_link=frozen(np.eye(4)) if parent_joint is None else parent_joint.origin,
                 joint=None if parent_joint is None else following.get(parent_joint.name),
-                visuals=tuple(shape.visual for shape in link.visuals) or rods(below[name]),
-                collisions=tuple(shape.visual for shape in link.collisions),
+                visuals=link.visuals or rods(below[name]),
+                collisions=link.collisions,
                 inertial=link.inertial,
                 missing=link.missing,
             )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,12 +84,12 @@ def _read(visual: Visual) -> list[VisualMesh]:
         "plain {:02x}{:02x}{:02x}".format(*visual.colour),
         (visual.colour[0] / 255.0, visual.colour[1] / 255.0, visual.colour[2] / 255.0),
     )
-    if not isinstance(visual.source, Path):
+    if visual.file is None:
         return [_shape(visual.mesh, np.eye(4), plain)]
     import trimesh
 
     T = visual.T_body_visual @ np.diag([*visual.scale, 1.0])
-    scene, shapes = scene_in(visual.source), []
+    scene, shapes = scene_in(visual.file), []
     for node in scene.graph.nodes_geometry:
         T_file, name = scene.graph[node]
         mesh = scene.geometry[name]

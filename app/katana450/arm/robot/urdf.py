@@ -82,24 +82,6 @@ class Inertial:
 
 
 @dataclass(frozen=True, eq=False)
-class UrdfShape:
-    """A shape of a link: a ``Visual`` whose source is either a mesh file or a primitive."""
-
-    T_body_visual: FloatArray
-    scale: FloatArray
-    colour: Color
-    file: Path | None = None
-    primitive: PrimitiveShape | None = None
-
-    @property
-    def visual(self) -> Visual:
-        """The shape that can be read."""
-        source = self.file or self.primitive
-        assert source is not None
-        return Visual(self.T_body_visual, self.scale, source, self.colour)
-
-
-@dataclass(frozen=True, eq=False)
 class UrdfLink:
     """An element <link>.
 
@@ -111,8 +93,8 @@ class UrdfLink:
     """
 
     name: str
-    visuals: tuple[UrdfShape, ...]
-    collisions: tuple[UrdfShape, ...]
+    visuals: tuple[Visual, ...]
+    collisions: tuple[Visual, ...]
     inertial: Inertial | None
     missing: tuple[tuple[Path, ...], tuple[Path, ...]]
 
@@ -245,7 +227,7 @@ def _joint(joint: Any) -> UrdfJoint:
 
 def _visual(
     shape: Any, colors: Mapping[str | None, Any], folder: Path, missing: list[Path]
-) -> UrdfShape | None:
+) -> Visual | None:
     """Return the shape of a visual or collision; None for a missing file, added to ``missing``."""
     geometry, scale, file = shape.geometry, np.ones(3), None
     primitive = None
@@ -265,7 +247,7 @@ def _visual(
             return None
         if geometry.mesh.scale is not None:
             scale = np.broadcast_to(np.asarray(geometry.mesh.scale, dtype=float), 3)
-    return UrdfShape(_origin(shape), frozen(scale), _color(shape, colors), file, primitive)
+    return Visual(_origin(shape), frozen(scale), file, _color(shape, colors), primitive)
 
 
 def _color(shape: Any, colors: Mapping[str | None, Any]) -> Color:

@@ -67,26 +67,30 @@ class Visual:
     Attributes:
         T_body_visual: (4, 4) pose in its body [m].
         scale: (3,) factors on the coordinates in the file.
-        source: a mesh file, a primitive shape, or a function that returns a new trimesh [m].
+        file: its mesh file; None for a shape that is made.
         colour: red, green and blue, 0..255, for shapes that have no colour of their own.
+        primitive: the primitive shape, if it is one.
+        make: function that returns any other shape as a new trimesh [m].
     """
 
     T_body_visual: FloatArray
     scale: FloatArray
-    source: Path | PrimitiveShape | Callable[[], Any]
+    file: Path | None
     colour: Color = GREY
+    primitive: PrimitiveShape | None = None
+    make: Any = None
 
     @property
     def glb(self) -> Path | None:
         """The GLB file, if it can be shown unchanged with its own materials; else None."""
-        if not isinstance(self.source, Path) or self.source.suffix != ".glb":
+        if self.file is None or self.file.suffix != ".glb":
             return None
-        return self.source if (self.scale == 1.0).all() else None
+        return self.file if (self.scale == 1.0).all() else None
 
     @property
     def is_rod(self) -> bool:
         """True if it only connects joints, in the place of a shape that the file lacks."""
-        return isinstance(self.source, PrimitiveShape) and "segment" in self.source.options
+        return self.primitive is not None and "segment" in self.primitive.options
 
     @cached_property
     def mesh(self) -> Any:
@@ -94,12 +98,10 @@ class Visual:
 
         Raises RobotDescriptionError if the file cannot be read.
         """
-        if isinstance(self.source, Path):
-            mesh = scene_in(self.source).to_mesh()
-        elif isinstance(self.source, PrimitiveShape):
-            mesh = self.source.mesh()
+        if self.file is not None:
+            mesh = scene_in(self.file).to_mesh()
         else:
-            mesh = self.source()
+            mesh = self.make() if self.primitive is None else self.primitive.mesh()
         mesh.apply_transform(self.T_body_visual @ np.diag([*self.scale, 1.0]))
         return mesh
 
@@ -109,15 +111,15 @@ class Visual:
         The value depends on the shape alone. ``kind``: its type. ``files``: suffixes of files that
         are sufficient for it.
         """
-        if not isinstance(self.source, Path) or self.source.suffix.lower() not in files:
+        if self.file is None or self.file.suffix.lower() not in files:
             return make()
         try:
-            data = self.source.read_bytes()
+            data = self.file.read_bytes()
         except OSError:
             # The reader of the mesh explains why.
             return make()
         own = (self.T_body_visual, self.scale, str(self.colour))
-        return kept(make, kind, self.source.suffix, data, *own)
+        return kept(make, kind, self.file.suffix, data, *own)
 
 
 def scene_in(source: Path) -> Any:
@@ -146,7 +148,10 @@ def rods(ends: Sequence[FloatArray]) -> tuple[Visual, ...]:
         Visual(
             frozen(np.eye(4)),
             frozen(np.ones(3)),
-            PrimitiveShape("cylinder", {"radius": ROD_RADIUS, "segment": [np.zeros(3), end]}),
+            None,
+            primitive=PrimitiveShape(
+                "cylinder", {"radius": ROD_RADIUS, "segment": [np.zeros(3), end]}
+            ),
         )
         for end in ends
         if float(np.linalg.norm(end)) > ROD_LENGTH

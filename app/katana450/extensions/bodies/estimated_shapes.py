@@ -73,7 +73,7 @@ def _capsules(robot: Robot, link: Link) -> list[Visual]:
     radius = min(RADIUS_RATIO * max(lengths), MAX_RADIUS)
     ends = [child.T_parent_link[:3, 3] for child in robot.children(link)]
     return [
-        Visual(frozen(np.eye(4)), frozen(np.ones(3)), partial(_capsule, end, radius))
+        Visual(frozen(np.eye(4)), frozen(np.ones(3)), None, make=partial(_capsule, end, radius))
         for end in ends
         if np.linalg.norm(end) > ROD_LENGTH
     ]

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.robot.visual import GEOMETRY_FILES, PrimitiveShape, Visual
+from katana450.arm.robot.visual import GEOMETRY_FILES, Visual
 from katana450.extensions.convex_body import convex_body, hull_faces
 from katana450.maths.geometry.arrays import FloatArray
 
@@ -62,7 +62,7 @@ def pieces(shape: Visual) -> Sequence[FloatArray]:
         mesh = shape.mesh
         return divided_mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
-    if isinstance(shape.source, PrimitiveShape):
+    if shape.primitive is not None:
         return [convex_body(shape.mesh.vertices).corners]
     return shape.kept(divided, list[FloatArray], files=GEOMETRY_FILES)
 

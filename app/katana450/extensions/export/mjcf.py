@@ -314,8 +314,7 @@ class _Model:
     def _collision(self, link: Link, collision: Visual) -> ET.Element:
         """Return the geometry of a collision shape."""
         geom = ET.Element("geom", group="3", mass="0")
-        source = collision.source
-        size = _primitive(source) if isinstance(source, PrimitiveShape) else None
+        size = None if collision.primitive is None else _primitive(collision.primitive)
         if size is not None:
             geom.attrib.update(size, **_place(collision.T_body_visual))
         else:

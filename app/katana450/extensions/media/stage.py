@@ -138,6 +138,8 @@ def _in_file(
 def _plain(scene_object: SceneObject) -> VisualMesh:
     red, green, blue = scene_object.appearance.colour or PLAIN_COLOUR
     colour = red / 255.0, green / 255.0, blue / 255.0
-    visual = Visual(frozen(np.eye(4)), frozen(np.ones(3)), lambda: form(scene_object), PLAIN_COLOUR)
+    visual = Visual(
+        frozen(np.eye(4)), frozen(np.ones(3)), None, PLAIN_COLOUR, make=lambda: form(scene_object)
+    )
     (shape,) = shapes_of(visual)
     return VisualMesh(Material("plain", colour), shape.vertices, shape.normals, shape.faces)
