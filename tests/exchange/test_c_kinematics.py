@@ -16,11 +16,9 @@ from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.c_source import arm_data, kinematics_files
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 from katana450.maths.kinematics.solver import inverse
-from katana450.resources import URDF_PATH
 from tests.docs.code_blocks import code_block
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import needs, run
@@ -291,11 +289,3 @@ def test_a_mechanism_without_an_arm_has_frames_only(gantry: Robot) -> None:
     assert "There is no robot_fk and no robot_ik." in files["kinematics.h"]
     assert gantry.why
     assert "robot_frames" in files["kinematics.h"]
-
-
-def test_canonical_arm_needs_no_change_of_frames(katana: Robot) -> None:
-    text = kinematics_files(katana)["arm_data.h"]
-    assert arm_of(katana.require_arm().chain).is_mirrored
-    for name in ("CANONICAL", "MIRRORED", "DIRECT"):
-        assert f"#define ARM_IS_{name} 1" in text
-    assert load(URDF_PATH).driven[:5] == katana.require_arm().chain.names

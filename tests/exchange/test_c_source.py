@@ -113,14 +113,6 @@ def test_kinematics_build_without_opengl(tmp_path: Path, katana: Robot) -> None:
     assert not (tmp_path / "build" / "viewer").exists()
 
 
-@needs("clang", "/usr/include/GL/freeglut.h")
-def test_clang_has_no_warnings_for_the_arm(tmp_path: Path, katana: Robot) -> None:
-    sources = sorted(written(tmp_path / "c", katana, ()).glob("*.c"))
-    assert len(sources) == 14
-    words = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-fsyntax-only")
-    run("clang", *words, *sources)
-
-
 @needs(*VIEWER)
 def test_a_picture_is_quick(viewer: Path) -> None:
     """Processor time is measured, because the machine may be shared."""

@@ -113,16 +113,6 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
     assert outward.min() > 0.0
 
 
-def test_an_arm_without_shapes_is_drawn_as_rods() -> None:
-    robot = load(ARMS / "pincherx_150.urdf")
-    links = {link.name: link for link in robot.links}
-    assert not links["fingertips"].shapes
-    # The elbow is 50 mm in front of the shoulder and 150 mm above it.
-    (rod,) = links["upper_arm"].shapes
-    assert rod.vertices[:, 2].max() == pytest.approx(0.15, abs=0.009)
-    assert rod.vertices[:, 0].max() == pytest.approx(0.05, abs=0.009)
-
-
 def test_the_camera_sees_it_in_every_pose_of_the_pictures(katana: Robot) -> None:
     view = camera(katana)
     way = (view.target - view.eye) / np.linalg.norm(view.target - view.eye)
@@ -159,7 +149,6 @@ def test_an_impossible_pose_is_refused(katana: Robot, pose: tuple[float, ...], s
         ),
         ('upper="0.5" velocity="1" effort="1"/>', 'upper="0.5"/>CIRCLE', "follows no driven joint"),
         ('<axis xyz="0 0 2"/>', '<axis xyz="0 0 0"/>', "'turn'.*no axis"),
-        ("</robot>", '<link name="alone"/></robot>', "one link without a parent, not 2"),
     ],
 )
 def test_an_invalid_description_is_refused(
@@ -177,11 +166,6 @@ def test_missing_mesh_is_reported(tmp_path: Path) -> None:
     text = GANTRY.read_text().replace('<sphere radius="0.05"/>', '<mesh filename="no.stl"/>')
     (tmp_path / "other.urdf").write_text(text)
     assert "no.stl" in load(tmp_path / "other.urdf").notes[0]
-    (tmp_path / "other.urdf").write_text("no markup")
-    with pytest.raises(RobotDescriptionError, match="is not a robot description"):
-        load(tmp_path / "other.urdf")
-    with pytest.raises(RobotDescriptionError, match="There is no robot description"):
-        load(tmp_path / "nowhere.urdf")
 
 
 def test_names_become_identifiers_and_stay_apart() -> None:

@@ -37,7 +37,6 @@ from katana450.extensions.importers.shape_file import (
     read_shape,
 )
 from katana450.maths.geometry import se3, so3
-from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.shape_bytes import ply
 from tests.exchange.solids import Numbers, is_closed, sides, triangles, volume
@@ -110,15 +109,6 @@ def test_another_reader_finds_the_same_triangles(file: str) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("file", "said"),
-    [("assimp.gltf", "'assimp.bin', which is not there")],
-)
-def test_ignored_content_of_foreign_files_is_reported(file: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_shape((FOREIGN / file).read_bytes(), Format.of(file), file)
-
-
 def written(mesh: trimesh.Trimesh, kind: str) -> bytes:
     """Return the file as trimesh writes it, independently of our code."""
     if kind == "gltf":
@@ -180,22 +170,6 @@ def test_our_exports_are_read_back(which: str, katana: Robot, gantry: Robot) -> 
         edges = np.linalg.norm(missing - np.roll(missing, 1, axis=1), axis=2)
         assert len(missing) == 0 or edges.min(axis=1).max() < 2.0 * near
         assert shape.colours is not None
-
-
-@pytest.mark.parametrize(
-    "file", ["stl/wrist_link.stl", "collision/pan_link_2.stl", "meshes/wrist_link.glb"]
-)
-def test_the_files_of_the_arm_are_read(file: str) -> None:
-    path = URDF_PATH.parent / file
-    data = path.read_bytes()
-    shape = read_shape(data, Format.of(file), file, 1.0, Up.Z)
-    other = trimesh.load_scene(path).to_mesh()
-    theirs = triangles(other.vertices, other.faces, 6)
-    ours = triangles(shape.vertices, shape.faces, 6)
-    assert not ours - theirs
-    # Triangles with two corners at one place.
-    assert sum((theirs - ours).values()) <= 0.01 * len(other.faces)
-    assert volume(shape) == pytest.approx(other.volume, rel=1e-5)
 
 
 TETRAHEDRON = "v 0 0 0\nv {0} 0 0\nv 0 {0} 0\nv 0 0 {0}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

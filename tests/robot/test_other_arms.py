@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 import yourdfpy
 
 from katana450.arm.control import commands as cmd
@@ -34,15 +33,6 @@ PINCHER, YOUBOT = ARMS / "pincherx_150.urdf", ARMS / "youbot_arm.urdf"
 @pytest.fixture(params=[PINCHER, YOUBOT], ids=lambda path: path.stem)
 def path(request: pytest.FixtureRequest) -> Path:
     return Path(request.param)
-
-
-ONE_AT_FIRST = pytest.mark.parametrize(
-    "path",
-    [PINCHER, pytest.param(YOUBOT, marks=pytest.mark.long)],
-    ids=lambda path: path.stem,
-    indirect=True,
-)
-"""Mark of tests that start processes: `make test` runs them with one arm."""
 
 
 @pytest.fixture
@@ -153,20 +143,18 @@ def test_links_without_shapes_are_drawn_as_rods() -> None:
     assert "tip" in robot.moving
 
 
-@ONE_AT_FIRST
-def test_it_is_served(path: Path) -> None:
-    with AppServer((*APP, "--urdf", str(path))) as server:
+def test_it_is_served() -> None:
+    with AppServer((*APP, "--urdf", str(PINCHER))) as server:
         assert server.running
         assert "Traceback" not in server.output
 
 
-@ONE_AT_FIRST
-def test_kinematics_are_answered_line_by_line(path: Path, other: MountedArm) -> None:
-    q = [0.3, -0.2, 0.5, 0.4, 0.7]
-    (answer,) = ask("fk", [{"q": q}], "--urdf", str(path), "--tool", "hand")
-    hand = load(path, "hand").require_arm()
+def test_kinematics_are_answered_line_by_line() -> None:
+    q, arm = [0.3, -0.2, 0.5, 0.4, 0.7], load(PINCHER).require_arm()
+    (answer,) = ask("fk", [{"q": q}], "--urdf", str(PINCHER), "--tool", "hand")
+    hand = load(PINCHER, "hand").require_arm()
     np.testing.assert_allclose(np.array(answer["T"]), forward(hand.chain, q), atol=1e-15)
-    (answer,) = ask("ik", [{"T": forward(other.chain, q).tolist()}], "--urdf", str(path))
+    (answer,) = ask("ik", [{"T": forward(arm.chain, q).tolist()}], "--urdf", str(PINCHER))
     assert any(np.allclose(s["q"], q) for s in answer["solutions"])
     assert answer["residual_mm"] < 1e-9
 
@@ -230,22 +218,6 @@ def test_an_impossible_tool_is_refused() -> None:
         load(PINCHER, "nose")
     with pytest.raises(RobotDescriptionError, match=r"is carried by 4 turning joints .* --tool"):
         load(PINCHER, "wrist")
-
-
-def test_meshes_of_other_formats_are_read_and_absent_ones_reported(tmp_path: Path) -> None:
-    trimesh.creation.box(extents=[10.0, 20.0, 30.0]).export(tmp_path / "box.stl")
-    shape = (
-        '<link name="forearm"><visual><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/>'
-        '<geometry><mesh filename="package://pincher/{}.stl" scale="0.001 0.001 0.001"/>'
-        "</geometry></visual></link>"
-    )
-    robot = load(edited(tmp_path, '<link name="forearm"/>', shape.format("box")))
-    (visual,) = next(body for body in robot.links if body.name == "forearm").visuals
-    np.testing.assert_allclose(visual.mesh.extents, [0.02, 0.01, 0.03], atol=1e-9)
-    np.testing.assert_allclose(visual.mesh.bounds.mean(axis=0), [0.1, 0.0, 0.0], atol=1e-9)
-    assert robot.notes == ()
-    absent = load(edited(tmp_path, '<link name="forearm"/>', shape.format("none")))
-    assert [note for note in absent.notes if "none.stl" in note]
 
 
 def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None:

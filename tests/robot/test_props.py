@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,23 +17,6 @@ from katana450.errors import RobotDescriptionError
 from katana450.maths.collision.world import obstacle
 from katana450.resources import PROPS_PATH
 from katana450.settings import Settings
-
-
-def bounds(mesh: Path) -> Any:
-    return trimesh.load_scene(mesh).bounds
-
-
-def test_the_meshes_have_the_numbers_of_the_file() -> None:
-    props = load_props()
-    for vessel in (props.cup, props.basin):
-        low, high = bounds(vessel.mesh)
-        assert np.allclose(high[:2], vessel.outer_radius, rtol=0.01)
-        assert np.allclose(low[:2], -vessel.outer_radius, rtol=0.01)
-        assert (low[2], high[2]) == pytest.approx((0.0, vessel.height), abs=5e-4)
-    low, high = bounds(props.table.mesh)
-    assert (low[0], high[0]) == pytest.approx(props.table.x, abs=1e-3)
-    assert (low[1], high[1]) == pytest.approx(props.table.y, abs=1e-3)
-    assert (low[2], high[2]) == pytest.approx((-props.table.thickness, 0.0), abs=1e-3)
 
 
 def test_a_straight_vessel_is_as_wide_at_its_floor() -> None:

@@ -23,7 +23,6 @@ from katana450.maths.kinematics.solver import inverse
 from katana450.server.api import answers, requests
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
-from tests.cli.lines import ask
 from tests.robot.public_arms import (
     KATANAS,
     PX100,
@@ -166,7 +165,6 @@ def test_the_number_of_axes_is_the_first_reason(
     slides_or_several = any(word in message for word in ("prismatic", "has 2 arms"))
     if slides_or_several:
         assert found.robot.arm is None
-        assert found.robot.arm is None
         assert [n for n in found.notes if n.startswith("Joints only. ") and "arm.urdf" in n]
     else:
         # A server drives its tool with the kinematics of other arms.
@@ -278,20 +276,12 @@ def test_an_so101_is_idealised_once_and_everything_works_on_it(tmp_path: Path) -
     assert "about 0.001 mm" in note
 
 
-def test_the_commands_take_an_so101(tmp_path: Path) -> None:
-    words = ("--urdf", str(written(tmp_path, "so101", SO101)))
-    q = [0.3, -0.2, 0.5, 0.4, 0.7]
-    (pose,) = ask("fk", [{"q": q}], *words)
-    (answer,) = ask("ik", [{"T": pose["T"]}], *words)
-    assert any(np.allclose(s["q"], q, atol=1e-9) for s in answer["solutions"])
-
-
 @pytest.mark.long
 @pytest.mark.parametrize(
     "joints",
     [
-        pytest.param(PX150, marks=pytest.mark.long),
-        pytest.param(KATANAS["katana_300"], marks=pytest.mark.long),
+        PX150,
+        KATANAS["katana_300"],
         SO101,
     ],
     ids=["px150", "300", "so101"],

@@ -72,12 +72,6 @@ def test_limits_of_followers_that_exclude_each_other_are_left_out_with_a_note(
     assert robot.joint_notes == ()
 
 
-def test_a_driven_joint_without_range_is_refused(tmp_path: Path) -> None:
-    text = rail().replace('lower="-0.1" upper="0.5"', 'lower="0" upper="0"')
-    with pytest.raises(RobotDescriptionError, match="its range is 0 to 0"):
-        _ = load(write(tmp_path, text)).joint_group
-
-
 @pytest.mark.parametrize("speed", ['velocity="0"', ""])
 def test_an_arm_without_speeds_turns_slowly_and_says_so(tmp_path: Path, speed: str) -> None:
     text = ARM.read_text(encoding="utf-8")

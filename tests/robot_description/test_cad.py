@@ -4,25 +4,43 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
 
+from katana450.resources import PROPS_PATH, URDF_PATH
 from robot_description.cad.build import MESHES, PARTS, build
+from robot_description.cad.hulls import COLLISION, build_hulls
 from robot_description.cad.outline import circle, inset, rounded
 from robot_description.cad.part import Part
+from robot_description.cad.props import build_props
 from robot_description.cad.solid import lathe
+from robot_description.cad.stl import build_stl
 from tests.robot_description.solids import solid
 
 
-def test_rebuild_gives_the_committed_bytes(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("make", "folder"),
+    [
+        (build, MESHES),
+        (build_hulls, COLLISION),
+        (build_stl, URDF_PATH.parent / "stl"),
+        (build_props, PROPS_PATH.parent),
+    ],
+    ids=["meshes", "hulls", "stl", "props"],
+)
+def test_rebuild_gives_the_committed_bytes(
+    tmp_path: Path, make: Callable[[Path], Iterable[object]], folder: Path
+) -> None:
     if sys.platform != "linux" or platform.machine() != "x86_64":
         pytest.skip("the committed bytes are those of Linux on x86-64")
-    for built in build(tmp_path):
-        committed = MESHES / built.path.name
-        assert built.path.read_bytes() == committed.read_bytes(), (
-            f"{committed} is not what the code makes: run python -m robot_description.cad"
+    list(make(tmp_path))
+    made = {path.name for path in tmp_path.iterdir()}
+    assert made == {path.name for path in folder.iterdir()}
+    for name in made:
+        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), (
+            f"{folder / name} is not what the code makes: run python -m robot_description.cad"
         )
 
 
