@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
 
 from katana450.errors import InputError
 from katana450.extensions.export.vrml_world import HEADER, KEYWORDS, Node, Use, Value, World
 from katana450.extensions.importers.vrml_reader import Reader
+from katana450.maths.geometry import se3, so3
 from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 
 
@@ -15,6 +20,37 @@ def read_world(text: str) -> World:
     if not re.match(f"{re.escape(HEADER)}(?![^ \r\n])", text):
         raise InputError(f"A world must begin with {HEADER!r}.")
     return StrictReader(text, "The file").world()
+
+
+Matrix = npt.NDArray[np.float64]
+
+
+def numbers_of(node: Node, field: str, default: tuple[float, ...]) -> Matrix:
+    """Return a field of numbers."""
+    value = node.get(field)
+    return np.array(default if value is None else value, dtype=float)
+
+
+def placed_nodes(world: World) -> Iterator[tuple[Node, str, Matrix]]:
+    """Yield each node, its name or that of the nearest named group, and its pose (4, 4)."""
+
+    def visit(node: Node, T: Matrix, name: str) -> Iterator[tuple[Node, str, Matrix]]:
+        name = node.name if node.name is not None and node.kind in ("Transform", "Group") else name
+        if node.kind == "Transform":
+            # ISO/IEC 14772-1, 6.52: P' = T C R -C P.
+            centre, moved = (numbers_of(node, key, (0.0,) * 3) for key in ("center", "translation"))
+            x, y, z, angle = numbers_of(node, "rotation", (0.0, 0.0, 1.0, 0.0))
+            step = se3.from_rotation_translation(so3.exp(angle * np.array((x, y, z))), moved)
+            step[:3, 3] += centre - step[:3, :3] @ centre
+            T = T @ step
+        yield node, name, T
+        for _, value in node.fields:
+            for part in value if isinstance(value, list) else (value,):
+                if isinstance(part, Node):
+                    yield from visit(part, T, name)
+
+    for top in world.nodes:
+        yield from visit(top, np.eye(4), "")
 
 
 class StrictReader(Reader):

@@ -16,7 +16,6 @@ from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.mjcf import SAG, keyframes
 from katana450.extensions.export.playback import of_script
-from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
@@ -36,15 +35,26 @@ LARGEST_ZIP = 1_200_000
 """[bytes]"""
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the model as the command writes it and unzip unpacks it."""
-    where = tmp_path_factory.mktemp("mjcf")
-    assert main(["export", "mjcf", "--out", str(where)]) == 0
-    archive = where / "katana450_mjcf.zip"
+def unpacked(where: Path, urdf: Path = URDF_PATH) -> Path:
+    """Return the folder of a model as the command writes it and unzip unpacks it."""
+    assert main(["export", "mjcf", "--urdf", str(urdf), "--out", str(where)]) == 0
+    (archive,) = where.glob("*.zip")
     assert archive.stat().st_size < LARGEST_ZIP
     zipfile.ZipFile(archive).extractall(where)
-    return where / "katana450"
+    return where / archive.stem.removesuffix("_mjcf")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return unpacked(tmp_path_factory.mktemp("mjcf"))
+
+
+def begun(model: mujoco.MjModel, key: str = "home") -> mujoco.MjData:
+    """Return the state at a keyframe."""
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
+    mujoco.mj_forward(model, data)
+    return data
 
 
 @pytest.fixture(scope="module")
@@ -129,9 +139,7 @@ def sites(model: mujoco.MjModel) -> set[str]:
 def test_keyframes_are_postures_without_contact(
     model: mujoco.MjModel, katana: Robot, key: str
 ) -> None:
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
-    mujoco.mj_forward(model, data)
+    data = begun(model, key)
     values = keyframes(katana)[key]
     for name in katana.joints:
         assert data.joint(name).qpos[0] == values[name]
@@ -143,9 +151,7 @@ def test_keyframes_are_postures_without_contact(
 @pytest.mark.parametrize("key", ["home", "zero"])
 def test_arm_holds_itself_for_five_seconds(model: mujoco.MjModel, key: str) -> None:
     """At rest no joint sags by more than the promised `SAG`."""
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
-    mujoco.mj_forward(model, data)
+    data = begun(model, key)
     start, tool = data.qpos.copy(), data.site("tcp").xpos.copy()
     sag = drop = 0.0
     while data.time < 5.0:
@@ -158,24 +164,6 @@ def test_arm_holds_itself_for_five_seconds(model: mujoco.MjModel, key: str) -> N
     assert drop < 2e-3
     assert float(np.abs(data.qpos - start).max()) < SAG
     assert float(np.abs(data.qvel).max()) < 1e-6
-
-
-def test_circle_is_replayed(model: mujoco.MjModel, katana: Robot) -> None:
-    """The joint angles of the demo bring the site `tcp` to our own tool poses."""
-    shown = of_script("circle", URDF_PATH)
-    arm = katana.require_arm()
-    data = mujoco.MjData(model)
-    worst = 0.0
-    for number in range(0, len(shown.states), 10):
-        state = shown.states[number]
-        values = katana.joint_values(state.q, state.gripper)
-        set_values(model, data, values)
-        T = katana.frames(values)[arm.default_tool]
-        worst = max(worst, float(np.abs(data.site("tcp").xpos - T[:3, 3]).max()))
-        turned = so3.angle(data.site("tcp").xmat.reshape(3, 3), T[:3, :3])
-        assert turned < 1e-6
-    assert len(shown.states) > 500
-    assert worst < 1e-6
 
 
 @pytest.mark.long
@@ -200,8 +188,7 @@ def test_drives_follow_the_circle(model: mujoco.MjModel, katana: Robot) -> None:
 
 
 def test_fingers_move_together(model: mujoco.MjModel) -> None:
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data = begun(model)
     data.actuator("finger_right_joint").ctrl[0] = -0.3
     while data.time < 1.0:
         mujoco.mj_step(model, data)
@@ -213,17 +200,13 @@ def test_fingers_move_together(model: mujoco.MjModel) -> None:
 def test_scene_has_a_floor(folder: Path) -> None:
     model = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
     assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    mujoco.mj_forward(model, data)
+    data = begun(model)
     assert data.ncon == 0
 
 
 def test_another_mechanism_is_a_model_too(tmp_path: Path, gantry: Robot) -> None:
     """It has sliding, endless and following joints, primitive shapes, and no mass."""
-    assert main(["export", "mjcf", "--urdf", str(GANTRY), "--out", str(tmp_path)]) == 0
-    zipfile.ZipFile(tmp_path / "gantry_2_mjcf.zip").extractall(tmp_path)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "gantry_2" / "gantry_2.xml"))
+    model = mujoco.MjModel.from_xml_path(str(unpacked(tmp_path, GANTRY) / "gantry_2.xml"))
     data = mujoco.MjData(model)
     values = gantry.values(GANTRY_POSE)
     set_values(model, data, values)
@@ -235,11 +218,8 @@ def test_another_mechanism_is_a_model_too(tmp_path: Path, gantry: Robot) -> None
 
 def test_an_arm_without_masses_holds_itself_too(tmp_path: Path) -> None:
     """Its URDF states none, although it has collision shapes."""
-    assert main(["export", "mjcf", "--urdf", str(OWN_ARM), "--out", str(tmp_path)]) == 0
-    zipfile.ZipFile(tmp_path / "my_own_arm_mjcf.zip").extractall(tmp_path)
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "my_own_arm" / "my_own_arm.xml"))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    model = mujoco.MjModel.from_xml_path(str(unpacked(tmp_path, OWN_ARM) / "my_own_arm.xml"))
+    data = begun(model)
     start = data.qpos.copy()
     while data.time < 1.0:
         mujoco.mj_step(model, data)
@@ -289,17 +269,13 @@ def test_other_arms_hold_themselves_at_home(
 ) -> None:
     """Links that overlap there do not push each other away, and forces are limited."""
     (tmp_path / "arm.urdf").write_text(text)
-    command = ["export", "mjcf", "--urdf", str(tmp_path / "arm.urdf"), "--out", str(tmp_path)]
-    assert main(command) == 0
-    zipfile.ZipFile(next(tmp_path.glob("*.zip"))).extractall(tmp_path)
-    (scene,) = tmp_path.glob("*/scene.xml")
+    scene = unpacked(tmp_path, tmp_path / "arm.urdf") / "scene.xml"
     model = mujoco.MjModel.from_xml_path(str(scene))
     stated = [math.nan if force is None else force for force in forces]
     limits = np.where(np.isnan(stated), model.actuator_forcerange[:, 1], stated)
     assert (limits > 0.0).all()
     np.testing.assert_allclose(model.actuator_forcerange, np.column_stack((-limits, limits)))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data = begun(model)
     start, speed = data.qpos.copy(), 0.0
     np.testing.assert_allclose(start[:3], home, atol=1e-9)
     while data.time < 5.0:

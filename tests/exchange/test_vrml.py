@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,11 +22,11 @@ from katana450.extensions.export.vrml_world import (
     World,
     world_text,
 )
-from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
-from tests.exchange.strict_vrml import read_world
+from tests.exchange.strict_vrml import Matrix, numbers_of, placed_nodes, read_world
 from tests.exchange.tools import SCREEN, needs, run
 from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 
@@ -36,7 +35,6 @@ pytestmark = pytest.mark.long
 MOST = 2_500_000
 """[bytes] Maximum size of the arm's world."""
 
-Matrix = npt.NDArray[np.float64]
 
 numbers = st.one_of(
     st.floats(allow_nan=False, allow_infinity=False), st.integers(-99, 99).map(lambda n: n / 10.0)
@@ -103,31 +101,9 @@ def test_the_arm_is_read_back(katana: Robot) -> None:
 
 def placed_points(world: World) -> Iterator[tuple[str, Matrix]]:
     """Return the nearest named ancestor and the placed points (n, 3) of every face set."""
-
-    def visit(node: Node, T: Matrix, name: str) -> Iterator[tuple[str, Matrix]]:
-        name = node.name if node.name is not None and node.kind in ("Transform", "Group") else name
-        if node.kind == "Transform":
-            # ISO/IEC 14772-1, 6.52: P' = T C R -C P.
-            centre, moved = (field(node, key, (0.0, 0.0, 0.0)) for key in ("center", "translation"))
-            x, y, z, angle = field(node, "rotation", (0.0, 0.0, 1.0, 0.0))
-            step = se3.from_rotation_translation(so3.exp(angle * np.array((x, y, z))), moved)
-            step[:3, 3] += centre - step[:3, :3] @ centre
-            T = T @ step
+    for node, name, T in placed_nodes(world):
         if node.kind == "Coordinate":
-            points = field(node, "point", ()).reshape(-1, 3)
-            yield name, points @ T[:3, :3].T + T[:3, 3]
-        for _, value in node.fields:
-            for part in value if isinstance(value, list) else (value,):
-                if isinstance(part, Node):
-                    yield from visit(part, T, name)
-
-    for top in world.nodes:
-        yield from visit(top, np.eye(4), "")
-
-
-def field(node: Node, name: str, default: tuple[float, ...]) -> Matrix:
-    value = node.get(name)
-    return np.array(default if value is None else value, dtype=float)
+            yield name, numbers_of(node, "point", ()).reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
 
 
 @pytest.mark.parametrize("which", ["katana", "gantry"])

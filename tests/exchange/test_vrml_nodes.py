@@ -25,13 +25,13 @@ from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.export.vrml import initial_objects, world_of
 from katana450.extensions.export.vrml_nodes import VrmlNodes
-from katana450.extensions.export.vrml_world import Node, World
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import requests
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.joint_rotations import THERE, rotation
+from tests.exchange.strict_vrml import placed_nodes
 from tests.exchange.vrml_types import FIELDS
 from tests.robot.public_arms import PX150, J, written
 
@@ -102,8 +102,9 @@ def test_export_has_the_objects_of_a_new_server_by_the_same_names(robot: Robot) 
     }
     assert {"cup", "basin", "tcp", "flange", "cup_look", "cup_paint"} <= world.keys()
     assert world.keys() == named.keys()
-    # By the Transforms of the file, every link and object is where the server says.
-    poses = absolute_poses(file)
+    # By the Transforms of the file, every link and object is where the server says, with z up.
+    turn = se3.from_rotation_translation(so3.rotation_x(0.5 * np.pi), np.zeros(3))
+    poses = {node.name: turn @ T for node, _, T in placed_nodes(file) if node.kind == "Transform"}
     for name, node in world.items():
         if node.kind == "Transform" and not node.of.startswith("joint"):
             fields = {field.field: field.value for field in node.fields}
@@ -112,31 +113,6 @@ def test_export_has_the_objects_of_a_new_server_by_the_same_names(robot: Robot) 
                 so3.exp(angle * np.array((x, y, z))), np.array(fields["translation"])
             )
             np.testing.assert_allclose(T, poses[name], rtol=0, atol=1e-7, err_msg=name)
-
-
-def absolute_poses(world: World) -> dict[str, Any]:
-    """Return the pose (4, 4) of each named Transform below the Transform that turns z up."""
-    found = {}
-
-    def field(node: Node, name: str, default: Any) -> Any:
-        value = node.get(name)
-        return default if value is None else value
-
-    def visit(node: Node, T: Any) -> None:
-        if node.kind == "Transform":
-            *axis, angle = field(node, "rotation", (0.0, 0.0, 1.0, 0.0))
-            T = T @ se3.from_rotation_translation(
-                so3.exp(angle * np.array(axis)), field(node, "translation", (0.0, 0.0, 0.0))
-            )
-            found[node.name or ""] = T
-        for child in field(node, "children", ()):
-            if isinstance(child, Node):
-                visit(child, T)
-
-    upright = next(node for node in world.nodes if node.kind == "Transform")
-    for child in field(upright, "children", ()):
-        visit(child, np.eye(4))
-    return found
 
 
 def test_fields_that_can_be_set_say_so(nodes: VrmlNodes, state: State, robot: Robot) -> None:
