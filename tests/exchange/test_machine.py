@@ -21,6 +21,7 @@ from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.strict_vrml import read_world
 from tests.exchange.trees import tree
+from tests.robot.urdf_files import saved
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
@@ -43,9 +44,7 @@ def test_followers_limit_their_leader() -> None:
 def test_no_posture_inside_the_limits_takes_any_joint_beyond_its_own(
     tmp_path: Path, seed: int
 ) -> None:
-    path = tmp_path / "tree.urdf"
-    path.write_text(tree(seed, 6 + seed))
-    robot = load(path)
+    robot = load(saved(tmp_path, tree(seed, 6 + seed)))
     joints, random = robot.joint_group, np.random.default_rng(seed)
     for fraction in (0.0, 1.0, random.uniform(size=joints.n)):
         values = robot.joint_values(joints.lower + fraction * (joints.upper - joints.lower), 0.0)
@@ -74,16 +73,13 @@ LOCKED = """<robot name="r"><link name="a"/><link name="b"/>
     ],
 )
 def test_undrivable_robot_is_reported(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "r.urdf"
-    path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=said):
-        assert load(path).joint_group
+        assert load(saved(tmp_path, text)).joint_group
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
-    path = tmp_path / "tree.urdf"
-    path.write_text(tree(seed))
+    path = saved(tmp_path, tree(seed))
     robot = load(path)
     values = robot.joint_values(robot.joint_group.upper, 0.0)
     made = (

@@ -17,6 +17,7 @@ from katana450.errors import InputError, RobotDescriptionError
 from katana450.extensions.export.files import distinct
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY, POSES
+from tests.robot.urdf_files import edited, saved
 
 ARMS = Path(__file__).parents[1] / "robot" / "arms"
 
@@ -40,8 +41,7 @@ def test_links_are_placed_as_in_yourdfpy(path: Path) -> None:
 def test_mimic_of_a_mimic_follows_the_driven_joint(tmp_path: Path) -> None:
     direct = '<mimic joint="grip" multiplier="-0.1" offset="-0.04"/>'
     chained = '<mimic joint="grip too" multiplier="0.1" offset="-0.05"/>'
-    (tmp_path / "other.urdf").write_text(GANTRY.read_text().replace(direct, chained))
-    gantry = load(tmp_path / "other.urdf")
+    gantry = load(edited(tmp_path, GANTRY.read_text(), direct, chained))
     assert gantry.driven == ("rail", "turn", "grip")
     values = gantry.values((0.1, 20.0, -0.5))
     assert values["grip too"] == pytest.approx(0.6)
@@ -102,8 +102,7 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
     ):
         assert shape in text
         text = text.replace(shape, mesh)
-    (tmp_path / "other.urdf").write_text(text)
-    shapes = {link.name: link.shapes for link in load(tmp_path / "other.urdf").links}
+    shapes = {link.name: link.shapes for link in load(saved(tmp_path, text)).links}
     (cart,), (thumb,) = shapes["cart"], shapes["thumb"]
     assert cart.material.colour == pytest.approx((0.8, 0.1, 0.2), abs=0.01)
     assert thumb.material.colour == pytest.approx((0.1, 0.4, 0.7), abs=0.01)
@@ -154,18 +153,16 @@ def test_an_impossible_pose_is_refused(katana: Robot, pose: tuple[float, ...], s
 def test_an_invalid_description_is_refused(
     tmp_path: Path, before: str, after: str, said: str
 ) -> None:
-    text = GANTRY.read_text()
-    assert before in text
-    changed = text.replace(before, after.replace("CIRCLE", '<mimic joint="out"/>'))
-    (tmp_path / "other.urdf").write_text(changed)
+    after = after.replace("CIRCLE", '<mimic joint="out"/>')
+    path = edited(tmp_path, GANTRY.read_text(), before, after)
     with pytest.raises(RobotDescriptionError, match=said):
-        load(tmp_path / "other.urdf").check_complete()
+        load(path).check_complete()
 
 
 def test_missing_mesh_is_reported(tmp_path: Path) -> None:
-    text = GANTRY.read_text().replace('<sphere radius="0.05"/>', '<mesh filename="no.stl"/>')
-    (tmp_path / "other.urdf").write_text(text)
-    assert "no.stl" in load(tmp_path / "other.urdf").notes[0]
+    text = GANTRY.read_text()
+    other = load(edited(tmp_path, text, '<sphere radius="0.05"/>', '<mesh filename="no.stl"/>'))
+    assert "no.stl" in other.notes[0]
 
 
 def test_names_become_identifiers_and_stay_apart() -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 
 from katana450.errors import InputError
 from katana450.extensions.importers.guarded_reading import read_shape_guarded
@@ -22,7 +21,6 @@ from katana450.extensions.importers.shape_file import (
     Format,
     read_shape,
 )
-from katana450.maths.geometry import se3, so3
 from katana450.platform_support import hanging_time
 from tests.exchange.mutations import check_mutations
 from tests.exchange.solids import is_closed, sides, volume
@@ -68,16 +66,6 @@ def test_other_units_become_metres() -> None:
     assert mesh.unit == "m"
     again = read_mesh(mesh.file, "l.3mf", "m")
     np.testing.assert_array_equal(again.vertices, mesh.vertices)
-
-
-def test_another_program_writes_the_same() -> None:
-    turn = se3.from_rotation_translation(so3.exp((0.2, 0.4, 0.6)), (5.0, 0.0, 0.0))
-    mesh = trimesh.creation.annulus(10.0, 30.0, 25.0, transform=turn)
-    data = mesh.export(file_type="3mf")
-    shape = read_shape(data, Format.THREEMF, "a", 1e-3)
-    assert len(shape.faces) == len(mesh.faces)
-    assert is_closed(shape)
-    assert volume(shape) == pytest.approx(mesh.volume * 1e-9, rel=1e-5)
 
 
 @pytest.mark.parametrize(

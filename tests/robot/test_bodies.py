@@ -18,12 +18,11 @@ from katana450.maths.collision.world import CollisionWorld, Part
 from katana450.settings import Settings
 from tests.exchange.trees import tree
 from tests.robot.hands import hand, rail
+from tests.robot.urdf_files import saved
 
 
 def read(tmp_path: Path, text: str) -> Robot:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    return load(path)
+    return load(saved(tmp_path, text))
 
 
 def pairs(world: CollisionWorld) -> set[frozenset[str]]:
@@ -137,8 +136,7 @@ def folded(height: float) -> str:
 
 
 def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Path) -> None:
-    path = tmp_path / "folded.urdf"
-    path.write_text(folded(0.16))
+    path = saved(tmp_path, folded(0.16))
     robot = load(path, find=find_arm)
     world, notes, _ = robot_world(robot)
     assert world is not None
@@ -158,8 +156,7 @@ def test_parts_that_touch_at_zero_and_are_apart_at_home_are_checked(tmp_path: Pa
 
 
 def test_parts_that_are_apart_at_zero_are_checked_as_before(tmp_path: Path) -> None:
-    path = tmp_path / "folded.urdf"
-    path.write_text(folded(0.05))
+    path = saved(tmp_path, folded(0.05))
     world, notes, _ = robot_world(load(path, find=find_arm))
     assert world is not None
     assert frozenset(("post", "forearm")) in pairs(world)

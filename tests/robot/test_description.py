@@ -11,14 +11,7 @@ from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
 from tests.robot.public_arms import PX150, J, urdf, written
-
-
-def edited(tmp_path: Path, old: str, new: str) -> Path:
-    text = urdf("arm", PX150)
-    assert old in text
-    path = tmp_path / "arm.urdf"
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    return path
+from tests.robot.urdf_files import edited
 
 
 @pytest.mark.parametrize(
@@ -80,7 +73,7 @@ def edited(tmp_path: Path, old: str, new: str) -> Path:
 def test_every_fault_of_a_file_is_reported_with_its_line(
     tmp_path: Path, old: str, new: str, expected: str
 ) -> None:
-    path = edited(tmp_path, old, new)
+    path = edited(tmp_path, urdf("arm", PX150), old, new)
     with pytest.raises(RobotDescriptionError, match=expected) as raised:
         find_robot(Settings(), path, None)
     message = str(raised.value)

@@ -15,6 +15,7 @@ from katana450.settings import Settings
 from tests.general_arms.driven import begun, settled
 from tests.general_arms.links_of_arms import ur5e
 from tests.robot.hands import column
+from tests.robot.urdf_files import saved
 
 SHAPE = re.compile(r"<(cylinder|box) [^>]*/>")
 ESTIMATED = "Contacts are estimated, because shapes cannot be read:"
@@ -22,9 +23,7 @@ MISSING = '<mesh filename="package://ur/none.stl"/>'
 
 
 def read(tmp_path: Path, text: str) -> DescribedRobot:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    return find_robot(Settings(), path, None)
+    return find_robot(Settings(), saved(tmp_path, text), None)
 
 
 def test_arm_without_its_meshes_stops_before_the_table_and_says_what_is_estimated(

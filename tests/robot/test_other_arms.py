@@ -24,6 +24,7 @@ from katana450.maths.kinematics.tool import pitch_and_roll, pitched_frame
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.cli.lines import ask
+from tests.robot.urdf_files import edited, saved
 
 ROOT = Path(__file__).resolve().parents[2]
 ARMS = Path(__file__).parent / "arms"
@@ -159,14 +160,6 @@ def test_kinematics_are_answered_line_by_line() -> None:
     assert answer["residual_mm"] < 1e-9
 
 
-def edited(tmp_path: Path, old: str, new: str) -> Path:
-    text = PINCHER.read_text(encoding="utf-8")
-    assert old in text
-    path = tmp_path / "edited.urdf"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return path
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -210,7 +203,7 @@ def test_an_arm_of_another_kind_is_refused_with_the_reason(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
     with pytest.raises(RobotDescriptionError, match=message):
-        load(edited(tmp_path, old, new)).require_arm()
+        load(edited(tmp_path, PINCHER.read_text(), old, new)).require_arm()
 
 
 def test_an_impossible_tool_is_refused() -> None:
@@ -223,8 +216,7 @@ def test_an_impossible_tool_is_refused() -> None:
 def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None:
     own = load().require_arm()
     text = (ROOT / "robot_description" / "katana450.urdf").read_text(encoding="utf-8")
-    path = tmp_path / "edited.urdf"
-    path.write_text(text.replace('"shoulder_frame"', '"elsewhere"'), encoding="utf-8")
+    path = edited(tmp_path, text, '"shoulder_frame"', '"elsewhere"')
     other = load(path).require_arm()
     np.testing.assert_allclose(other.T_base_shoulder, own.T_base_shoulder, atol=1e-15)
     np.testing.assert_allclose(so3.log(other.chain.M[:3, :3]), 0.0, atol=1e-15)
@@ -243,10 +235,8 @@ def test_the_shoulder_frame_of_our_own_arm_needs_no_link(tmp_path: Path) -> None
 def test_invalid_robot_description_is_reported_plainly(
     text: str, message: str, tmp_path: Path
 ) -> None:
-    path = tmp_path / "arm.urdf"
-    path.write_text(text)
     with pytest.raises(RobotDescriptionError, match=message):
-        load(path)
+        load(saved(tmp_path, text))
 
 
 def test_a_joint_behind_a_tool_without_name_is_reported(tmp_path: Path) -> None:

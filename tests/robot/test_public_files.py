@@ -11,14 +11,9 @@ from katana450.arm.robot.link import SLOW_TURN
 from katana450.arm.robot.loader import load
 from katana450.errors import RobotDescriptionError
 from tests.robot.hands import rail
+from tests.robot.urdf_files import saved
 
 ARM = Path(__file__).resolve().parent / "arms" / "pincherx_150.urdf"
-
-
-def write(tmp_path: Path, text: str) -> Path:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    return path
 
 
 @pytest.mark.parametrize(
@@ -33,13 +28,13 @@ def write(tmp_path: Path, text: str) -> Path:
     ],
 )
 def test_a_wrong_xml_declaration_is_overlooked(tmp_path: Path, beginning: str) -> None:
-    robot = load(write(tmp_path, beginning + rail()))
+    robot = load(saved(tmp_path, beginning + rail()))
     assert robot.driven == ("slide_left", "slide_right")
     # The line of a fault is still that of the file.
     broken = beginning + rail().replace('lower="-0.5"', 'lower="low"', 1)
     line = broken[: broken.index('"low"')].count("\n") + 1
     with pytest.raises(RobotDescriptionError, match=f"line {line}: lower='low'"):
-        load(write(tmp_path, broken))
+        load(saved(tmp_path, broken))
 
 
 def test_elements_of_other_programs_need_no_declared_prefix(tmp_path: Path) -> None:
@@ -48,10 +43,10 @@ def test_elements_of_other_programs_need_no_declared_prefix(tmp_path: Path) -> N
         '<gazebo><controller:base name="c"><interface:position name="p"/></controller:base>'
         "</gazebo></robot>",
     )
-    assert load(write(tmp_path, text)).driven == ("slide_left", "slide_right")
+    assert load(saved(tmp_path, text)).driven == ("slide_left", "slide_right")
     xacro = rail().replace("</robot>", '<xacro:unknown name="x"/></robot>')
     with pytest.raises(RobotDescriptionError, match="unbound prefix"):
-        load(write(tmp_path, xacro))
+        load(saved(tmp_path, xacro))
 
 
 def test_limits_of_followers_that_exclude_each_other_are_left_out_with_a_note(
@@ -60,14 +55,14 @@ def test_limits_of_followers_that_exclude_each_other_are_left_out_with_a_note(
     # A follower in the opposite direction, with the limits of the driven joint.
     text = rail().replace('joint="slide_right"/>', 'joint="slide_right" multiplier="-1"/>')
     text = text.replace('lower="-0.5" upper="0.3"', 'lower="0.1" upper="0.3"')
-    robot = load(write(tmp_path, text))
+    robot = load(saved(tmp_path, text))
     joints = robot.joint_group
     assert (joints.lower[1], joints.upper[1]) == (0.1, 0.3)
     (note,) = robot.joint_notes
     assert "follow 'slide_right' exclude each other" in note
     # Limits that only narrow each other count, as before.
     narrow = rail().replace('upper="0.3"', 'upper="0.1"')
-    robot = load(write(tmp_path, narrow.replace('upper="0.1"', 'upper="0.3"', 1)))
+    robot = load(saved(tmp_path, narrow.replace('upper="0.1"', 'upper="0.3"', 1)))
     assert robot.joint_group.upper[1] == 0.1
     assert robot.joint_notes == ()
 
@@ -78,7 +73,7 @@ def test_an_arm_without_speeds_turns_slowly_and_says_so(tmp_path: Path, speed: s
     assert 'velocity="' in text
     start = text.index('velocity="')
     end = text.index('"', start + len('velocity="')) + 1
-    path = write(tmp_path, text[:start] + speed + text[end:])
+    path = saved(tmp_path, text[:start] + speed + text[end:])
     robot = load(path)
     arm = robot.require_arm()
     expected = np.array(load(ARM).require_arm().chain.speed)

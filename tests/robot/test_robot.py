@@ -15,6 +15,9 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
+from tests.robot.urdf_files import edited
+
+KATANA = URDF_PATH.read_text(encoding="utf-8")
 
 
 def test_the_axes_are_the_papers(arm: MountedArm) -> None:
@@ -75,23 +78,17 @@ def test_every_mesh_is_there(robot: Robot) -> None:
     assert robot.notes == robot.require_arm().notes == ()
 
 
-def edited(tmp_path: Path, old: str, new: str) -> Path:
-    text = URDF_PATH.read_text(encoding="utf-8")
-    assert old in text
-    path = tmp_path / "edited.urdf"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return path
-
-
 def test_the_kinematics_follow_the_file(tmp_path: Path) -> None:
     """Check that a longer arm in the file is a longer arm: no number is duplicated."""
-    changed = load(edited(tmp_path, 'xyz="0.190', 'xyz="0.290')).require_arm()
+    changed = load(edited(tmp_path, KATANA, 'xyz="0.190', 'xyz="0.290')).require_arm()
     assert changed.tools["tcp"][0, 3] == pytest.approx(0.7318)
     assert math.isclose(changed.chain.S[5, 2], 0.290)  # v of axis 3: -omega x r
 
 
 def test_a_finger_that_mimics_nothing_is_driven_with_the_other(tmp_path: Path) -> None:
-    other = load(edited(tmp_path, '<mimic joint="finger_right_joint"', '<dynamics friction="0"'))
+    other = load(
+        edited(tmp_path, KATANA, '<mimic joint="finger_right_joint"', '<dynamics friction="0"')
+    )
     angles = other.joint_values(np.zeros(5), 0.2)
     assert (angles["finger_right_joint"], angles["finger_left_joint"]) == (0.2, 0.2)
 

@@ -13,12 +13,11 @@ from katana450.extensions.bodies.robot_world import robot_world
 from katana450.maths.collision.world import CollisionWorld
 from tests.general_arms.links_of_arms import ur5e
 from tests.robot.hands import column, hand, rail
+from tests.robot.urdf_files import saved
 
 
 def read(tmp_path: Path, text: str) -> tuple[CollisionWorld, tuple[str, ...]]:
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    world, notes, _ = robot_world(load(path))
+    world, notes, _ = robot_world(load(saved(tmp_path, text)))
     assert world is not None
     return world, notes
 
@@ -84,8 +83,7 @@ def test_part_that_is_near_the_table_at_rest_keeps_half_of_its_distance(tmp_path
 
 
 def test_arm_has_its_table_in_its_session(tmp_path: Path) -> None:
-    path = tmp_path / "ur5e.urdf"
-    path.write_text(ur5e())
+    path = saved(tmp_path, ur5e())
     world, _, _ = robot_world(load(path, find=find_arm))
     assert world is not None
     assert "table" not in {part.name for part in world.parts}

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-import numpy as np
 import pytest
 import yourdfpy
 
@@ -24,7 +22,6 @@ from katana450.extensions.export.vrml import vrml_files, world_of
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
-from tests.exchange.trees import tree
 from tests.robot.public_arms import PX150, J, urdf, written
 
 ARMS = Path(__file__).parent / "arms"
@@ -64,39 +61,6 @@ def everything(tmp_path: Path) -> Path:
 
 def read(path: Path) -> Urdf:
     return urdf_of(path.read_bytes(), path.parent)
-
-
-def paths(tmp_path: Path) -> Iterator[Path]:
-    yield from (URDF_PATH, GANTRY, *sorted(ARMS.glob("*.urdf")))
-    for seed in range(5):
-        path = tmp_path / f"tree{seed}.urdf"
-        path.write_text(tree(seed, 8))
-        yield path
-
-
-def test_every_joint_is_that_of_yourdfpy(everything: Path, tmp_path: Path) -> None:
-    for path in (everything, *paths(tmp_path)):
-        peer = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False)
-        found = read(path)
-        assert list(found.links) == list(peer.link_map)
-        assert list(found.joints) == list(peer.joint_map)
-        for name, joint in found.joints.items():
-            other = peer.joint_map[name]
-            assert (joint.type, joint.parent, joint.child) == (
-                other.type, other.parent, other.child
-            )  # fmt: skip
-            origin = np.eye(4) if other.origin is None else other.origin
-            # The same bits: exported files must not change with the reader.
-            np.testing.assert_array_equal(joint.origin, origin)
-            np.testing.assert_array_equal(joint.axis, other.axis)
-            assert (joint.limit is None) == (other.limit is None)
-            if joint.limit is not None:
-                limit = other.limit
-                assert joint.limit == (limit.lower, limit.upper, limit.velocity, limit.effort)
-            assert (joint.mimic is None) == (other.mimic is None)
-            if joint.mimic is not None:
-                mimic = other.mimic
-                assert joint.mimic == (mimic.joint, mimic.multiplier, mimic.offset)
 
 
 def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
