@@ -18,7 +18,7 @@ from katana450.extensions.real_arm.emulator.arm import EmulatedArm
 from katana450.extensions.real_arm.emulator.axis import AxisMode
 from katana450.extensions.real_arm.emulator.server import EmulatorServer
 from katana450.extensions.real_arm.exchange_lines import ExchangeDecoder
-from katana450.extensions.real_arm.link import ArmLink, ExchangeLog, LoggedTransport, TcpTransport
+from katana450.extensions.real_arm.link import ArmLink, ExchangeLog, TcpTransport
 from katana450.server.api import answers
 from katana450.server.api.answers import MeasuredArm
 from tests.browser.server import APP, AppServer, free_port
@@ -75,7 +75,7 @@ def test_probe_without_an_arm_says_so_and_keeps_what_it_has(tmp_path: Path) -> N
 def test_log_shows_the_exchanges_in_words(server: EmulatorServer, tmp_path: Path) -> None:
     file = tmp_path / "exchanges.log"
     log = ExchangeLog(file)
-    link = ArmLink(LoggedTransport(TcpTransport("127.0.0.1", server.port), log))
+    link = ArmLink(TcpTransport("127.0.0.1", server.port), log=log)
     link.exchange(req.ReadMasterVersion())
     with pytest.raises(Exception, match="not calibrated"):
         link.exchange(req.CommandMotor(2, req.MotorFlag.MOVE, 100))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from argparse import Namespace
-from dataclasses import fields
 from pathlib import Path
+
+import msgspec
 
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError
@@ -81,7 +82,7 @@ class ExchangeDecoder:
 
 def message_words(message: WireMessage) -> str:
     """Return the class of a message and its fields."""
-    values = ((field.name, getattr(message, field.name)) for field in fields(message))
+    values = msgspec.structs.asdict(message).items()
     shown = ", ".join(f"{name} {_shown(value)}" for name, value in values)
     return f"{type(message).__name__} {shown}".rstrip()
 

@@ -125,14 +125,6 @@ BAUD = 57_600
 """[bit/s] Rate of every arm with a serial port."""
 
 
-def serial_transport(path: str) -> SerialPort:
-    """Open ``path``, such as /dev/ttyUSB0 or COM3.
-
-    Raises LinkLostError, and ConfigurationError if pyserial is not installed.
-    """
-    return SerialPort(path, BAUD, "the arm", LinkLostError)
-
-
 CONNECT_TIMEOUT = 1.0
 """[s] Longest time that an attempt to connect may take."""
 
@@ -173,7 +165,7 @@ class ArmUrl:
     def open(self) -> Transport:
         """Connect, and return the connection. Raises LinkLostError and ConfigurationError."""
         if self.port is None:
-            return serial_transport(self.host)
+            return SerialPort(self.host, BAUD, "the arm", LinkLostError)
         return TcpTransport(self.host, self.port, CONNECT_TIMEOUT)
 
     def __str__(self) -> str:
@@ -230,45 +222,6 @@ class ExchangeLog:
             ) from error
 
 
-class LoggedTransport:
-    """A connection that writes all that passes to a log."""
-
-    def __init__(self, transport: Transport, log: ExchangeLog) -> None:
-        self._transport, self._log = transport, log
-        log.note(CONNECTED)
-
-    def write(self, data: bytes, timeout: float) -> None:
-        """Send ``data`` within ``timeout`` [s]. Raises LinkLostError."""
-        self._log.note(SENT, data)
-        self._transport.write(data, timeout)
-
-    def read(self, timeout: float) -> bytes:
-        """Return what has arrived within ``timeout`` [s]. Raises LinkLostError."""
-        data = self._transport.read(timeout)
-        self._log.note(RECEIVED, data)
-        return data
-
-    def close(self) -> None:
-        """End the connection."""
-        self._transport.close()
-
-
-@dataclass(frozen=True)
-class LoggedArmUrl(ArmUrl):
-    """Address of an arm whose connections are written to a log.
-
-    Attributes:
-        log: The log; None for none.
-    """
-
-    log: ExchangeLog | None = None
-
-    def open(self) -> Transport:
-        """Connect, and return the connection. Raises LinkLostError and ConfigurationError."""
-        transport = super().open()
-        return transport if self.log is None else LoggedTransport(transport, self.log)
-
-
 EXCHANGE_TIMEOUT = 0.3
 """[s] Deadline of an exchange. With the time between two exchanges it is less than the silence for
 which the driver takes an arm for lost."""
@@ -286,10 +239,16 @@ class ArmLink:
     """
 
     def __init__(
-        self, transport: Transport, clock: Callable[[], float] = time.perf_counter
+        self,
+        transport: Transport,
+        clock: Callable[[], float] = time.perf_counter,
+        log: ExchangeLog | None = None,
     ) -> None:
+        """Use ``transport``, by the time of ``clock``; ``log``: file of all that passes."""
         self._transport = transport
         self._clock = clock
+        self._log = log
+        self._note(CONNECTED)
         self._codec = HostCodec()
         self._is_lost = False
         self.heard_at = clock()
@@ -324,6 +283,7 @@ class ArmLink:
         data = self._codec.send(request)
         start = self._clock()
         try:
+            self._note(SENT, data)
             self._transport.write(data, timeout)
             while not (events := self._codec.receive(self._read(start + timeout))):
                 pass
@@ -341,6 +301,11 @@ class ArmLink:
     def _read(self, deadline: float) -> bytes:
         left = deadline - self._clock()
         data = self._transport.read(left) if left > 0.0 else b""
+        self._note(RECEIVED, data)
         if not data:
             raise LinkLostError("The arm does not answer.")
         return data
+
+    def _note(self, mark: str, data: bytes = b"") -> None:
+        if self._log is not None:
+            self._log.note(mark, data)

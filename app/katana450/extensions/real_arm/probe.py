@@ -8,9 +8,10 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from katana450.assembly.log_output import printable
 from katana450.atomic import check_writable, write_files, writer_of
@@ -173,7 +174,7 @@ def _read(link: ArmLink, request: req.ArmRequest, repeats: int) -> Report:
         payloads = [reply.payload for reply in replies]
         reading["reply"] = payloads[0].hex(" ")
         reading["fields"] = {
-            field.name: _plain(getattr(replies[0], field.name)) for field in fields(replies[0])
+            name: _plain(value) for name, value in msgspec.structs.asdict(replies[0]).items()
         }
         reading["bytes_that_changed"] = [
             place

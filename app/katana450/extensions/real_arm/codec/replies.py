@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any, ClassVar, Final, Self
+
+import msgspec
 
 from katana450.errors import InputError
 
 
-@dataclass(frozen=True)
-class WireMessage:
+class WireMessage(msgspec.Struct, frozen=True):
     """A message: fixed bytes, then the fields of the class in the order of their definition.
 
     Attributes:
@@ -53,15 +53,14 @@ class WireMessage:
 
     def _numbers(self) -> list[Any]:
         numbers: list[Any] = []
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for value in msgspec.structs.astuple(self):
             numbers += value if isinstance(value, tuple) else (value,)
         return numbers
 
     @classmethod
     def _of(cls, numbers: tuple[Any, ...]) -> Self:
         create: Callable[..., Self] = cls
-        count = len(fields(cls))
+        count = len(cls.__struct_fields__)
         if len(numbers) == count:
             return create(*numbers)
         return create(*numbers[: count - 1], numbers[count - 1 :])
@@ -177,20 +176,17 @@ ERROR_TEXT_LENGTH = 51
 """Bytes of the text of an error in the longest form, with its final zero."""
 
 
-@dataclass(frozen=True)
-class ArmReply(WireMessage):
+class ArmReply(WireMessage, frozen=True):
     """Base of all replies."""
 
 
-@dataclass(frozen=True)
-class EchoReply(ArmReply):
+class EchoReply(ArmReply, frozen=True):
     """Reply without content."""
 
     HEAD = b"z"
 
 
-@dataclass(frozen=True)
-class MasterVersion(ArmReply):
+class MasterVersion(ArmReply, frozen=True):
     """Firmware of the master, 2.1 for example."""
 
     HEAD = b"b"
@@ -199,8 +195,7 @@ class MasterVersion(ArmReply):
     revision: int
 
 
-@dataclass(frozen=True)
-class ArmIdentity(ArmReply):
+class ArmIdentity(ArmReply, frozen=True):
     """Text of 81 bytes with which the arm identifies itself, and its end of line."""
 
     HEAD = b"y"
@@ -209,8 +204,7 @@ class ArmIdentity(ArmReply):
     end: bytes = b"\r\n"
 
 
-@dataclass(frozen=True)
-class CommandTable(ArmReply):
+class CommandTable(ArmReply, frozen=True):
     """Commands of the firmware: 30 entries of 6 bytes.
 
     An entry holds index, command, three bytes of unknown meaning, and the letter of the reply.
@@ -221,8 +215,7 @@ class CommandTable(ArmReply):
     entries: bytes
 
 
-@dataclass(frozen=True)
-class SlaveVersion(ArmReply):
+class SlaveVersion(ArmReply, frozen=True):
     """Firmware of the controller of an axis.
 
     Attributes:
@@ -246,8 +239,7 @@ class SlaveVersion(ArmReply):
     rest: bytes = b"\0\0\0\0\0"
 
 
-@dataclass(frozen=True)
-class AxisReading(ArmReply):
+class AxisReading(ArmReply, frozen=True):
     """State of one axis.
 
     Attributes:
@@ -267,8 +259,7 @@ class AxisReading(ArmReply):
     pwm: int
 
 
-@dataclass(frozen=True)
-class AxisStates(ArmReply):
+class AxisStates(ArmReply, frozen=True):
     """Status bytes of all axes, (6,)."""
 
     HEAD = b"n"
@@ -276,8 +267,7 @@ class AxisStates(ArmReply):
     states: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class AxisPositions(ArmReply):
+class AxisPositions(ArmReply, frozen=True):
     """Positions of all axes, (6,) [encoders]."""
 
     HEAD = b"n"
@@ -285,8 +275,7 @@ class AxisPositions(ArmReply):
     positions: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class MotorCommanded(ArmReply):
+class MotorCommanded(ArmReply, frozen=True):
     """Answer to a motor command. ``axis``: 0 for a failure, unless the command was for all."""
 
     HEAD = b"c"
@@ -295,8 +284,7 @@ class MotorCommanded(ArmReply):
     flag: int
 
 
-@dataclass(frozen=True)
-class AxisParameters(ArmReply):
+class AxisParameters(ArmReply, frozen=True):
     """Values of a parameter of an axis."""
 
     HEAD = b"s"
@@ -308,8 +296,7 @@ class AxisParameters(ArmReply):
     r3: int
 
 
-@dataclass(frozen=True)
-class CollisionDetectionSet(ArmReply):
+class CollisionDetectionSet(ArmReply, frozen=True):
     """Answer to switching collision detection. ``result``: unknown; 0."""
 
     HEAD = b"a"
@@ -317,8 +304,7 @@ class CollisionDetectionSet(ArmReply):
     result: int = 0
 
 
-@dataclass(frozen=True)
-class SensorBytes(ArmReply):
+class SensorBytes(ArmReply, frozen=True):
     """Sensors of the gripper, (16,) as raw bytes. ``controller``: 0 for a failure."""
 
     HEAD = b"e"
@@ -327,8 +313,7 @@ class SensorBytes(ArmReply):
     values: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class SplinesSent(ArmReply):
+class SplinesSent(ArmReply, frozen=True):
     """Answer to the polynomials of all axes. ``results``: two bytes of unknown meaning."""
 
     HEAD = b"h"
@@ -336,8 +321,7 @@ class SplinesSent(ArmReply):
     results: bytes = b"\x02\x01"
 
 
-@dataclass(frozen=True)
-class DigitalBits(ArmReply):
+class DigitalBits(ArmReply, frozen=True):
     """Digital inputs: input n is bit n - 1, 0 while it is active."""
 
     HEAD = b"t"
@@ -345,8 +329,7 @@ class DigitalBits(ArmReply):
     bits: int
 
 
-@dataclass(frozen=True)
-class FirmwareError(ArmReply):
+class FirmwareError(ArmReply, frozen=True):
     """Reason for which the arm refused a request.
 
     Attributes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -28,8 +27,7 @@ class MotorFlag(IntEnum):
     FLUSH = 32
 
 
-@dataclass(frozen=True)
-class ArmRequest(WireMessage):
+class ArmRequest(WireMessage, frozen=True):
     """Base of all requests."""
 
     REPLY: ClassVar[type[ArmReply]] = ArmReply
@@ -39,40 +37,35 @@ class ArmRequest(WireMessage):
         return getattr(reply, "axis", 1) != 0
 
 
-@dataclass(frozen=True)
-class EchoRequest(ArmRequest):
+class EchoRequest(ArmRequest, frozen=True):
     """Request without effect."""
 
     HEAD = b"Z"
     REPLY = replies.EchoReply
 
 
-@dataclass(frozen=True)
-class ReadMasterVersion(ArmRequest):
+class ReadMasterVersion(ArmRequest, frozen=True):
     """Read the version of the master's firmware."""
 
     HEAD = b"B"
     REPLY = replies.MasterVersion
 
 
-@dataclass(frozen=True)
-class ReadArmIdentity(ArmRequest):
+class ReadArmIdentity(ArmRequest, frozen=True):
     """Read the text with which the arm identifies itself."""
 
     HEAD = b"Y"
     REPLY = replies.ArmIdentity
 
 
-@dataclass(frozen=True)
-class ReadCommandTable(ArmRequest):
+class ReadCommandTable(ArmRequest, frozen=True):
     """Read the list of commands of the firmware."""
 
     HEAD = b"X"
     REPLY = replies.CommandTable
 
 
-@dataclass(frozen=True)
-class ReadSlaveVersion(ArmRequest):
+class ReadSlaveVersion(ArmRequest, frozen=True):
     """Read the version of the firmware of an axis. ``parameter`` is always 32."""
 
     HEAD = b"V"
@@ -82,8 +75,7 @@ class ReadSlaveVersion(ArmRequest):
     parameter: int = 32
 
 
-@dataclass(frozen=True)
-class ReadAxis(ArmRequest):
+class ReadAxis(ArmRequest, frozen=True):
     """Read status, position, speed and drive of an axis."""
 
     HEAD = b"D"
@@ -92,8 +84,7 @@ class ReadAxis(ArmRequest):
     axis: int
 
 
-@dataclass(frozen=True)
-class ReadStates(ArmRequest):
+class ReadStates(ArmRequest, frozen=True):
     """Read the status of all axes."""
 
     HEAD = b"N\x01"
@@ -101,8 +92,7 @@ class ReadStates(ArmRequest):
     REPLY = replies.AxisStates
 
 
-@dataclass(frozen=True)
-class ReadPositions(ArmRequest):
+class ReadPositions(ArmRequest, frozen=True):
     """Read the positions of all axes."""
 
     HEAD = b"N\x03"
@@ -110,8 +100,7 @@ class ReadPositions(ArmRequest):
     REPLY = replies.AxisPositions
 
 
-@dataclass(frozen=True)
-class CommandMotor(ArmRequest):
+class CommandMotor(ArmRequest, frozen=True):
     """Order to the motor of one axis or, with axis 0, of all.
 
     Attributes:
@@ -132,8 +121,7 @@ class CommandMotor(ArmRequest):
         return self.axis == ALL_AXES or super().is_confirmed_by(reply)
 
 
-@dataclass(frozen=True)
-class SetAxisParameter(ArmRequest):
+class SetAxisParameter(ArmRequest, frozen=True):
     """Set a parameter of an axis.
 
     Attributes:
@@ -152,8 +140,7 @@ class SetAxisParameter(ArmRequest):
     p3: int = 0
 
 
-@dataclass(frozen=True)
-class SetCollisionDetection(ArmRequest):
+class SetCollisionDetection(ArmRequest, frozen=True):
     """Switch collision detection on (1) or off (0). ``first`` is 1 for on with a Katana300."""
 
     HEAD = b"A"
@@ -170,8 +157,7 @@ class SetCollisionDetection(ArmRequest):
         return cls(enabled=numbers[1], first=numbers[0])
 
 
-@dataclass(frozen=True)
-class ReadSensors(ArmRequest):
+class ReadSensors(ArmRequest, frozen=True):
     """Read the 16 sensors of the gripper."""
 
     HEAD = b"E"
@@ -220,8 +206,7 @@ class More(IntEnum):
     """The packet waits for a later one."""
 
 
-@dataclass(frozen=True)
-class SendSplines(ArmRequest):
+class SendSplines(ArmRequest, frozen=True):
     """Polynomials of all axes, in one packet.
 
     Attributes:
@@ -248,8 +233,7 @@ class SendSplines(ArmRequest):
         return cls(segments, *numbers[AXES * width :])
 
 
-@dataclass(frozen=True)
-class ReadInputs(ArmRequest):
+class ReadInputs(ArmRequest, frozen=True):
     """Read the digital inputs."""
 
     HEAD = b"Tr"
@@ -257,19 +241,14 @@ class ReadInputs(ArmRequest):
     REPLY = replies.DigitalBits
 
 
-@dataclass(frozen=True)
-class ErrorQuery(ArmRequest):
+class ErrorQuery(ArmRequest, frozen=True):
     """Fetch the reason of an error. Sent as four raw bytes without header and checksum."""
 
     HEAD = b"\x00\x00\x00\xc1"
     REPLY = replies.FirmwareError
 
 
-REQUESTS: tuple[type[ArmRequest], ...] = (
-    EchoRequest, ReadMasterVersion, ReadArmIdentity, ReadCommandTable, ReadSlaveVersion, ReadAxis,
-    ReadStates, ReadPositions, CommandMotor, SetAxisParameter, SetCollisionDetection, ReadSensors,
-    SendSplines, ReadInputs,
-)  # fmt: skip
+REQUESTS = tuple(kind for kind in ArmRequest.__subclasses__() if kind is not ErrorQuery)
 """Requests that are sent in frames: all but ``ErrorQuery``."""
 
 

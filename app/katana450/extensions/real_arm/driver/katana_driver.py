@@ -27,7 +27,6 @@ from katana450.extensions.real_arm.link import (
     ArmUrl,
     ExchangeLog,
     LinkLostError,
-    LoggedArmUrl,
 )
 from katana450.extensions.real_arm.tool_travel import Travel, tool_travel
 from katana450.extensions.real_arm.variants import DEFAULT_VARIANT, EncoderMap, Variant
@@ -78,6 +77,7 @@ class KatanaDriver:
         variant: Variant = DEFAULT_VARIANT,
         clock: Callable[[], float] = time.perf_counter,
         travel: Travel | None = None,
+        exchange_log: ExchangeLog | None = None,
     ) -> None:
         """Create the driver without a connection.
 
@@ -88,11 +88,12 @@ class KatanaDriver:
             variant: The arm.
             clock: Clock of the control loop.
             travel: Travel of the tool between two postures; None if a stop is measured without it.
+            exchange_log: File of all exchanges; None for none.
 
         Raises ConfigurationError if the limits of the joints are not those of the arm.
         """
         EncoderMap(variant).check_limits(*bounds[:, :JOINTS])
-        self._url = url
+        self._url, self._exchange_log = url, exchange_log
         self._clock = clock
         self._machine = ArmMachine(variant, bounds, joints, travel)
         self._link: ArmLink | None = None
@@ -222,7 +223,7 @@ class KatanaDriver:
             self._sleep()
             return
         try:
-            self._link = ArmLink(self._url.open(), self._clock)
+            self._link = ArmLink(self._url.open(), self._clock, self._exchange_log)
         except KatanaError as error:
             self._lose(str(error))
         else:
@@ -284,8 +285,7 @@ def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -
     if url.port is None:
         # Before the server starts: the driver tries to connect until it is ended.
         require("serial", "serial", "Serial ports")
-    if options.arm_log is not None:
-        url = LoggedArmUrl(url.host, url.port, ExchangeLog(options.arm_log))
+    exchange_log = None if options.arm_log is None else ExchangeLog(options.arm_log)
     arm = robot.require_arm()
     bounds = np.array(
         [
@@ -294,4 +294,5 @@ def driver_of(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -
         ]
     )
     joints = np.array([*q, gripper])
-    return KatanaDriver(url, bounds, joints, travel=tool_travel(robot))
+    travel = tool_travel(robot)
+    return KatanaDriver(url, bounds, joints, travel=travel, exchange_log=exchange_log)
