@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from katana450.errors import KatanaError as KatanaError
     from katana450.errors import RobotDescriptionError as RobotDescriptionError
     from katana450.extensions.general_arms.nearest import NearestPose as NearestPose
-    from katana450.extensions.reachability.map import ReachabilityMap as ReachabilityMap
+    from katana450.extensions.reachability.reachability import ReachabilityMap as ReachabilityMap
     from katana450.library.arm import Arm as Arm
     from katana450.library.loading import load as load
     from katana450.library.motion_plan import MotionPlan as MotionPlan
@@ -52,7 +52,7 @@ _MODULES = {
     "KatanaError": "errors",
     "MotionPlan": "library.motion_plan",
     "NearestPose": "extensions.general_arms.nearest",
-    "ReachabilityMap": "extensions.reachability.map",
+    "ReachabilityMap": "extensions.reachability.reachability",
     "Recording": "library.recording",
     "RobotDescriptionError": "errors",
     "ScriptWriter": "library.script_writer",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.reachability.map import voxel_centers, voxel_ranges
+from katana450.extensions.reachability.reachability import voxel_centers, voxel_ranges
 from katana450.maths.geometry.arrays import FloatArray
 
 CENTER = (0.01, -0.02, 0.3)

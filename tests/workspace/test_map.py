@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.extensions.reachability import map as map_module
-from katana450.extensions.reachability.map import FAMILY, reachability_map
-from katana450.extensions.reachability.reachability import Reachability
+from katana450.extensions.reachability import reachability as map_module
+from katana450.extensions.reachability.reachability import FAMILY, Reachability, reachability_map
 
 
 def test_map_has_the_counts_of_its_voxels_however_many_are_counted_at_once(

@@ -10,8 +10,12 @@ import pytest
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.reachability.map import reachability_map
-from katana450.extensions.reachability.reachability import PoseSolver, Reachability, rotations
+from katana450.extensions.reachability.reachability import (
+    PoseSolver,
+    Reachability,
+    reachability_map,
+    rotations,
+)
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
