@@ -31,8 +31,7 @@ from katana450.arm.control.joint_commands import JOG_TIME
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
-from katana450.maths.motion.pursuit import stream_step
-from katana450.maths.motion.stream import Stream
+from katana450.maths.motion.stream import Stream, stream_step
 
 TICK = 0.01
 

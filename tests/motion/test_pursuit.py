@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits
-from katana450.maths.motion.pursuit import braked, pursued
-from katana450.maths.motion.stream import Stream
+from katana450.maths.motion.stream import Stream, braked, pursued
 
 TICK = 0.01
 

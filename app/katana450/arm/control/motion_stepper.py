@@ -32,9 +32,15 @@ from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import JogFrame, coasted, jog
-from katana450.maths.motion.limiter import LIMIT_TOLERANCE, JointMotion, Limiter, Limits
-from katana450.maths.motion.proportional import STILL, in_proportion
-from katana450.maths.motion.pursuit import stream_step
+from katana450.maths.motion.limiter import (
+    LIMIT_TOLERANCE,
+    STILL,
+    JointMotion,
+    Limiter,
+    Limits,
+    in_proportion,
+)
+from katana450.maths.motion.stream import stream_step
 
 PROBE_LENGTH = 0.02
 """[rad] Length of path that must be clear before a waiting arm continues. After a shorter probe the
