@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.in_plane import nearest_at_pitch
+from katana450.maths.kinematics.nearest_posture import nearest_at_pitch
 from katana450.maths.kinematics.planar import Interval, PlanarArm, Posture
 from tests.kinematics.conftest import L1, L2, TOOL_LENGTHS
 
