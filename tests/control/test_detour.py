@@ -23,9 +23,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.jet import Jet
-from katana450.maths.planning.sampling import collision_free_paths
+from katana450.maths.planning.sampling import BranchRegion, collision_free_paths
 
 TICK = 0.01
 

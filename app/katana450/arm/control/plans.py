@@ -14,11 +14,10 @@ from katana450.errors import BlockedError
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import Branch
-from katana450.maths.planning.branch_region import BranchRegion
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
 from katana450.maths.planning.plan import MARGIN, Plan, check_clear, plan
-from katana450.maths.planning.sampling import collision_free_paths
+from katana450.maths.planning.sampling import BranchRegion, collision_free_paths
 from katana450.maths.planning.scaling import Bounds
 
 DETOUR_SEARCHES = 5
