@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
+import queue
+import sys
+import threading
 import time
 from argparse import Namespace
 from contextlib import suppress
@@ -31,7 +34,6 @@ from katana450.extensions.leader.joint_map import (
     read_calibration,
     read_layout,
 )
-from katana450.extensions.leader.keyboard import Keyboard
 from katana450.extensions.leader.motor_bus import (
     BAUD,
     HOMING_OFFSET,
@@ -45,6 +47,33 @@ from katana450.extensions.serial_port import SerialPort
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.sdk import answers, requests
 from katana450.sdk import program_requests as programs
+
+
+class Keyboard:
+    """The typed lines, read in a thread. Without a terminal there are none.
+
+    Attributes:
+        present: whether a person can type.
+    """
+
+    def __init__(self) -> None:
+        """Start the thread if standard input is a terminal."""
+        self.present = sys.stdin is not None and sys.stdin.isatty()
+        self._lines: queue.Queue[str] = queue.Queue()
+        if self.present:
+            threading.Thread(target=self._read, name="keyboard", daemon=True).start()
+
+    def line(self) -> str | None:
+        """Return the next line that was typed; None if there is none."""
+        try:
+            return self._lines.get_nowait()
+        except queue.Empty:
+            return None
+
+    def _read(self) -> None:
+        for line in sys.stdin:
+            self._lines.put(line.strip())
+
 
 NAME = "Leader"
 """Name of this client, which others see as the driver."""
