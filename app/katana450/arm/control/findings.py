@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -73,17 +74,23 @@ def of_projection(
         findings.append(Finding(Reason.ROLL_CHANGED, roll_error))
     if pitch_gave_way and (in_place or priority is Priority.PITCH):
         findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
-    if findings:
-        if best.axis1:
-            findings.append(Finding(Reason.AXIS_1))
-        if best.reach:
-            findings.append(Finding(Reason.LINKS))
-        for axis in best.limits:
-            q, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
-            findings.append(
-                Finding(Reason.AXIS_LIMIT, float(min(lower, upper, key=lambda b: abs(b - q))), axis)
-            )
-    return tuple(findings)
+    return (*findings, *causes_of(chain, best)) if findings else ()
+
+
+def causes_of(chain: Chain, best: Projection, *, at_edge: bool = False) -> Iterator[Finding]:
+    """Yield the findings on what keeps the tool of ``best`` from coming nearer to its target.
+
+    ``at_edge``: whether the posture is at the edge of its branch.
+    """
+    if best.axis1:
+        yield Finding(Reason.AXIS_1)
+    if best.reach:
+        yield Finding(Reason.LINKS)
+    elif at_edge:
+        yield Finding(Reason.SINGULAR)
+    for axis in best.limits:
+        ends = float(chain.lower[axis]), float(chain.upper[axis])
+        yield Finding(Reason.AXIS_LIMIT, min(ends, key=lambda end: abs(end - best.q[axis])), axis)
 
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:

@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.links import DHLinks, links_of
-from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.links import DHLinks
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
@@ -100,11 +100,9 @@ class FileRounding:
         q, chain = np.array(q), self.chain
         missed = np.abs(forward_batch(chain, q) - T).max(axis=(1, 2))
         for k in np.flatnonzero((missed > EXACT) & (missed <= BESIDE * self.offset)).tolist():
-            angles, _ = self._search.descend(self._search.goal(T[k]), q[k].tolist(), STEPS)
+            angles, _ = search_of(self.chain).descend(
+                search_of(self.chain).goal(T[k]), q[k].tolist(), STEPS
+            )
             if np.abs(forward(chain, angles) - T[k]).max() < missed[k]:
                 q[k] = in_limits_turns(chain, np.array(angles))
         return q
-
-    @cached_property
-    def _search(self) -> Numerical:
-        return Numerical(self.chain, links_of(self.chain, exact=False))

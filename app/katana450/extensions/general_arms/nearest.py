@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
-from katana450.arm.control.findings import of_projection
+from katana450.arm.control.findings import causes_of, of_projection
 from katana450.arm.control.messages import REASONS
 from katana450.arm.control.state import Finding, Reason
 from katana450.errors import InputError
-from katana450.extensions.general_arms.links import links_of
-from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch, Branch
@@ -157,7 +155,7 @@ def _searched(
     chain: Chain, T: FloatArray, solutions: Iterable[Solution], q_hint: npt.ArrayLike | None
 ) -> list[Solution]:
     """Return postures inside the limits that searches from ``solutions`` and the hint lead to."""
-    search = _search(chain)
+    search = search_of(chain)
     starts = [chain.clamp(solution.q) for solution in solutions]
     if q_hint is not None:
         starts.insert(0, chain.clamp(q_hint))
@@ -247,11 +245,6 @@ def is_out_of_reach(chain: Chain, q: FloatArray, reached: FloatArray, target: Fl
     return before - after <= CLEARLY * min(before, APPROACH * length)
 
 
-@lru_cache(maxsize=64)
-def _search(chain: Chain) -> Numerical:
-    return Numerical(chain, links_of(chain, exact=False))
-
-
 def losses_of(
     chain: Chain,
     best: Projection,
@@ -277,12 +270,5 @@ def losses_of(
         yield Finding(reason, best.position_error)
     if turned:
         yield Finding(Reason.ORIENTATION_CHANGED, best.rotation_error)
-    if not (off or turned) or gap is not None:
-        return
-    if best.reach:
-        yield Finding(Reason.LINKS)
-    elif at_edge:
-        yield Finding(Reason.SINGULAR)
-    for axis in best.limits:
-        ends = float(chain.lower[axis]), float(chain.upper[axis])
-        yield Finding(Reason.AXIS_LIMIT, min(ends, key=lambda end: abs(end - best.q[axis])), axis)
+    if (off or turned) and gap is None:
+        yield from causes_of(chain, best, at_edge=at_edge)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -24,10 +25,11 @@ import numpy.typing as npt
 from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
-from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
+from katana450.extensions.general_arms.links import DHLinks, links_of, sine_and_cosine
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import inverse_one_by_one
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turns
@@ -350,3 +352,9 @@ def _turn(pose: tuple[float, ...], goal: tuple[float, ...]) -> tuple[float, floa
         return w[0], w[1], w[2]
     factor = math.atan2(sine, cosine) / sine if sine > 1e-12 else 1.0
     return factor * x, factor * y, factor * z
+
+
+@lru_cache(maxsize=64)
+def search_of(chain: Chain) -> Numerical:
+    """Return the search of ``chain`` as its file describes it; the result is cached."""
+    return Numerical(chain, links_of(chain, exact=False))

@@ -30,7 +30,7 @@ from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS
 from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
-from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.spherical_wrist import (
     crossing_shoulder,
     is_crossing_shoulder,
@@ -117,10 +117,6 @@ class SevenAxes(GeneralKinematics):
         )
 
     @cached_property
-    def _search(self) -> Numerical:
-        return Numerical(self.chain, links_of(self.chain, exact=False))
-
-    @cached_property
     def rounding(self) -> FileRounding:
         """The rounding of the file that describes the chain; `at_swivels` does not correct it."""
         return FileRounding(self.chain, self.links)
@@ -202,7 +198,7 @@ class SevenAxes(GeneralKinematics):
         swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
-            neighbour = self._search.solve(T, hint, seeds=0)
+            neighbour = search_of(self.chain).solve(T, hint, seeds=0)
             ends = [hint[self.swivel], neighbour[self.swivel]]
             swivels = np.append(swivels, np.clip(ends, low, high))
         q = self.at_swivels(T, swivels)
