@@ -61,7 +61,7 @@ def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -
 
     Four axes turn the pose with axis 1, and seven keep their swivel.
     """
-    solver, chain = tool._solver, tool.chain
+    solver, chain = tool.solver, tool.chain
     if isinstance(solver, SevenAxes):
         found = solver.at_its_swivel(place.T[None], q)[0, solver.branches.index(branch)]
         return near_turns(chain, found, q) if np.isfinite(found).all() else None

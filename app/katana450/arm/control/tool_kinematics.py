@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol, cast
+from typing import ClassVar, cast
 
 import numpy as np
 
@@ -12,10 +13,12 @@ from katana450.arm.control import findings
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
 from katana450.arm.control.tool_commands import StepTool, Turn, TurnCommand
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics import projection, tracker, velocity
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch, branch_of
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
 from katana450.maths.kinematics.priority import Priority
@@ -27,41 +30,60 @@ from katana450.maths.kinematics.velocity import JogFrame
 from katana450.maths.motion.limiter import Limits
 
 
-class ToolKinematics(Kinematics, Protocol):
+@dataclass(frozen=True, eq=False)
+class ToolKinematics(ABC):
     """Kinematics of one tool: inverse kinematics, drags, typed poses, branches and jogs.
 
     The functions that take a state read its goal (n,) [rad], branch and priority.
 
     Attributes:
-        branches: every branch, in the order in which they are shown.
+        chain: the chain, whose `M` is the pose of the tool.
         priorities: the priorities that can be chosen, each with its name and a sentence for people.
         freedoms: number of numbers in a jog and in a step: 5 (x, y, z, pitch, roll), or 6 (x, y, z
             and a rotation about each axis of the frame).
         turn: the command that turns the tool.
     """
 
-    @property
-    def priorities(self) -> Mapping[Priority, tuple[str, str]]: ...  # noqa: D102
-    @property
-    def freedoms(self) -> int: ...  # noqa: D102
-    @property
-    def turn(self) -> type[TurnCommand]: ...  # noqa: D102
+    chain: Chain
 
+    priorities: ClassVar[Mapping[Priority, tuple[str, str]]]
+    freedoms: ClassVar[int]
+    turn: ClassVar[type[TurnCommand]]
+
+    @property
+    @abstractmethod
+    def solver(self) -> Kinematics:
+        """The inverse kinematics of the chain."""
+
+    @property
+    def branches(self) -> tuple[AnyBranch, ...]:
+        """Every branch, in the order in which they are shown."""
+        return self.solver.branches
+
+    @abstractmethod
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the branch of the joint angles `q` (n,) [rad]."""
 
+    @abstractmethod
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the target at which the tool is with the joints at `q` (n,) [rad]."""
 
+    @abstractmethod
     def turned(self, state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
         """Return ``target`` with the orientation of ``command``, which is a `turn`."""
 
+    @abstractmethod
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``."""
 
-    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:
-        """Return ``target``, given on the branch of ``state``, in the numbers of ``branch``."""
+    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:  # noqa: ARG002
+        """Return ``target``, given on the branch of ``state``, in the numbers of ``branch``.
 
+        A pose is the same on every branch.
+        """
+        return target
+
+    @abstractmethod
     def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, as far as one tick allows.
 
@@ -69,33 +91,49 @@ class ToolKinematics(Kinematics, Protocol):
         drag has been followed.
         """
 
+    @abstractmethod
     def project(self, state: State, T: FloatArray, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch``, inside the limits, nearest to the pose `T` (4, 4)."""
 
+    @abstractmethod
     def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``, at any distance."""
 
+    @abstractmethod
     def losses(self, state: State, best: Projection, *, yaw_was_given: bool) -> tuple[Finding, ...]:
         """Return the findings on what ``best`` loses of its target.
 
         ``yaw_was_given``: whether the target has a yaw that counts for five axes.
         """
 
+    @abstractmethod
     def tracking_losses(self, state: State, tracked: Tracked) -> tuple[Finding, ...]:
         """Return the findings on what following a drag loses, a gap first."""
 
+    @abstractmethod
     def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
         """Return the twist (6,) of the tool in {S} [rad/s, m/s] for a jog at `q` (n,) [rad]."""
 
+    @abstractmethod
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
         """Return the speed of the tool point [m/s], or an upper bound, for rates `qd` (n,)."""
 
+    @abstractmethod
     def tool_speed_bound(self, qd: FloatArray) -> float:
         """Return the maximum of ``tool_speed`` over all postures."""
 
-    def branch_limits(self, limits: Limits) -> Mapping[AnyBranch, Limits]:
-        """Return ``limits`` for each branch whose elbow must keep its side; may be empty."""
+    def branch_limits(self, limits: Limits) -> Mapping[AnyBranch, Limits]:  # noqa: ARG002
+        """Return ``limits`` for each branch whose elbow must keep its side.
 
+        Empty where the limits of one joint do not decide the branch.
+        """
+        return {}
+
+    def axes(self, q: FloatArray, frame: JogFrame) -> FloatArray:
+        """Return the rotation (3, 3) in {S} of the axes of ``frame`` at `q` (n,) [rad]."""
+        return np.eye(3) if frame is JogFrame.BASE else forward(self.chain, q)[:3, :3]
+
+    @abstractmethod
     def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:
         """Return the joint angles (n,) [rad] in which the arm starts.
 
@@ -112,14 +150,19 @@ READY_ROOM = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class FiveAxisTool(FiveAxisKinematics):
-    """The functions of the five-axis family as `ToolKinematics`."""
+class FiveAxisTool(ToolKinematics):
+    """The tool of an arm of the five-axis family."""
 
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = {
         priority: (name, PRIORITY_HINTS[priority]) for priority, name in PRIORITIES.items()
     }
     freedoms: ClassVar[int] = 5
     turn: ClassVar[type[TurnCommand]] = Turn
+
+    @cached_property
+    def solver(self) -> FiveAxisKinematics:
+        """The closed form of the family."""
+        return FiveAxisKinematics(self.chain)
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return `branch.branch_of`."""
@@ -136,9 +179,7 @@ class FiveAxisTool(FiveAxisKinematics):
 
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then pitch and roll [rad]."""
-        moved = step.by[:3]
-        if step.frame is velocity.JogFrame.TOOL:
-            moved = forward(self.chain, state.goal)[:3, :3] @ moved
+        moved = self.axes(state.goal, step.frame) @ step.by[:3]
         pitch, roll = target.pitch + float(step.by[3]), target.roll + float(step.by[4])
         return ToolTarget(frozen(target.position + moved), pitch, roll)
 
@@ -147,7 +188,7 @@ class FiveAxisTool(FiveAxisKinematics):
         same = _five(branch).shoulder == _five(state.branch).shoulder
         return target if same else target.turned_round()
 
-    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> tracker.Tracked:
+    def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return `tracker.track`."""
         return tracker.track(
             self.chain,
@@ -158,31 +199,28 @@ class FiveAxisTool(FiveAxisKinematics):
             since=since,
         )
 
-    def project(self, state: State, T: FloatArray, branch: AnyBranch) -> projection.Projection:
+    def project(self, state: State, T: FloatArray, branch: AnyBranch) -> Projection:
         """Return `projection.project`."""
         where, priority = _five(branch), state.priority
         return projection.project(self.chain, T, branch=where, q_hint=state.goal, priority=priority)
 
-    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> projection.Projection:
+    def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> Projection:
         """Return `tracker.leap`."""
         return tracker.leap(self.chain, state.goal, target, _five(branch), state.priority)
 
-    def losses(
-        self, state: State, best: projection.Projection, *, yaw_was_given: bool
-    ) -> tuple[Finding, ...]:
+    def losses(self, state: State, best: Projection, *, yaw_was_given: bool) -> tuple[Finding, ...]:
         """Return `findings.of_projection`."""
         return findings.of_projection(self.chain, best, state.priority, yaw_was_given=yaw_was_given)
 
-    def tracking_losses(self, state: State, tracked: tracker.Tracked) -> tuple[Finding, ...]:
+    def tracking_losses(self, state: State, tracked: Tracked) -> tuple[Finding, ...]:
         """Return `findings.of_tracked`."""
         return findings.of_tracked(self.chain, tracked, state.priority)
 
-    def jog_twist(self, q: FloatArray, rates: FloatArray, frame: velocity.JogFrame) -> FloatArray:
+    def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
         """Return the twist (6,) of rates (5,): velocity of the tool point, pitch and roll."""
-        in_base, pitched = frame is velocity.JogFrame.BASE, pitched_frame(self.chain, q)
-        v = rates[:3] if in_base else forward(self.chain, q)[:3, :3] @ rates[:3]
+        pitched = pitched_frame(self.chain, q)
         omega = rates[3] * pitched[:, 1] + rates[4] * pitched[:, 0]
-        return np.concatenate((omega, v))
+        return np.concatenate((omega, self.axes(q, frame) @ rates[:3]))
 
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
         """Return `velocity.tool_speed`."""

@@ -2,31 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.control.gripper_model import GripperModel
+from katana450.arm.control.joints import JointSet
 from katana450.arm.control.silence import SilenceProfile
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
-from katana450.maths.motion.limiter import Limits
-
-
-class JointLimitsSource(Protocol):
-    """The limits of an arm that the simulation needs; any ``ArmModel`` or ``JointSet`` has them."""
-
-    @property
-    def limits(self) -> Limits:
-        """Limits of the joints."""
-        ...
-
-    @property
-    def gripper(self) -> GripperModel:
-        """The finger joint."""
-        ...
 
 
 class SimulatedDriver:
@@ -34,7 +18,7 @@ class SimulatedDriver:
 
     silence_profile = SilenceProfile.SIMULATION
 
-    def __init__(self, arm: JointLimitsSource, q: FloatArray, gripper: float) -> None:
+    def __init__(self, arm: ArmModel | JointSet, q: FloatArray, gripper: float) -> None:
         """Create an arm at ``q`` (n,) [rad] with its finger joint at ``gripper`` [rad or m].
 
         Values beyond the limits are clipped.

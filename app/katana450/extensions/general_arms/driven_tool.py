@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state import Finding, State
 from katana450.arm.control.tool_commands import Orient, StepTool, TurnCommand
+from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.arm.robot.arm_reader import OtherArm, described_chain
 from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf
@@ -28,9 +28,8 @@ from katana450.extensions.general_arms.general_kinematics import (
     GeneralKinematics,
     in_order_for_people,
 )
-from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.nearest import losses_of, nearest_posture, projected
-from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.pose_equations import PoseEquations
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.maths.geometry import so3
@@ -41,11 +40,9 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projection
-from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import JogFrame
-from katana450.maths.motion.limiter import Limits
 
 ANGLES: Final = tuple(np.radians((0.0, 45.0, -45.0, 90.0, -90.0, 135.0, -135.0)).tolist())
 """[rad] Angles that are tried for the joints that turn."""
@@ -151,48 +148,33 @@ SIX_PRIORITIES: Final[Mapping[Priority, tuple[str, str]]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class DrivenTool:
-    """The functions of one arm as `ToolKinematics`."""
-
-    chain: Chain
+class DrivenTool(ToolKinematics):
+    """The tool of an arm outside the five-axis family."""
 
     freedoms: ClassVar[int] = 6
     turn: ClassVar[type[TurnCommand]] = Orient
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = SIX_PRIORITIES
 
     @cached_property
-    def _solver(self) -> GeneralKinematics:
+    def solver(self) -> GeneralKinematics:
+        """The closed form of the chain, or the search."""
         solver = kinematics_of(self.chain)
         assert isinstance(solver, GeneralKinematics)
         return solver
 
     @cached_property
     def _tracker(self) -> PoseTracker:
-        search = Numerical(self.chain, links_of(self.chain, exact=False))
-        regularity = Regularity(self.chain.n, self._solver.swivel)
-        return PoseTracker(Descent(search, regularity), self._solver)
-
-    @property
-    def method(self) -> str:
-        """The method in words."""
-        return self._solver.method
+        regularity = Regularity(self.chain.n, self.solver.swivel)
+        return PoseTracker(Descent(search_of(self.chain), regularity), self.solver)
 
     @property
     def branches(self) -> tuple[AnyBranch, ...]:
         """The names of the branches, those of usual postures first."""
-        return in_order_for_people(self._solver.branches)
-
-    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
-        """Return a posture for each branch; see `Kinematics.inverse`."""
-        return self._solver.inverse(T, q_hint)
-
-    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
-        """Return joint angles (N, branches, n) [rad]; see `Kinematics.inverse_batch`."""
-        return self._solver.inverse_batch(T)
+        return in_order_for_people(self.solver.branches)
 
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the name of the branch of `q` (n,) [rad]."""
-        return self._solver.branch_of(q)
+        return self.solver.branch_of(q)
 
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the pose of the tool at `q` (n,) [rad]."""
@@ -206,19 +188,13 @@ class DrivenTool:
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then a rotation vector [rad]."""
         pan, by = self._pan(state.goal), step.by
-        R = np.eye(3)
-        if step.frame is JogFrame.TOOL:
-            R = forward(self.chain, state.goal)[:3, :3]
+        R = self.axes(state.goal, step.frame)
         turned = so3.exp(R @ by[3:]) @ pan @ target.R
         return ToolTarget(frozen(target.position + R @ by[:3]), rotation=frozen(pan.T @ turned))
 
     def _pan(self, q: FloatArray) -> FloatArray:
         """Return the rotation (3, 3) that axis 1 gives to targets of fewer than six axes."""
         return so3.exp(self.chain.S[:3, 0] * float(q[0])) if self.chain.n < 6 else np.eye(3)
-
-    def target_on(self, state: State, target: ToolTarget, branch: AnyBranch) -> ToolTarget:  # noqa: ARG002
-        """Return ``target``: a pose is the same on every branch."""
-        return target
 
     def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, see `PoseTracker`."""
@@ -284,7 +260,7 @@ class DrivenTool:
             projections,
             key=lambda candidate: (candidate.branch != branch, *_misses(candidate, state.priority)),
         )
-        closed = self._solver.on_branch(T, str(branch), state.goal)
+        closed = self.solver.on_branch(T, str(branch), state.goal)
         if best.branch == branch or closed is None:
             return best
         slack = tolerances.LIMIT_SLACK
@@ -295,7 +271,7 @@ class DrivenTool:
 
     def _starts(self, state: State, T: FloatArray, branch: AnyBranch) -> list[FloatArray]:
         """Return postures (n,) [rad] from which the one nearest to `T` (4, 4) is searched."""
-        closed = self._solver.on_branch(T, str(branch), state.goal)
+        closed = self.solver.on_branch(T, str(branch), state.goal)
         if closed is None:
             closed = nearest_posture(kinematics_of(self.chain), T, q_hint=state.goal).q
         starts = [self.chain.clamp(closed)]
@@ -339,7 +315,7 @@ class DrivenTool:
 
     def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
         """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``."""
-        R = np.eye(3) if frame is JogFrame.BASE else forward(self.chain, q)[:3, :3]
+        R = self.axes(q, frame)
         return np.concatenate((R @ rates[3:], R @ rates[:3]))
 
     def equations(self, q: FloatArray) -> PoseEquations:
@@ -348,7 +324,7 @@ class DrivenTool:
         Of more than six axes the swivel is locked, or the joints without which the others move the
         tool best.
         """
-        swivel = self._solver.swivel
+        swivel = self.solver.swivel
         equations = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
         while len(equations.free) > 6:
             rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]
@@ -378,10 +354,6 @@ class DrivenTool:
             sum(map(math.hypot, a[k:], [0.0, *d[k + 1 : len(a)]])) + tool for k in range(links.n)
         ]
         return np.array(lengths)
-
-    def branch_limits(self, limits: Limits) -> Mapping[AnyBranch, Limits]:  # noqa: ARG002
-        """Return no limits: the limits of one joint do not decide the branch."""
-        return {}
 
     def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return `ready_posture`."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -25,13 +26,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.tracker import (
-    DRAG_STRIDE,
-    HOP,
-    MAX_PATH_LENGTH,
-    MIN_LEAP_GAIN,
-    Tracked,
-)
+from katana450.maths.kinematics.tracker import HOP, MIN_LEAP_GAIN, Tracked, stops_between
 
 MAX_EFFORT: Final = 20
 """Maximum effort of one call, in looks at a posture. The next call continues."""
@@ -78,16 +73,13 @@ class PoseTracker:
         ``projected`` returns the projection of ``target`` that joint angles give.
         """
         angles, effort, place = tuple(self.chain.clamp(q).tolist()), MAX_EFFORT, since
-        distance, angle = since.apart(target)
-        count = max(1, math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH)))
-        for number in range(1, count + 1):
-            stop = target if number == count else since.towards(target, number / count)
+        for stop in chain(stops_between(since, target), (target,)):
             before = angles
             angles, effort, ended = self._advanced(angles, place, stop, branch, priority, effort)
-            if number == 1 and not ended and self._is_led_along_edge(angles, stop, priority):
+            if place is since and not ended and self._is_led_along_edge(angles, stop, priority):
                 at_swivel = self._with_its_swivel(before, stop, branch)
                 angles, ended = (angles, False) if at_swivel is None else (at_swivel, True)
-            if not ended or (effort <= 0 and number < count):
+            if not ended or (effort <= 0 and stop is not target):
                 return Tracked(projected(np.array(angles)), since=stop if ended else place)
             place = stop
         goal = np.array(angles)

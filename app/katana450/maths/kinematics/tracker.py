@@ -27,10 +27,7 @@ from katana450.maths.kinematics.limited import LimitedArm
 from katana450.maths.kinematics.nearest_posture import NearestPosture, nearest_posture
 from katana450.maths.kinematics.planar import Interval
 from katana450.maths.kinematics.priority import Priority
-from katana450.maths.kinematics.projection import (
-    Projection,
-    measured,
-)
+from katana450.maths.kinematics.projection import Projection, measured
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.turns import wrapped
 
@@ -134,7 +131,8 @@ def track(
         )
     # One hop at least, so that the loop ends.
     effort = max(MAX_POSES - _effort(nearest), 1)
-    for stop in () if since is None else _stops(limited.arm, since, target):
+    ends = () if since is None else (_near(limited.arm, since), _near(limited.arm, target))
+    for stop in stops_between(*ends) if ends else ():
         stop_target = stop.canonical(limited.arm, priority)
         pursuit = _Pursuit(
             limited, stop_target, nearest_posture(limited, stop_target, branch, alpha)
@@ -186,9 +184,8 @@ def _near(arm: FiveAxisArm, target: ToolTarget) -> ToolTarget:
     return target if far <= 1.0 else replace(target, position=target.position / far)
 
 
-def _stops(arm: FiveAxisArm, since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
-    """Return the stops on the path of the drag, without its ends."""
-    since, target = _near(arm, since), _near(arm, target)
+def stops_between(since: ToolTarget, target: ToolTarget) -> Iterator[ToolTarget]:
+    """Return the stops of a drag, one stride apart, without the ends of its path."""
     distance, angle = since.apart(target)
     count = math.ceil(min(max(distance / DRAG_STRIDE, angle / HOP), MAX_PATH_LENGTH))
     return (since.towards(target, i / count) for i in range(1, count))

@@ -244,7 +244,9 @@ class HandPlanning:
             # The swivel of the posture there may be another one.
             hints += [chain.clamp(q + swing * np.eye(chain.n)[axis]) for swing in SWINGS]
         for hint in hints:
-            postures = [p for p in kinematics.inverse(T, hint) if p.exact and p.within_limits]
+            postures = [
+                p for p in kinematics.solver.inverse(T, hint) if p.exact and p.within_limits
+            ]
             if postures:
                 names = sorted((str(p.branch) for p in postures), key=lambda name: name != present)
                 return [*dict.fromkeys(names)][:MAX_BRANCHES]
