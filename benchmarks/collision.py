@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.state import Status
+from katana450.arm.control.state.state import Status
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm

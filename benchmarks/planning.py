@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run.program import compiled

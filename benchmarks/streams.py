@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, Trajectory
 
-from katana450.arm.control.joint_commands import JOG_TIME
+from katana450.arm.control.commands.joint_commands import JOG_TIME
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.motion.limiter import JointMotion, Limiter, Limits

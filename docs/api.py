@@ -11,8 +11,8 @@ from typing import Any
 
 import msgspec
 
-from katana450.arm.control.act import Act, Request, tag_of
-from katana450.arm.control.checked import field_schema
+from katana450.arm.control.commands.act import Act, Request, tag_of
+from katana450.arm.control.commands.checked import field_schema
 from katana450.extension import extensions, load
 from katana450.extensions.api_description import documentation
 from katana450.server.api import answers, requests

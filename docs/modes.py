@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections import defaultdict
 from pathlib import Path
 
-from katana450.arm.control.modes import MODES, Mode
-from katana450.arm.control.transitions import TABLE, Effect
+from katana450.arm.control.session.transitions import TABLE, Effect
+from katana450.arm.control.state.modes import MODES, Mode
 
 FILE = Path(__file__).resolve().parent / "tour.md"
 BEGIN, END = "<!-- modes: written by python -m docs.modes -->\n", "<!-- end of modes -->\n"

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 
 from docs.api import added_requests
-from katana450.arm.control.checked import field_schema
+from katana450.arm.control.commands.checked import field_schema
 from katana450.server.api import answers, requests
 
 FILE = Path(__file__).resolve().parents[1] / "tests" / "javascript" / "types.d.ts"

@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 import katana450
-from katana450.arm.control.act import Request
+from katana450.arm.control.commands.act import Request
 from katana450.client import acts
 from katana450.extensions.programs.language.declaration import Schema
 from katana450.library import step_methods

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot

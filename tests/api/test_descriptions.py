@@ -13,7 +13,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from katana450.arm.control.act import tag_of
+from katana450.arm.control.commands.act import tag_of
 from katana450.extensions.api_description import openapi_json
 from katana450.server.api import answers, requests
 from tests.api.test_documented import EVERY_REQUEST

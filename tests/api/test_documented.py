@@ -8,7 +8,7 @@ import pytest
 
 from docs import page_types
 from docs.api import PAGE, added_requests, page
-from katana450.arm.control.act import Command, Request, classes_of, tag_of
+from katana450.arm.control.commands.act import Command, Request, classes_of, tag_of
 from katana450.errors import InputError
 from katana450.extensions.api_description import openapi_json, summary
 from katana450.server.api import answers, requests

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page
 
-from katana450.arm.control.messages import AXIS_NAMES
+from katana450.arm.control.state.messages import AXIS_NAMES
 from katana450.settings import Settings
 from tests.browser.page import ViserPage
 from tests.browser.server import AppServer

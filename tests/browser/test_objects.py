@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from katana450.client import Client
-from katana450.extensions.export.vrml_world import HEADER
+from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.server.api import answers
 from tests.browser.conftest import OpenPage
 from tests.browser.page import ViserPage

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import Status
+from katana450.arm.control.state.state import Status
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.server.viser_bridge.themes import DARK
 from tests.browser.conftest import OpenPage, Windows

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Route
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
-from katana450.extensions.export.vrml import view, vrml_files, world_of
+from katana450.extensions.export.vrml.vrml_files import view, vrml_files, world_of
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -8,10 +8,10 @@ import trimesh
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.solid import MAX_CORNERS
+from katana450.arm.control.state.solid import MAX_CORNERS
 from katana450.errors import InputError
 from katana450.extensions.convex_body import MIN_THICKNESS_FRACTION, ConvexBody, convex_body
-from katana450.extensions.importers.shape_file import MIN_SIZE
+from katana450.extensions.importers.formats.shape_file import MIN_SIZE
 from katana450.maths.collision.shape import hull
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
-from katana450.arm.control.stopping import clear_refusal
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.state.state import State
 
 TICK = 0.01
 

@@ -10,14 +10,14 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.following import Following
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.modes import Idle, Jogging, Leaving, Positioning, Servoing
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
-from katana450.arm.control.stopping import clear_refusal
-from katana450.arm.control.transitions import TABLE, Effect, effect_of
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.session.transitions import TABLE, Effect, effect_of
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import Idle, Jogging, Leaving, Positioning, Servoing
+from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import describe_robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.resources import URDF_PATH

@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control import solid
-from katana450.arm.control.appearance import (
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.scene_changes import PAINT, appearance_of
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state import solid
+from katana450.arm.control.state.appearance import (
     AS_MADE,
     MAX_CHANGED_PARTS,
     Appearance,
@@ -22,9 +24,7 @@ from katana450.arm.control.appearance import (
     DisplayMode,
     LinkAppearance,
 )
-from katana450.arm.control.scene_changes import PAINT, appearance_of
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.errors import InputError
 from katana450.maths.geometry import so3
 

@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.messages import PRIORITIES
-from katana450.arm.control.modes import JointTarget
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
-from katana450.arm.control.tool_targets import branch_options
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import branch_options
+from katana450.arm.control.state.messages import PRIORITIES
+from katana450.arm.control.state.modes import JointTarget
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch, branch_of

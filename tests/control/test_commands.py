@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
 from katana450.errors import InputError
 
 NAN = math.nan

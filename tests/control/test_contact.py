@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.modes import JointTarget
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import JointTarget
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.appearance import AppearanceTrait
-from katana450.arm.control.following import Following
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.modes import JointTarget
-from katana450.arm.control.outcome import NO_DETOUR
-from katana450.arm.control.plans import detour_from, plan_to
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status, Verdict
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.outcome import NO_DETOUR
+from katana450.arm.control.session.plans import detour_from, plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.appearance import AppearanceTrait
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.modes import JointTarget
+from katana450.arm.control.state.state import Reason, State, Status, Verdict
 from katana450.arm.robot.loader import load
 from katana450.errors import BlockedError
 from katana450.maths.geometry.arrays import FloatArray

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.gripper_model import NO_GRIPPER
-from katana450.arm.control.messages import PRIORITIES
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
-from katana450.arm.control.tool_targets import current_target
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import current_target
+from katana450.arm.control.state.messages import PRIORITIES
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.arm.robot.loader import load
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.event_log import LogEntry, entries_between
-from katana450.arm.control.messages import REASONS, STATUS, sentence
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.event_log import LogEntry, entries_between
+from katana450.arm.control.state.messages import REASONS, STATUS, sentence
+from katana450.arm.control.state.state import Finding, Reason, State, Status
 
 TICK = 0.01
 

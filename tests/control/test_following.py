@@ -10,13 +10,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.modes import JointTarget
-from katana450.arm.control.plan_follower import MAX_UNCHECKED_PATH
-from katana450.arm.control.plans import path_to, plan_along, plan_to
-from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plan_follower import MAX_UNCHECKED_PATH
+from katana450.arm.control.session.plans import path_to, plan_along, plan_to
+from katana450.arm.control.session.session import TOOL_SPEED, Session
+from katana450.arm.control.state.modes import JointTarget
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc, ToolLine

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.grip import touching
-from katana450.arm.control.plans import plan_along, plan_to
-from katana450.arm.control.scene_objects import MAX_OBJECTS, SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.grip import touching
+from katana450.arm.control.session.plans import plan_along, plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import MAX_OBJECTS, SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props

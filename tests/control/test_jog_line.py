@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.tool import pitch_and_roll

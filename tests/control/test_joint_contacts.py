@@ -12,12 +12,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.scene_objects import Attachment
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.scene_objects import Attachment
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.arm.robot.loader import load
 from katana450.errors import InputError
 from katana450.extensions.bodies.robot_world import robot_world

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.appearance import AppearanceTrait, DisplayMode
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.appearance import AppearanceTrait, DisplayMode
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
 
 DT = 0.01

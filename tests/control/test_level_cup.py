@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.findings import of_projection
-from katana450.arm.control.messages import finding_text
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.findings import of_projection
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.state import Reason, State
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from katana450.arm.control.margins import margins
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.margins import margins
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.plans import detour_from
-from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import State, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import detour_from
+from katana450.arm.control.session.session import TOOL_SPEED, Session
+from katana450.arm.control.state.state import State, Status
 from katana450.arm.robot.loader import load
 from katana450.errors import BlockedError
 from katana450.maths.geometry.arrays import FloatArray

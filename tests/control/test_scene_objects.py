@@ -9,11 +9,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, same
-from katana450.arm.control.session import Session
-from katana450.arm.control.solid import ObjectAppearance, Solid
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import (
+    MAX_OBJECTS,
+    Attachment,
+    SceneObject,
+    Shape,
+    same,
+)
+from katana450.arm.control.state.solid import ObjectAppearance, Solid
+from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.convex_body import convex_body

@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import JOG_TIME
-from katana450.arm.control.modes import Servoing
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.commands import JOG_TIME
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import Servoing
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -8,11 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.modes import JointTarget, PoseTarget
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status, Verdict
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import JointTarget, PoseTarget
+from katana450.arm.control.state.state import Reason, State, Status, Verdict
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

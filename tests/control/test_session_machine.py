@@ -7,12 +7,12 @@ from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import precondition, rule, run_state_machine_as_test
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.following import Following
-from katana450.arm.control.messages import PRIORITIES
-from katana450.arm.control.modes import Jogging, Positioning, Tracking
-from katana450.arm.control.plans import detour_from, plan_to
-from katana450.arm.control.tool_targets import current_target
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import detour_from, plan_to
+from katana450.arm.control.session.tool_targets import current_target
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.messages import PRIORITIES
+from katana450.arm.control.state.modes import Jogging, Positioning, Tracking
 from katana450.errors import KatanaError
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm_commands import HAZARDS, ArmAct
-from katana450.arm.control.arm_report import ACTS, ArmMode, ArmReport, MeasuredStop
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Verdict
-from katana450.arm.control.stopping import clear_refusal
-from katana450.arm.control.supervision import CONTACT_DISTANCE
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.arm_commands import HAZARDS, ArmAct
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.session.supervision import CONTACT_DISTANCE
+from katana450.arm.control.state.arm_report import ACTS, ArmMode, ArmReport, MeasuredStop
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State, Verdict
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import failed, stepped, waited
 from katana450.errors import InputError

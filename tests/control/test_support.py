@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
-from katana450.arm.control.support import check_carried, check_mounted, is_loose
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.objects.support import check_carried, check_mounted, is_loose
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3

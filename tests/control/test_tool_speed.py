@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import State
-from katana450.arm.control.stopping import clear_refusal
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import TOOL_SPEED, Session
+from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.state.state import State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import jacobian_body
 from katana450.maths.kinematics.velocity import tool_speed, tool_speed_bound

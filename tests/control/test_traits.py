@@ -8,14 +8,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Command, Traits, classes_of
-from katana450.arm.control.appearance import AppearanceTrait
-from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.scene_objects import Attachment, SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Command, Traits, classes_of
+from katana450.arm.control.commands.arm_commands import ArmAct
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.appearance import AppearanceTrait
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.maths.kinematics.priority import Priority
 

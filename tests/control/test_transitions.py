@@ -9,11 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import classes_of
-from katana450.arm.control.appearance import AppearanceTrait
-from katana450.arm.control.following import Following
-from katana450.arm.control.modes import (
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import classes_of
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.transitions import TABLE, Effect, effect_of, row_of
+from katana450.arm.control.state.appearance import AppearanceTrait
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import (
     MODES,
     Idle,
     Jogging,
@@ -23,11 +26,8 @@ from katana450.arm.control.modes import (
     Servoing,
     Tracking,
 )
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.scene_objects import Attachment, named
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.control.transitions import TABLE, Effect, effect_of, row_of
+from katana450.arm.control.state.scene_objects import Attachment, named
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.forward import forward

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Command
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Command
 from katana450.arm.control.lease import Lease, Person, Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Finding, Outcome, Reason, Verdict
 from katana450.client import connect
 from katana450.extensions.event_log.record_content import content_of
 from katana450.extensions.event_log.record_maker import (

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.run.runner import Phase

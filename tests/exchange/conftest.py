@@ -11,8 +11,8 @@ import pytest
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.importers import shape_file
-from katana450.extensions.importers.shape_file import SECONDS
+from katana450.extensions.importers.formats import shape_file
+from katana450.extensions.importers.formats.shape_file import SECONDS
 from katana450.resources import URDF_PATH
 
 GANTRY = Path(__file__).parent / "gantry.urdf"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.shape_file import (
     MAX_MEMORY_BYTES,
     MAX_SIZE,
     MIN_SIZE,

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import numpy.typing as npt
 
-from katana450.extensions.importers.shape_file import ShapeFile
+from katana450.extensions.importers.formats.shape_file import ShapeFile
 
 Numbers = npt.NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER, KEYWORDS, Node, Use, Value, World
-from katana450.extensions.importers.vrml_reader import Reader
+from katana450.extensions.export.vrml.vrml_world import HEADER, KEYWORDS, Node, Use, Value, World
+from katana450.extensions.importers.formats.vrml_reader import Reader
 from katana450.maths.geometry import se3, so3
 from tests.exchange.vrml_types import FIELDS, LISTS, WIDTHS, Type
 

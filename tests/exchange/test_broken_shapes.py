@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.importers import surface
-from katana450.extensions.importers.shape_file import Format, read_shape
+from katana450.extensions.importers.formats import surface
+from katana450.extensions.importers.formats.shape_file import Format, read_shape
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import packed
-from katana450.extensions.importers.shape_file import Format, ShapeFile, read_shape
+from katana450.extensions.importers.formats.shape_file import Format, ShapeFile, read_shape
 from tests.exchange.compressed_gltf import DATA, POINTS, SQUARE, draco, quantized
 from tests.exchange.solids import sides
 from tests.exchange.test_broken_shapes import glb

@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER
+from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.extensions.importers.archive import packed
-from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.reading import bind
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.shape_file import (
     SECONDS,
     Format,
 )
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
+from katana450.extensions.importers.reading import bind
 from tests.exchange.compressed_gltf import draco_glb
 from tests.exchange.mutations import MUTATIONS, check_mutations, looked_at
 from tests.exchange.shape_bytes import OBJ, PAINTED, ply

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.urdf_package import package_files
-from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY
 from tests.exchange.strict_vrml import read_world

@@ -9,7 +9,7 @@ import pytest
 
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import packed
-from katana450.extensions.importers.shape_file import Format, ShapeFile, read_shape
+from katana450.extensions.importers.formats.shape_file import Format, ShapeFile, read_shape
 from tests.exchange.shape_bytes import ply
 
 OBJ = """mtllib my paints.mtl

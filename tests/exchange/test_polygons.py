@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.extensions.importers.surface import cut
+from katana450.extensions.importers.formats.surface import cut
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from katana450.extensions.importers import guarded_reading
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.shape_file import SECONDS
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.shape_file import SECONDS
 from katana450.maths.geometry.arrays import FloatArray
 
 resource = pytest.importorskip("resource")

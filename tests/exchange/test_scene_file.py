@@ -14,20 +14,21 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.solid import ObjectAppearance, Solid
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import ObjectAppearance, Solid
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError
-from katana450.extensions.importers import archive, scene_file
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import (
+from katana450.extensions.importers import archive
+from katana450.extensions.importers.formats import scene_file
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.scene_file import (
     StoredScene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,
     written,
 )
-from katana450.extensions.importers.shape_file import Up
+from katana450.extensions.importers.formats.shape_file import Up
 from katana450.extensions.programs.script.script_scene import MeshFile, Scene, parsed
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

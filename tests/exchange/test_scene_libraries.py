@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import POSES
 from tests.exchange.silhouette import placed

@@ -11,21 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER
+from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.extensions.importers import archive
 from katana450.extensions.importers.archive import ChoiceError, packed
-from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import (
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.scene_file import (
     StoredScene,
     read_scene_folder,
     read_scene_zip,
     scene_zip,
 )
-from katana450.extensions.importers.shape_file import Format, read_shape
+from katana450.extensions.importers.formats.shape_file import Format, read_shape
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.extensions.programs.script.script_scene import Scene
 from tests.exchange.compressed_gltf import DATA, SQUARE
 

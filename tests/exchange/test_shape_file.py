@@ -15,18 +15,17 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 from trimesh.exchange.gltf import export_gltf
 
-from katana450.arm.control import scene_objects
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state import scene_objects
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.vrml import world_of
-from katana450.extensions.export.vrml_world import world_text
+from katana450.extensions.export.vrml.vrml_files import world_of
+from katana450.extensions.export.vrml.vrml_world import world_text
 from katana450.extensions.importers import guarded_reading
-from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.shape_file import (
     LONGEST_NAME,
     MAX_SIZE,
     MIN_SIZE,
@@ -36,6 +35,7 @@ from katana450.extensions.importers.shape_file import (
     object_name,
     read_shape,
 )
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.maths.geometry import se3, so3
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.shape_bytes import ply

@@ -11,7 +11,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.vrml import vrml_files, world_of, x3d_files
+from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of, x3d_files
 from tests.exchange.conftest import GANTRY, GANTRY_POSE
 
 

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.importers.guarded_reading import read_shape_guarded
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.shape_file import (
     MAX_FILE_BYTES,
     SECONDS,
     Format,
     read_shape,
 )
+from katana450.extensions.importers.guarded_reading import read_shape_guarded
 from katana450.platform_support import hanging_time
 from tests.exchange.mutations import check_mutations
 from tests.exchange.solids import is_closed, sides, volume

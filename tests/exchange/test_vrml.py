@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.export.obj_text import DIGITS
-from katana450.extensions.export.vrml import part_world, view, vrml_files, world_of
-from katana450.extensions.export.vrml_world import (
+from katana450.extensions.export.vrml.vrml_files import part_world, view, vrml_files, world_of
+from katana450.extensions.export.vrml.vrml_world import (
     KEYWORDS,
     Node,
     Use,

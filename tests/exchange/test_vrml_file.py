@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER
-from katana450.extensions.importers.shape_file import Format, ShapeFile, Up, read_shape
+from katana450.extensions.export.vrml.vrml_world import HEADER
+from katana450.extensions.importers.formats.shape_file import Format, ShapeFile, Up, read_shape
 from katana450.maths.geometry import so3
 from tests.exchange.solids import is_closed, sides, volume
 

@@ -12,19 +12,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.appearance import AppearanceTrait
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.appearance import AppearanceTrait
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
-from katana450.extensions.export.vrml import initial_objects, world_of
-from katana450.extensions.export.vrml_nodes import VrmlNodes
+from katana450.extensions.export.vrml.vrml_files import initial_objects, world_of
+from katana450.extensions.export.vrml.vrml_nodes import VrmlNodes
 from katana450.maths.geometry import se3, so3
 from katana450.resources import URDF_PATH
 from katana450.server.api import requests

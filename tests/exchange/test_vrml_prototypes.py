@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from katana450.errors import InputError
-from katana450.extensions.export.vrml_world import HEADER
+from katana450.extensions.export.vrml.vrml_world import HEADER
 from katana450.extensions.importers.archive import packed
-from katana450.extensions.importers.shape_file import Format, ShapeFile, Up, read_shape
+from katana450.extensions.importers.formats.shape_file import Format, ShapeFile, Up, read_shape
 from tests.exchange.solids import sides, volume
 
 JOINT = """

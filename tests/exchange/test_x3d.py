@@ -12,8 +12,8 @@ import pytest
 
 from katana450.arm.robot.robot import Robot
 from katana450.cli.main import main
-from katana450.extensions.export.vrml import view, world_of
-from katana450.extensions.export.vrml_world import Node, Use, World, x3d_text
+from katana450.extensions.export.vrml.vrml_files import view, world_of
+from katana450.extensions.export.vrml.vrml_world import Node, Use, World, x3d_text
 from katana450.resources import URDF_PATH
 from tests.exchange.conftest import GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.arm.control.messages import PRIORITIES
+from katana450.arm.control.state.messages import PRIORITIES
 from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import Shape
+from katana450.arm.control.state.state import Reason
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of

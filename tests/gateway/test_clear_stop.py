@@ -8,13 +8,13 @@ from typing import Any, cast
 
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import ActiveStop, State
-from katana450.arm.control.stop_cause import StopCause, pressed
-from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import ActiveStop, State
+from katana450.arm.control.state.stop_cause import StopCause, pressed
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.errors import LeaseError
 from katana450.server.service import status
 from katana450.server.service.hub import TICK, Hub

@@ -17,12 +17,12 @@ import pytest
 import viser
 
 import katana450
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, Grounds
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
-from katana450.arm.control.outcome import DROPPED
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import ACCEPTED, Finding, Outcome, Reason
+from katana450.arm.control.session.outcome import DROPPED
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
 from katana450.extensions.undo import UndoRequests
 from katana450.server.api import requests
@@ -309,4 +309,4 @@ def test_only_the_front_end_makes_command_messages() -> None:
         for path in PACKAGE.rglob("*.py")
         if "CommandMessage(" in path.read_text(encoding="utf-8")
     }
-    assert made == {"arm/runtime/front_end.py"}
+    assert made == {"arm/runtime/pipes/front_end.py"}

@@ -14,10 +14,10 @@ import pytest
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
 from katana450.errors import InputError
 from katana450.extensions.server_commands.people_requests import PeopleRequests
 from katana450.server.api import requests

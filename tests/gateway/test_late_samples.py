@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.state import Reason
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state.state import Reason
 from katana450.errors import LeaseError
 from katana450.server.api import requests
 from katana450.server.service.budget import Budgets

@@ -12,12 +12,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.state import Finding, Reason
-from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state.state import Finding, Reason
+from katana450.arm.control.state.stop_cause import StopCause
 from katana450.arm.runtime.readiness import LAST_ACK_RECEIVED, ack_age, data_age
 from katana450.errors import LeaseError
 from katana450.extensions.programs.serve_options import OWNER_SILENCE

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from msgspec.inspect import FloatType, IntType, StructType, type_info
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.arm_commands import ArmAct
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.lease import Role
-from katana450.arm.control.messages import PRIORITIES
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Outcome
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import PRIORITIES
+from katana450.arm.control.state.state import Outcome
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.robot_choice.choose_robot import ChooseRobot

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.errors import LeaseError
 from katana450.extensions.programs.run.compiler import TIMING, PlanningStage
 from katana450.extensions.programs.run.program import compiled

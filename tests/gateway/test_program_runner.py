@@ -11,10 +11,10 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import CommandChannel, Grounds
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
 from katana450.errors import LeaseError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.serve_options import OWNER_SILENCE

@@ -19,8 +19,8 @@ from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.importers.archive import SCENE
-from katana450.extensions.importers.scene_file import load_initial_scene
-from katana450.extensions.importers.shape_file import MAX_FILE_BYTES
+from katana450.extensions.importers.formats.scene_file import load_initial_scene
+from katana450.extensions.importers.formats.shape_file import MAX_FILE_BYTES
 from katana450.extensions.importers.uploads import UPLOAD_BURST
 from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
-from katana450.arm.control.messages import STATUS
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, Status
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import STATUS
+from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.server.state_line import duration
 from katana450.server.api.program_requests import ProgramOrder

@@ -14,7 +14,7 @@ from contextlib import suppress
 
 import pytest
 
-from katana450.arm.control.stopping import HOLD_OFF
+from katana450.arm.control.session.stopping import HOLD_OFF
 from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer, ServerError

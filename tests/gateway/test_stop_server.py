@@ -14,8 +14,8 @@ import h11
 import pytest
 
 from katana450.arm.control.lease import Role
-from katana450.arm.control.stop_cause import StopCause, pressed
-from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
+from katana450.arm.control.state.stop_cause import StopCause, pressed
+from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.server.service import stop_path
 from katana450.server.service.stop_path import StopPath, watch_stop_path
 from katana450.server.web import stop_server

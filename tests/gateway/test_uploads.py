@@ -17,7 +17,7 @@ from starlette.requests import Request
 
 from katana450.arm.control.lease import Role
 from katana450.assembly.robot_session import DescribedRobot
-from katana450.extensions.importers.shape_file import SECONDS
+from katana450.extensions.importers.formats.shape_file import SECONDS
 from katana450.extensions.importers.uploads import WAITING, WAITING_EACH
 from katana450.server.web import bodies
 from katana450.server.web.access_links import AccessFile

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.scene_objects import Shape
+from katana450.arm.control.state.scene_objects import Shape
 from katana450.client import Client, connect
 from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError

@@ -25,9 +25,9 @@ from starlette.applications import Starlette
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError
 from websockets.frames import Close
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.silence import SilenceProfile
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.silence import SilenceProfile
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.runtime.detour_planner import DetourPlanner

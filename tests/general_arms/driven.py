@@ -6,11 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.gripper_model import NO_GRIPPER
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain

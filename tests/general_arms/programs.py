@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext, PlanState
 from katana450.extensions.programs.planning.curve_path import PosePath

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import sentence
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.messages import sentence
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import tool_and_jacobian

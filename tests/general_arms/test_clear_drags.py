@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray

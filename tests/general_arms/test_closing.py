@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import REASONS
-from katana450.arm.control.modes import IDLE
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import REASONS
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State, Status, Verdict
-from katana450.arm.control.tool_targets import with_branch
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import with_branch
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.state import Reason, State, Status, Verdict
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.recording.codec import Codec, json_form, json_text

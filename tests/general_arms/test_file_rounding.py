@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.simulation import Planned, plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.preview import Preview

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import named
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.state.scene_objects import named
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.assembly.robot_session import describe_robot, find_arm
 from katana450.errors import InputError

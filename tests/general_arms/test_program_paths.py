@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import Angles

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import ScriptError

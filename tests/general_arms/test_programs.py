@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.extensions.programs.building.plan_state import UntimedPath
 from katana450.extensions.programs.language.step_target import StepTarget
 from katana450.extensions.programs.planning.curve_path import PosePath

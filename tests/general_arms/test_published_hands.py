@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.simulation import Planned
 from tests.general_arms.gripping_arms import gripping_urdf
 from tests.general_arms.published_hands import (

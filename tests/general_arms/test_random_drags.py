@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.descent import NEAR
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
 from katana450.extensions.general_arms.general_kinematics import near_turns

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import find_robot
 from katana450.client import Client

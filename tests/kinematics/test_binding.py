@@ -9,7 +9,7 @@ import os
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES
+from katana450.arm.control.state.messages import PRIORITIES
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of

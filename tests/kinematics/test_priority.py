@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES
+from katana450.arm.control.state.messages import PRIORITIES
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import BRANCHES, Branch

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES
+from katana450.arm.control.state.messages import PRIORITIES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import PRIORITIES
+from katana450.arm.control.state.messages import PRIORITIES
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics import tracker
 from katana450.maths.kinematics.branch import Branch, branch_of

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.tool_targets import BranchMetrics
+from katana450.arm.control.session.tool_targets import BranchMetrics
 from katana450.errors import InputError
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray

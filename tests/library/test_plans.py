@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 
 CENTRE = np.array([0.15, 0.0, -0.11])
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.files.trimming import trim
 from tests.recording.recorded import described, record

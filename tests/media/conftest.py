@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.initial_camera import FIELD_OF_VIEW, camera
 from katana450.arm.robot.initial_camera import InitialCamera as Viewpoint
 from katana450.arm.robot.loader import load

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import katana450
 from docs import modes
-from katana450.arm.control.act import Traits
+from katana450.arm.control.commands.act import Traits
 from katana450.cli.main import CORE_COMMANDS
 from katana450.extension import extensions
 

@@ -35,7 +35,7 @@ Shape { geometry IndexedFaceSet {
 READ = """
 from pathlib import Path
 from katana450.errors import KatanaError
-from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.importers.formats.mesh_file import read_mesh
 for path in sorted(Path().iterdir()):
     try:
         print(path.name, len(read_mesh(path.read_bytes(), path.name, "mm").faces))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext

@@ -7,7 +7,7 @@ from collections import deque
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.arm_report import ArmMode, ArmReport
+from katana450.arm.control.state.arm_report import ArmMode, ArmReport
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.maths.geometry.arrays import FloatArray, frozen

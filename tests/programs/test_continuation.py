@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import State
-from katana450.arm.control.stopping import HOLD_OFF
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.stopping import HOLD_OFF
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.continuation import RETURN, Interruption, continued

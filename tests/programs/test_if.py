@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import AXIS_NAMES
+from katana450.arm.control.state.messages import AXIS_NAMES
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import ScriptFrame

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import Program, compiled

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT, FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.language.attached_files import attached
 from katana450.extensions.programs.language.source import ScriptError

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from katana450.arm.control.state import ActiveStop
+from katana450.arm.control.state.state import ActiveStop
 from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
 from katana450.extensions.programs.script.script import parse

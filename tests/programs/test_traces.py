@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.plans import plan_along
-from katana450.arm.control.session import Session
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import plan_along
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import Linear, ToolArc

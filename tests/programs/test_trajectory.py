@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.commands import PlaceObject
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.commands import PlaceObject
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext

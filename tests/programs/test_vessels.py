@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.pouring import MAX_VESSELS, is_vessel
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.pouring import MAX_VESSELS, is_vessel
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.program import Program, compiled

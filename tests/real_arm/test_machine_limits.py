@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.replies import AxisStatus
 from katana450.extensions.real_arm.codec.requests import More, MotorFlag, SendSplines
 from tests.real_arm.paper_arm import ENDS, JOINTS, MAP, Conversation, sway

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.control.arm_report import ArmMode
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.arm_commands import ArmAct
+from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.simulation import plan_script, simulated
 from katana450.extensions.programs.script.script import parse

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from katana450.arm.control.session import MAX_STEP_TIME
+from katana450.arm.control.session.session import MAX_STEP_TIME
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.driver.spline_motion import (
     SEGMENT_TICKS,

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmMode
 from katana450.extensions.real_arm.codec.requests import More, SendSplines
 from katana450.extensions.real_arm.driver.spline_motion import SplineStream
 from katana450.extensions.real_arm.plant.axis import KATANA450, STIFF

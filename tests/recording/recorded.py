@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.scene_objects import Attachment as Mount
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.solid import Solid
-from katana450.arm.control.state import State
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.state.scene_objects import Attachment as Mount
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import Solid
+from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.drivers.driver import Driver, DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import REST_PERIOD, ControlLoop

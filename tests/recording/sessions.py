@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner

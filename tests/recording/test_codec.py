@@ -17,17 +17,17 @@ from hypothesis import strategies as st
 from hypothesis.stateful import run_state_machine_as_test
 from msgspec import Struct, msgpack
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import classes_of
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import classes_of
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.modes import IDLE, Target, Tracking
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.solid import Solid
-from katana450.arm.control.state import Finding, Reason, State
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import IDLE, Target, Tracking
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import Solid
+from katana450.arm.control.state.state import Finding, Reason, State
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.robot.props import load_props, water_environment
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import (

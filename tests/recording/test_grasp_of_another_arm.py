@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox

@@ -14,7 +14,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import katana450
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox

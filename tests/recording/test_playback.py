@@ -19,12 +19,12 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from benchmarks.scrub import write_run
-from katana450.arm.control.commands import ClearStop, Command, Follow, Joints, Stop
+from katana450.arm.control.commands.commands import ClearStop, Command, Follow, Joints, Stop
 from katana450.arm.control.lease import Role
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import State
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.runtime.tick import TickRecord
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError

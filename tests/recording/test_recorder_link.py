@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from katana450.arm.runtime.guarded_pipe import disconnect
+from katana450.arm.runtime.pipes.guarded_pipe import disconnect
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import StartEpisode, StopEpisode
 from katana450.extensions.recording.live import recorder_link

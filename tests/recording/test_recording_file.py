@@ -16,7 +16,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 import katana450
-from katana450.arm.runtime.arm_listener import ArmAddress
+from katana450.arm.runtime.pipes.arm_listener import ArmAddress
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
 from katana450.errors import InputError

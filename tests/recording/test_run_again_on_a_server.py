@@ -18,7 +18,7 @@ from starlette.requests import Request
 
 import katana450
 from katana450.arm.control.lease import Role
-from katana450.arm.control.scene_objects import Shape
+from katana450.arm.control.state.scene_objects import Shape
 from katana450.cli.main import main
 from katana450.client import Client, RefusedError
 from katana450.extensions.programs.script.script import parse

@@ -14,8 +14,8 @@ import pytest
 from msgspec import structs
 
 import katana450
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extensions.media.measures import measurements

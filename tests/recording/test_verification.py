@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import katana450
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import Reason
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import Reason
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.maths.geometry import se3
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from katana450.arm.control.messages import UNCHECKED
+from katana450.arm.control.state.messages import UNCHECKED
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_arm, find_robot

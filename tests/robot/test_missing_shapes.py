@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import UNCHECKED
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.messages import UNCHECKED
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.settings import Settings
 from tests.general_arms.driven import begun, settled

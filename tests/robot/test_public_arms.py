@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Reason
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.loader import load
 from katana450.assembly.robot_session import find_robot

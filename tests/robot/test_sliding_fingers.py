@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm

@@ -18,7 +18,7 @@ from katana450.arm.robot.visual import GREY
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.export.c_source import c_files
 from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.vrml import vrml_files, world_of
+from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.exchange.conftest import GANTRY

@@ -12,22 +12,22 @@ from multiprocessing.connection import Connection
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control import silence
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.session import Session
-from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import Finding, Outcome, Reason, Verdict
-from katana450.arm.control.stopping import clear_refusal
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session import silence
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.session.stopping import clear_refusal
+from katana450.arm.control.state.state import Finding, Outcome, Reason, Verdict
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.arm_end import ArmEnd, CommandMessage
-from katana450.arm.runtime.arm_listener import FRONT, Greeting
 from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.front_end import FrontEnd
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import CAPACITY, Mailbox
 from katana450.arm.runtime.outcomes import MAX_KEPT_OUTCOMES, Outcomes
+from katana450.arm.runtime.pipes.arm_end import ArmEnd, CommandMessage
+from katana450.arm.runtime.pipes.arm_listener import FRONT, Greeting
+from katana450.arm.runtime.pipes.front_end import FrontEnd
 from katana450.assembly import running_arm
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.assembly.running_arm import RunningArm
@@ -267,7 +267,7 @@ def test_numbers_of_displaced_outcomes_are_dropped(
     ends: Ends, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The loop, which reports states, does not run.
-    monkeypatch.setattr("katana450.arm.runtime.front_end.COMMAND_TIMEOUT", 60.0)
+    monkeypatch.setattr("katana450.arm.runtime.pipes.front_end.COMMAND_TIMEOUT", 60.0)
     ends.loop.stop()
     count = MAX_KEPT_OUTCOMES + 5
     # Each command replaces the one before, so that one tick reports all outcomes.

@@ -13,7 +13,7 @@ from queue import SimpleQueue
 
 import pytest
 
-from katana450.arm.runtime.arm_listener import (
+from katana450.arm.runtime.pipes.arm_listener import (
     ArmAddress,
     ArmListener,
     Greeting,
@@ -77,7 +77,7 @@ def test_connection_for_which_no_thread_starts_keeps_no_later_one_out(
     address: ArmAddress, greetings: SimpleQueue[Greeting], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr("katana450.arm.runtime.arm_listener.threading.Thread", RefusedThread)
+        patch.setattr("katana450.arm.runtime.pipes.arm_listener.threading.Thread", RefusedThread)
         with Client(address.name) as refused:
             assert refused.poll(5.0)
             with pytest.raises((EOFError, OSError)):

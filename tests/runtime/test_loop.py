@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import Finding, Reason, Status
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.state.state import Finding, Reason, Status
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.runtime.clock import MonotonicClock

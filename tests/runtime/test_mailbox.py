@@ -7,11 +7,11 @@ import threading
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason
-from katana450.arm.control.stop_cause import pressed
-from katana450.arm.control.stopping import joined
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.stopping import joined
+from katana450.arm.control.state.state import Finding, Reason
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.runtime.mailbox import CAPACITY, Drained, Mailbox
 from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control import plans
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason
+from katana450.arm.control.session import plans
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Finding, Reason
 from katana450.arm.runtime import planning_worker
 from katana450.arm.runtime.loop_timing import LoopTiming
+from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import InputError
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.planning.plan import Plan

@@ -17,16 +17,16 @@ import pytest
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.session import Session
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.runtime import stop_end
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
-from katana450.arm.runtime.stop_end import StopEnd
-from katana450.arm.runtime.stop_messages import StopPress, StopStatus
-from katana450.arm.runtime.stop_pipe import StopPipe
+from katana450.arm.runtime.pipes import stop_end
+from katana450.arm.runtime.pipes.stop_end import StopEnd
+from katana450.arm.runtime.pipes.stop_messages import StopPress, StopStatus
+from katana450.arm.runtime.pipes.stop_pipe import StopPipe
 
 TIMEOUT = 5.0
 

@@ -220,7 +220,7 @@ def test_process_that_supervises_loads_no_calculation() -> None:
     """It takes part of the start, and stays for as long as the server."""
     script = (
         "import sys, katana450.cli.serve, katana450.extensions.event_log.disk_log\n"
-        "loaded = {'numpy', 'ruckig', 'katana450.arm.control.state'} & sys.modules.keys()\n"
+        "loaded = {'numpy', 'ruckig', 'katana450.arm.control.state.state'} & sys.modules.keys()\n"
         "assert not loaded, loaded"
     )
     subprocess.run([sys.executable, "-c", script], check=True, timeout=60.0)

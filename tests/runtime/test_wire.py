@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.following import Following
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.session import Session
-from katana450.arm.control.solid import Solid
-from katana450.arm.runtime.state_publisher import Snapshot
-from katana450.arm.runtime.wire import MAX_NAMED_PLANS, PlanNames, PlanStore
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.solid import Solid
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.wire import MAX_NAMED_PLANS, PlanNames, PlanStore
 from katana450.maths.planning.plan import Plan
 
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.extensions.touch.touch_model import TouchModel

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.solid import Solid
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import Solid
 from katana450.extensions.touch.pad import (
     COLUMNS,
     ROWS,

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.event_log import entries_between
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.restart import restarted
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
-from katana450.arm.control.support import SUPPORT_GAP
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.support import SUPPORT_GAP
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.restart import restarted
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.extensions.touch.pad import ROWS, pads_of
 from katana450.extensions.touch.solid_body import DENSITY, FRICTION, SLIDING_RESISTANCE, mass

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.extensions.touch.pad import COLUMNS, ROWS
 from katana450.extensions.touch.pad_patches import (

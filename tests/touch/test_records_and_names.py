@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.state import Reason, State
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import verify_recording
 from tests.control.test_grip import OPEN

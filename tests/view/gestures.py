@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.commands import Command
+from katana450.arm.control.commands.commands import Command
 from katana450.arm.control.lease import Person, Role
 
 ANNA = Actor(Person("anna", "Anna", Role.OPERATOR), CommandChannel.SCENE, seen=0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.commands import EndDrag, Orient, Turn
+from katana450.arm.control.commands.commands import EndDrag, Orient, Turn
 from katana450.assembly.robot_session import find_robot
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward

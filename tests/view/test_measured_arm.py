@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.arm_report import ArmMode, ArmReport
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.arm_report import ArmMode, ArmReport
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.extensions.real_arm.options import view_layer
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import viser
 
-from katana450.arm.control.commands import Command, Joints
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
-from katana450.arm.control.tool_targets import BranchOption
+from katana450.arm.control.commands.commands import Command, Joints
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import BranchOption
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.branches import INTERVAL, BranchList
 from katana450.server.view.controls import Clickable

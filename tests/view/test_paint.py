@@ -8,9 +8,9 @@ from typing import Any, cast
 import pytest
 import viser
 
-from katana450.arm.control.appearance import Appearance, AppearanceTrait
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.appearance import Appearance, AppearanceTrait
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import viser
 
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.server.view.controls import listener
 from katana450.server.view.pose_form import PoseForm

@@ -13,8 +13,8 @@ import pytest
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot

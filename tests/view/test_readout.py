@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control.session import Session
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.controls import ends

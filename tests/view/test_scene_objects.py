@@ -12,16 +12,16 @@ import pytest
 import trimesh
 import viser
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.session import Session
-from katana450.arm.control.solid import ObjectAppearance
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import ObjectAppearance
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.robot.creases import drawn, glb
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.arm.robot.props import load_props
-from katana450.extensions.importers.mesh_file import read_mesh
+from katana450.extensions.importers.formats.mesh_file import read_mesh
 from katana450.extensions.objects.handles import ObjectHandles
 from katana450.extensions.objects.objects_panel import NOTHING, ObjectsPanel
 from katana450.maths.water.environment import TableTop

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.messages import (
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import BranchMetrics, BranchOption
+from katana450.arm.control.state.messages import (
     AXIS_NAMES,
     PRIORITIES,
     PRIORITY_HINTS,
@@ -23,9 +25,7 @@ from katana450.arm.control.messages import (
     sentence,
     title,
 )
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State, Status
-from katana450.arm.control.tool_targets import BranchMetrics, BranchOption
+from katana450.arm.control.state.state import Finding, Reason, State, Status
 from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.server.view.branches import HEADINGS, cells_of

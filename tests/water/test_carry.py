@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands import Command, Joint, Stop
-from katana450.arm.control.session import Session
+from katana450.arm.control.commands.commands import Command, Joint, Stop
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

@@ -13,16 +13,16 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from katana450.arm.runtime.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
+from katana450.arm.runtime.pipes.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
 from katana450.assembly.supervised import KEPT, READY, SCENE, SupervisorPipe
 from katana450.extension import ServerFacts, results
 
 if TYPE_CHECKING:
-    from katana450.arm.control.state import State
+    from katana450.arm.control.state.state import State
     from katana450.arm.drivers.driver import Driver
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
-    from katana450.arm.runtime.state_publisher import StatePublisher
+    from katana450.arm.runtime.pipes.state_publisher import StatePublisher
     from katana450.assembly.robot_session import DescribedRobot
     from katana450.maths.geometry.arrays import FloatArray
 
@@ -97,7 +97,7 @@ def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> 
 
 def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScene | None]:
     """Return the robot if it was read for the scene that an extension starts with, and that."""
-    from katana450.arm.control.session import Session
+    from katana450.arm.control.session.session import Session
     from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.robot_session import find_robot
 
@@ -131,7 +131,7 @@ def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
 
 
 def _packed(state: State) -> bytes:
-    from katana450.arm.control.restart import at_rest
+    from katana450.arm.control.state.restart import at_rest
 
     return pickle.dumps(replace(at_rest(state), objects=()))
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from katana450.arm.control.environment import Hand
-from katana450.arm.control.messages import UNCHECKED
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.session import Session
+from katana450.arm.control.objects.environment import Hand
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import UNCHECKED
+from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.robot.arm_reader import FindArm, OtherArm
 from katana450.arm.robot.bare import bare
 from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of

@@ -9,21 +9,21 @@ from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Connection
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.restart import restarted
-from katana450.arm.control.silence import SilenceProfile
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.state.restart import restarted
+from katana450.arm.control.state.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.initial_scene import InitialScene
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.arm_end import ArmEnd
-from katana450.arm.runtime.arm_listener import Greeting
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
-from katana450.arm.runtime.state_publisher import StatePublisher
-from katana450.arm.runtime.stop_end import StopEnd
+from katana450.arm.runtime.pipes.arm_end import ArmEnd
+from katana450.arm.runtime.pipes.arm_listener import Greeting
+from katana450.arm.runtime.pipes.state_publisher import StatePublisher
+from katana450.arm.runtime.pipes.stop_end import StopEnd
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.extension import TickSender
 from katana450.maths.geometry.arrays import FloatArray

@@ -10,7 +10,7 @@ import socket
 import time
 from functools import partial
 
-from katana450.arm.runtime.arm_listener import STOP, Greeting, connect_when_ready
+from katana450.arm.runtime.pipes.arm_listener import STOP, Greeting, connect_when_ready
 from katana450.assembly.supervised import READY, SupervisorPipe
 from katana450.extension import ServerFacts
 from katana450.platform_support import raise_priority
@@ -34,7 +34,7 @@ def run_stop(config: ServerFacts, listening: socket.socket, supervisor: Supervis
 async def _serve(config: ServerFacts, listening: socket.socket, supervisor: SupervisorPipe) -> None:
     import asyncio
 
-    from katana450.arm.runtime.stop_pipe import StopPipe
+    from katana450.arm.runtime.pipes.stop_pipe import StopPipe
     from katana450.assembly.authentication import access_file, address_of, tls_context
     from katana450.server.web.acceptor import Acceptor
     from katana450.server.web.authenticator import Authenticator

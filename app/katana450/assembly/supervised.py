@@ -17,7 +17,12 @@ from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from katana450.arm.runtime.arm_listener import RECORD, ArmAddress, Greeting, connect_when_ready
+from katana450.arm.runtime.pipes.arm_listener import (
+    RECORD,
+    ArmAddress,
+    Greeting,
+    connect_when_ready,
+)
 from katana450.arm.runtime.readiness import writable
 from katana450.assembly.log_output import start_log
 from katana450.errors import KatanaError

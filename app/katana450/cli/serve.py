@@ -19,7 +19,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from katana450.arm.runtime.arm_listener import ArmAddress
+from katana450.arm.runtime.pipes.arm_listener import ArmAddress
 from katana450.assembly.arm_process import ARM, run_arm
 from katana450.assembly.frontend_process import OPEN, Sockets, run_frontend
 from katana450.assembly.log_output import say, start_log

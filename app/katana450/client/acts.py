@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from katana450.arm.control.act import MotionRequest, Request, content_names, tag_of
+from katana450.arm.control.commands.act import MotionRequest, Request, content_names, tag_of
 from katana450.server.api import requests
 
 AtRest, Answered, Sent = TypeVar("AtRest"), TypeVar("Answered"), TypeVar("Sent")

@@ -3,10 +3,10 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy.typing as npt
 
-from katana450.arm.control.act import Request
-from katana450.arm.control.arm_commands import ArmAct
-from katana450.arm.control.scene_objects import Attachment, Shape
-from katana450.arm.control.tool_commands import Frame
+from katana450.arm.control.commands.act import Request
+from katana450.arm.control.commands.arm_commands import ArmAct
+from katana450.arm.control.commands.tool_commands import Frame
+from katana450.arm.control.state.scene_objects import Attachment, Shape
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
 from katana450.server.api.requests import FieldName, FieldSetting

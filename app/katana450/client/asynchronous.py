@@ -17,8 +17,8 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as open_websocket
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
-from katana450.arm.control.act import Id
-from katana450.arm.control.checked import encoded_field
+from katana450.arm.control.commands.act import Id
+from katana450.arm.control.commands.checked import encoded_field
 from katana450.client.acts import Acts
 from katana450.client.files import STOP_TIMEOUT, EpisodeClient, LostError, RefusedError, Site
 from katana450.errors import KatanaError

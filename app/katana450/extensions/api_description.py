@@ -13,8 +13,8 @@ from starlette.requests import Request as HttpRequest
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control.act import Request, tag_of
-from katana450.arm.control.checked import field_schema
+from katana450.arm.control.commands.act import Request, tag_of
+from katana450.arm.control.commands.checked import field_schema
 from katana450.server.api import answers, requests
 from katana450.server.api.fields import MAX_PRESS_LENGTH, ROOT
 from katana450.server.web.http_api import QUERY_SUBJECTS, RouteContext

@@ -63,7 +63,7 @@ EXTENSIONS = (
                 f"{HERE}.export.options:export_format",
             ),
         ),
-        nodes=f"{HERE}.export.vrml_nodes:VrmlNodes",
+        nodes=f"{HERE}.export.vrml.vrml_nodes:VrmlNodes",
     ),
     Extension(
         "experiments",

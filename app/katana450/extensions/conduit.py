@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry import se3

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.solid import MAX_CORNERS
+from katana450.arm.control.state.solid import MAX_CORNERS
 from katana450.errors import InputError
 from katana450.maths.collision.engine import hull_triangles
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen

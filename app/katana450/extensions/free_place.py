@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 

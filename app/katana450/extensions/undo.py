@@ -10,10 +10,10 @@ from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.scene_objects import SceneObject, named, same
-from katana450.arm.control.state import Outcome, State, Verdict
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import SceneObject, named, same
+from katana450.arm.control.state.state import Outcome, State, Verdict
 from katana450.errors import InputError
 from katana450.server.api import answers, requests
 from katana450.server.service.hub import Hub

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.environment import WaterEnvironment

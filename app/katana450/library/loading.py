@@ -8,7 +8,7 @@ from typing import Literal
 from katana450.assembly.robot_files import read_robot
 from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.driven_tool import solved_arm
-from katana450.extensions.importers.scene_file import load_initial_scene
+from katana450.extensions.importers.formats.scene_file import load_initial_scene
 from katana450.library.arm import Arm
 from katana450.library.pose_frame import PoseFrame
 from katana450.resources import URDF_PATH

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.commands import Command
+from katana450.arm.control.commands.commands import Command
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.recorded_robot import orientations

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from katana450.arm.control.gripper_model import GripperModel
+from katana450.arm.control.objects.gripper_model import GripperModel
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.caching import cached_property
 from katana450.errors import InputError

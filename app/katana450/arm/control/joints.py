@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.arm import limits_of
-from katana450.arm.control.gripper_model import NO_GRIPPER, GripperModel
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER, GripperModel
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.motion.limiter import Limits

@@ -9,10 +9,10 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from katana450.arm.control import findings
-from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
-from katana450.arm.control.state import Finding, State
-from katana450.arm.control.tool_commands import StepTool, Turn, TurnCommand
+from katana450.arm.control.commands.tool_commands import StepTool, Turn, TurnCommand
+from katana450.arm.control.state import findings
+from katana450.arm.control.state.messages import PRIORITIES, PRIORITY_HINTS
+from katana450.arm.control.state.state import Finding, State
 from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics import projection, tracker, velocity

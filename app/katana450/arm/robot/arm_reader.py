@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.gripper_model import NO_GRIPPER, GripperModel
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER, GripperModel
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.mounted_arm import MountedArm

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from katana450.arm.control.gripper_model import NO_GRIPPER
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
 

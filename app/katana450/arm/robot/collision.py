@@ -8,8 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
-from katana450.arm.control.environment import Hand
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.objects.environment import Hand
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.robot.link import Joint, Link
 from katana450.arm.robot.props import BASIN_AT, CUP_AT, Props
 from katana450.arm.robot.robot import Robot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.maths.geometry.arrays import FloatArray
 

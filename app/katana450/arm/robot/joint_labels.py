@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from katana450.arm.control.messages import axis_names
+from katana450.arm.control.state.messages import axis_names
 from katana450.arm.robot.robot import Robot
 
 

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from katana450.arm.control.solid import Solid
+from katana450.arm.control.state.solid import Solid
 from katana450.arm.robot import creases
 from katana450.arm.robot.creases import Colours
 from katana450.atomic import write_files, writer_of

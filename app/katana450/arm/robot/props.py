@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.errors import RobotDescriptionError
 from katana450.maths.water.cylinder import Cylinder
 from katana450.maths.water.environment import Basin, Cup, TableTop, WaterEnvironment

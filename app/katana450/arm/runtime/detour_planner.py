@@ -5,12 +5,12 @@ from __future__ import annotations
 import logging
 import threading
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.plans import detour_from
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.plans import detour_from
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
+from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.arm.runtime.planning_worker import PlanningWorker
-from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
 from katana450.errors import CancelledError, KatanaError
 from katana450.maths.planning.checkpoint import checked_by
 

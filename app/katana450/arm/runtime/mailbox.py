@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import ClearStop, Command, HoldFor, PauseFor, Stop
-from katana450.arm.control.stop_cause import StopCause
-from katana450.arm.control.stopping import joined
-from katana450.arm.runtime.presses import Presses
+from katana450.arm.control.commands.commands import ClearStop, Command, HoldFor, PauseFor, Stop
+from katana450.arm.control.session.stopping import joined
+from katana450.arm.control.state.stop_cause import StopCause
+from katana450.arm.runtime.pipes.presses import Presses
 from katana450.arm.runtime.tick import Submission
 from katana450.errors import InputError
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, InvalidStateError
 from contextlib import suppress
 
-from katana450.arm.control.state import Outcome
+from katana450.arm.control.state.state import Outcome
 
 MAX_KEPT_OUTCOMES = 1024
 """Maximum number of recorded outcomes, and of awaited tickets: many seconds of a fast stream."""

@@ -9,15 +9,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, Grounds
-from katana450.arm.control.goals import START_TOLERANCE
-from katana450.arm.control.plans import plan_to
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
-from katana450.arm.control.tool_targets import branch_named, with_branch
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.goals import START_TOLERANCE
+from katana450.arm.control.session.plans import plan_to
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.session.tool_targets import branch_named, with_branch
+from katana450.arm.control.state.state import State
 from katana450.arm.runtime.mailbox import CommandSink
-from katana450.arm.runtime.state_publisher import StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import StatePublisher
 from katana450.errors import KatanaError
 from katana450.maths.planning.plan import Plan
 

@@ -10,11 +10,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command
-from katana450.arm.control.modes import IDLE
-from katana450.arm.control.outcome import FAILED
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Finding, Reason, State
+from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.session.outcome import FAILED
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.maths.motion.limiter import JointMotion
 

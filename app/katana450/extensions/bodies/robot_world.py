@@ -27,7 +27,7 @@ from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.messages import UNCHECKED, short
+from katana450.arm.control.state.messages import UNCHECKED, short
 from katana450.extensions.bodies.estimated_shapes import drawn
 from katana450.extensions.bodies.pairs_at_rest import TOUCH_DISTANCE, RestPairs, judged_at_rest
 from katana450.maths.collision.clearance import MIN_CLEARANCE

@@ -17,7 +17,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from katana450.arm.runtime.guarded_pipe import GuardedPipe
+from katana450.arm.runtime.pipes.guarded_pipe import GuardedPipe
 from katana450.arm.runtime.readiness import writable
 from katana450.extension import ServerLog
 from katana450.extensions.event_log.log_files import MAX_FILE_BYTES, MAX_FILES, LogFile

@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Act, content_names
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Act, content_names
 from katana450.extensions.event_log.records import text
 from katana450.maths.planning.plan import Plan
 

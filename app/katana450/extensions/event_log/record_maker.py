@@ -19,13 +19,13 @@ from multiprocessing.connection import Connection
 from queue import Empty
 from typing import Any
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Command
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel
-from katana450.arm.control.event_log import LogEntry
-from katana450.arm.control.messages import finding_text
-from katana450.arm.control.outcome import reason
-from katana450.arm.control.state import Outcome, Verdict
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Command
+from katana450.arm.control.session.outcome import reason
+from katana450.arm.control.state.event_log import LogEntry
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.extensions.event_log.record_content import content_of
 from katana450.extensions.event_log.records import Record, record, text, utc

@@ -10,12 +10,12 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 
-from katana450.arm.control.messages import part
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import part
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
-from katana450.extensions.importers.scene_file import load_initial_scene
+from katana450.extensions.importers.formats.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
 from katana450.extensions.programs.building.actions import FollowPlan, Task
 from katana450.extensions.programs.run.compiler import ConditionalJump

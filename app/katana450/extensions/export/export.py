@@ -17,7 +17,12 @@ from katana450.extensions.export.formats import FORMATS, named
 from katana450.extensions.export.glb import glb_files
 from katana450.extensions.export.mjcf import mjcf_files
 from katana450.extensions.export.urdf_package import package_files
-from katana450.extensions.export.vrml import initial_objects, vrml_files, world_of, x3d_files
+from katana450.extensions.export.vrml.vrml_files import (
+    initial_objects,
+    vrml_files,
+    world_of,
+    x3d_files,
+)
 
 LARGE_BYTES = 20_000_000
 """Size [bytes] of all files together above which the command says why."""

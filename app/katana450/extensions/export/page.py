@@ -9,8 +9,8 @@ from pathlib import Path
 
 import viser
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot

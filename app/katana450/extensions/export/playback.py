@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot
 from katana450.errors import InputError

@@ -13,9 +13,9 @@ from typing import ClassVar, Final
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control.messages import PRIORITIES, PRIORITY_HINTS
-from katana450.arm.control.state import Finding, State
-from katana450.arm.control.tool_commands import Orient, StepTool, TurnCommand
+from katana450.arm.control.commands.tool_commands import Orient, StepTool, TurnCommand
+from katana450.arm.control.state.messages import PRIORITIES, PRIORITY_HINTS
+from katana450.arm.control.state.state import Finding, State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.arm.robot.arm_reader import OtherArm, described_chain
 from katana450.arm.robot.structure import Structure, structure_of

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from katana450 import tolerances
-from katana450.arm.control.findings import causes_of, of_projection
-from katana450.arm.control.messages import REASONS
-from katana450.arm.control.state import Finding, Reason
+from katana450.arm.control.state.findings import causes_of, of_projection
+from katana450.arm.control.state.messages import REASONS
+from katana450.arm.control.state.state import Finding, Reason
 from katana450.errors import InputError
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry import screws, se3, so3

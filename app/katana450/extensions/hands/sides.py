@@ -15,11 +15,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.environment import Hand
-from katana450.arm.control.grip import TOUCH_DISTANCE
-from katana450.arm.control.gripper_model import GripperModel
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.environment import Hand
+from katana450.arm.control.objects.grip import TOUCH_DISTANCE
+from katana450.arm.control.objects.gripper_model import GripperModel
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.hands.placed_bodies import PlacedBodies
 from katana450.maths.collision.engine import distance

@@ -17,7 +17,7 @@ from katana450.disk_cache import decoded
 from katana450.errors import InputError
 from katana450.extensions.convex_body import ConvexBody
 from katana450.extensions.importers.archive import ChoiceError, is_inside, packed
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.shape_file import (
     MAX_FILE_BYTES,
     MAX_MEMORY_BYTES,
     SECONDS,

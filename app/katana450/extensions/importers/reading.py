@@ -12,14 +12,14 @@ from katana450.disk_cache import encoded
 from katana450.errors import KatanaError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.importers.archive import ChoiceError
-from katana450.extensions.importers.guarded_reading import ShapeReading
-from katana450.extensions.importers.shape_file import (
+from katana450.extensions.importers.formats.shape_file import (
     MAX_MEMORY_BYTES,
     SECONDS,
     Format,
     Up,
     read_shape,
 )
+from katana450.extensions.importers.guarded_reading import ShapeReading
 from katana450.platform_support import limit_resources
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from starlette.routing import BaseRoute
 
-    from katana450.arm.control.session import Session
+    from katana450.arm.control.session.session import Session
     from katana450.arm.robot.initial_scene import InitialScene
     from katana450.server.web.http_api import RouteContext
 
@@ -32,7 +32,7 @@ def chosen_scene(options: Namespace, session: Callable[[], Session]) -> InitialS
     """Return the scene of ``--scene``; None without one. Raises KatanaError."""
     if options.scene is None:
         return None
-    from katana450.extensions.importers.scene_file import initial_scene
+    from katana450.extensions.importers.formats.scene_file import initial_scene
 
     return initial_scene(session(), options.scene)
 

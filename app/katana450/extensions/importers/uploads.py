@@ -13,14 +13,14 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.robot.object_meshes import Mesh
 from katana450.errors import CancelledError, InputError, LeaseError
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
-from katana450.extensions.importers.mesh_file import read_mesh
-from katana450.extensions.importers.scene_file import StoredScene, read_scene_zip, scene_zip
-from katana450.extensions.importers.shape_file import LONGEST_NAME, Format
+from katana450.extensions.importers.formats.mesh_file import read_mesh
+from katana450.extensions.importers.formats.scene_file import StoredScene, read_scene_zip, scene_zip
+from katana450.extensions.importers.formats.shape_file import LONGEST_NAME, Format
 from katana450.extensions.objects.scenes import free_name, scenes_of, used_in
 from katana450.extensions.programs.script.script_scene import Scene
 from katana450.maths.planning.checkpoint import checked_by

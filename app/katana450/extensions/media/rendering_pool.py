@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.modes import IDLE
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import find_robot

@@ -13,8 +13,8 @@ import numpy as np
 from trimesh.creation import cylinder
 from trimesh.util import append_faces
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.control.tool_kinematics import FiveAxisTool
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.creases import smooth_normals
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot

@@ -8,11 +8,11 @@ from dataclasses import replace
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import PlaceObject
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
-from katana450.arm.control.support import check_carried, is_loose
+from katana450.arm.control.commands.commands import PlaceObject
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.objects.support import check_carried, is_loose
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import se3
 from katana450.server.view.controls import GestureGate, refuse

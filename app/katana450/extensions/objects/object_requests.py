@@ -7,11 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.pouring import BASIN, CUP, MAX_VESSELS, is_vessel
-from katana450.arm.control.scene_objects import MAX_OBJECTS, Attachment, SceneObject, Shape, named
-from katana450.arm.control.solid import PLAIN, ObjectAppearance
-from katana450.arm.control.support import check_carried, check_mounted, is_loose
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.pouring import BASIN, CUP, MAX_VESSELS, is_vessel
+from katana450.arm.control.objects.support import check_carried, check_mounted, is_loose
+from katana450.arm.control.state.scene_objects import (
+    MAX_OBJECTS,
+    Attachment,
+    SceneObject,
+    Shape,
+    named,
+)
+from katana450.arm.control.state.solid import PLAIN, ObjectAppearance
 from katana450.errors import InputError
 from katana450.extensions.free_place import free_place
 from katana450.extensions.objects.scenes import scenes_of

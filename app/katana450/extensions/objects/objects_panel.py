@@ -10,13 +10,19 @@ from typing import Any
 import numpy as np
 import viser
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.pouring import BASIN, CUP
-from katana450.arm.control.scene_objects import MAX_SCALE, MIN_SCALE, Attachment, SceneObject, named
-from katana450.arm.control.solid import MIN_OPACITY, ObjectAppearance
-from katana450.arm.control.state import State
-from katana450.arm.control.support import check_mounted
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.objects.pouring import BASIN, CUP
+from katana450.arm.control.objects.support import check_mounted
+from katana450.arm.control.state.scene_objects import (
+    MAX_SCALE,
+    MIN_SCALE,
+    Attachment,
+    SceneObject,
+    named,
+)
+from katana450.arm.control.state.solid import MIN_OPACITY, ObjectAppearance
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError, KatanaError
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import frozen

@@ -6,9 +6,9 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.scene_objects import MAX_OBJECTS
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.scene_objects import MAX_OBJECTS
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.object_meshes import Mesh, Meshes
 from katana450.errors import InputError, LeaseError
 

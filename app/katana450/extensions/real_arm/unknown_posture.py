@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from katana450.arm.control.arm_report import ArmMode
-from katana450.arm.control.state import State
+from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.state import State
 from katana450.sdk import LayerContext, ViewLayer
 
 

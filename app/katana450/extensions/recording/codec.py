@@ -21,12 +21,12 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control import modes
-from katana450.arm.control.act import ENVELOPE, Act, classes_of, tag_of
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command
-from katana450.arm.control.solid import Solid
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.act import ENVELOPE, Act, classes_of, tag_of
+from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.state import modes
+from katana450.arm.control.state.solid import Solid
+from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.extensions.programs.planning.curve_path import PosePath, ToolPath
 from katana450.extensions.programs.planning.curves import (

@@ -10,9 +10,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from katana450.arm.control.act import tag_of
-from katana450.arm.control.modes import Target
-from katana450.arm.control.pouring import CUP
+from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.state.modes import Target
 from katana450.extensions.recording.forms import FormError, shown
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.water.motion import MotionWithWater

@@ -13,11 +13,11 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.messages import finding_text
-from katana450.arm.control.modes import JointTarget, PoseTarget
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.modes import JointTarget, PoseTarget
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.maths.geometry import se3, so3

@@ -11,9 +11,9 @@ import hashlib
 from dataclasses import replace
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Batch, Command, Stop
-from katana450.arm.control.state import State
-from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.control.commands.commands import Batch, Command, Stop
+from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import StopCause
 from katana450.arm.runtime.tick import Submission, TickRecord
 
 DIGITS = 12

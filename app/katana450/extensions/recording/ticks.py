@@ -22,13 +22,13 @@ import msgspec
 import numpy as np
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.commands import Command
-from katana450.arm.control.following import Following
-from katana450.arm.control.modes import Leaving, Mode, Positioning, Tracking
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.commands import Command
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.arm_report import ArmReport
+from katana450.arm.control.state.following import Following
+from katana450.arm.control.state.modes import Leaving, Mode, Positioning, Tracking
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.runtime.tick import Submission, TickRecord, failed, stepped
 from katana450.errors import InputError, KatanaError

@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta
 
-from katana450.arm.control.act import Request, Traits
+from katana450.arm.control.commands.act import Request, Traits
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.extensions.robot_choice.robot_check import checked_robot
 from katana450.resources import URDF_PATH

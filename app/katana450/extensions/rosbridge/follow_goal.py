@@ -19,8 +19,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from katana450.arm.control.act import MAX_WAIT
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands.act import MAX_WAIT
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.programs.planning.trajectory_path import MIN_INTERVAL
 from katana450.extensions.rosbridge.goals import Goal, GoalHost, GoalStatus, Result

@@ -16,11 +16,11 @@ from foxglove import messages
 from foxglove.channels import FrameTransformsChannel, JointStatesChannel
 from foxglove.websocket import Service, ServiceRequest, ServiceSchema
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.messages import sentence
-from katana450.arm.control.stop_cause import pressed
+from katana450.arm.control.state.messages import sentence
+from katana450.arm.control.state.stop_cause import pressed
 from katana450.extensions.rosbridge import names
 from katana450.extensions.rosbridge.publications import SILENT_AFTER, Publications, link_poses
 from katana450.server.service.arm_handle import ArmHandle

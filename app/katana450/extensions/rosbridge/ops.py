@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeVar, get_args
 import msgspec
 from msgspec import Meta
 
-from katana450.arm.control.act import Traits, tag_of
+from katana450.arm.control.commands.act import Traits, tag_of
 from katana450.errors import InputError
 from katana450.extensions.rosbridge.names import (
     CANCEL,

@@ -15,7 +15,7 @@ from enum import Enum
 
 import numpy as np
 
-from katana450.arm.control.joint_commands import JOG_TIME
+from katana450.arm.control.commands.joint_commands import JOG_TIME
 from katana450.errors import InputError, KatanaError
 from katana450.extensions.rosbridge.messages import (
     Header,

@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from katana450.arm.control.pouring import is_vessel
-from katana450.arm.control.scene_objects import MAX_OBJECTS, SceneObject, Shape
-from katana450.arm.control.state import State
-from katana450.arm.control.support import surface_below
+from katana450.arm.control.objects.pouring import is_vessel
+from katana450.arm.control.objects.support import surface_below
+from katana450.arm.control.state.scene_objects import MAX_OBJECTS, SceneObject, Shape
+from katana450.arm.control.state.state import State
 from katana450.extensions.convex_body import hull_faces
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.water.units import DENSITY as WATER_DENSITY

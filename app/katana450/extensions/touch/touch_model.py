@@ -8,10 +8,10 @@ from typing import TypedDict
 
 import numpy as np
 
-from katana450.arm.control.environment import Hand
-from katana450.arm.control.scene_objects import SceneObject, same
-from katana450.arm.control.state import State
-from katana450.arm.control.support import SUPPORT_GAP
+from katana450.arm.control.objects.environment import Hand
+from katana450.arm.control.objects.support import SUPPORT_GAP
+from katana450.arm.control.state.scene_objects import SceneObject, same
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import load_props
 from katana450.extensions.touch.pad import Pad, PadPressure, pads_of
 from katana450.extensions.touch.solid_body import (

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from katana450.arm.control.act import Id, Traits, tag_of
+from katana450.arm.control.commands.act import Id, Traits, tag_of
 
 VERSION = 1
 

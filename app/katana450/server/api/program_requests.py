@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.arm.control.act import MotionRequest, Request, Traits
+from katana450.arm.control.commands.act import MotionRequest, Request, Traits
 from katana450.server.api.fields import MAX_REQUEST_BYTES
 
 SLOWEST_SPEED = 0.01

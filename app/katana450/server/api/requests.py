@@ -13,17 +13,17 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 import msgspec
 from msgspec import Meta
 
-from katana450.arm.control.act import *
-from katana450.arm.control.act import Id, MotionRequest, Name, Request, Traits, tag_of
-from katana450.arm.control.arm_commands import *
-from katana450.arm.control.checked import Transform, decoded_field
-from katana450.arm.control.joint_commands import *
-from katana450.arm.control.motion_commands import *
-from katana450.arm.control.object_commands import *
-from katana450.arm.control.scene_objects import Attachment as Attachment
-from katana450.arm.control.scene_objects import Shape as Shape
-from katana450.arm.control.tool_commands import *
-from katana450.arm.control.tool_commands import Frame
+from katana450.arm.control.commands.act import *
+from katana450.arm.control.commands.act import Id, MotionRequest, Name, Request, Traits, tag_of
+from katana450.arm.control.commands.arm_commands import *
+from katana450.arm.control.commands.checked import Transform, decoded_field
+from katana450.arm.control.commands.joint_commands import *
+from katana450.arm.control.commands.motion_commands import *
+from katana450.arm.control.commands.object_commands import *
+from katana450.arm.control.commands.tool_commands import *
+from katana450.arm.control.commands.tool_commands import Frame
+from katana450.arm.control.state.scene_objects import Attachment as Attachment
+from katana450.arm.control.state.scene_objects import Shape as Shape
 from katana450.errors import InputError
 from katana450.server.api.fields import *
 from katana450.server.api.fields import (

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar
 
 from msgspec import Meta
 
-from katana450.arm.control.act import Name, Request, Traits
+from katana450.arm.control.commands.act import Name, Request, Traits
 from katana450.server.api.fields import Press
 
 

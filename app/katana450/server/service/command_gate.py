@@ -12,13 +12,13 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import SERVER, Actor, CommandChannel, Grounds
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Lease, Person
-from katana450.arm.control.messages import finding_text
-from katana450.arm.control.state import CAUSES, Finding, State
-from katana450.arm.control.stop_cause import StopCause, pressed
-from katana450.arm.runtime.presses import Presses
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.state import CAUSES, Finding, State
+from katana450.arm.control.state.stop_cause import StopCause, pressed
+from katana450.arm.runtime.pipes.presses import Presses
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.server.service.arm_handle import ArmHandle
 from katana450.server.service.heartbeats import check_in_time

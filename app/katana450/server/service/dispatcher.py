@@ -9,10 +9,10 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Request
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Request
 from katana450.arm.control.lease import Role
-from katana450.arm.control.state import Verdict
+from katana450.arm.control.state.state import Verdict
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.maths.geometry import so3
 from katana450.server.api import answers, requests

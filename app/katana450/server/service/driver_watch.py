@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from katana450.arm.control.lease import Person
-from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.state import Finding, Reason
+from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state.state import Finding, Reason
 from katana450.server.service.command_gate import CommandGate
 
 BUSY_LATENESS = 0.1

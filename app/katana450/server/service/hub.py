@@ -12,14 +12,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor, CommandChannel
-from katana450.arm.control.event_log import entries_between
+from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Lease, Person
-from katana450.arm.control.messages import finding_text, sentence
-from katana450.arm.control.silence import PAUSE_TIMEOUT, SilenceProfile
-from katana450.arm.control.state import State
-from katana450.arm.control.stop_cause import StopCause, pressed
+from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
+from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.state.messages import finding_text, sentence
+from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import StopCause, pressed
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.errors import LeaseError
 from katana450.server.api.requests import RequestDecoder

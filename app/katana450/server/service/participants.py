@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person, Role
-from katana450.arm.control.stop_cause import StopCause
+from katana450.arm.control.state.stop_cause import StopCause
 from katana450.server.service.heartbeats import LastHeartbeat
 from katana450.server.service.identity import Identity
 

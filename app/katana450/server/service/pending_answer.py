@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import msgspec
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import ABOUT_NOW, sentence
-from katana450.arm.control.state import GRIPPER_REASONS, Status
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.messages import ABOUT_NOW, sentence
+from katana450.arm.control.state.state import GRIPPER_REASONS, Status
 from katana450.errors import KatanaError
 from katana450.server.api import answers
 from katana450.server.service import serialize

@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from katana450.arm.control.act import Command
 from katana450.arm.control.actor import Actor, CommandChannel
+from katana450.arm.control.commands.act import Command
 from katana450.arm.control.lease import Lease, Person, Role
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.errors import KatanaError

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Request
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Request
 from katana450.arm.control.lease import Person
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.server.api import answers
 from katana450.server.service.participants import Participant
 

@@ -8,22 +8,22 @@ from weakref import WeakKeyDictionary
 
 import msgspec
 
-from katana450.arm.control import state as control
-from katana450.arm.control.act import tag_of
-from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.grip import touching
-from katana450.arm.control.margins import Margins
-from katana450.arm.control.messages import MAX_CONDITION, finding_text, sentence
-from katana450.arm.control.outcome import reason
-from katana450.arm.control.pouring import Pouring
-from katana450.arm.control.solid import Colour
-from katana450.arm.control.supervision import tracking_error
-from katana450.arm.control.tool_targets import BranchOption
+from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.objects.grip import touching
+from katana450.arm.control.objects.pouring import Pouring
+from katana450.arm.control.session.outcome import reason
+from katana450.arm.control.session.supervision import tracking_error
+from katana450.arm.control.session.tool_targets import BranchOption
+from katana450.arm.control.state import state as control
+from katana450.arm.control.state.arm_report import ArmReport
+from katana450.arm.control.state.margins import Margins
+from katana450.arm.control.state.messages import MAX_CONDITION, finding_text, sentence
+from katana450.arm.control.state.solid import Colour
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
-from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.water.units import MILLILITRE
 from katana450.server.api import answers

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.arm_report import ArmMode, ArmReport
 from katana450.arm.control.lease import Person
-from katana450.arm.control.messages import headline, mood, sentence
-from katana450.arm.control.state import State, Status
-from katana450.arm.control.supervision import tracking_error
-from katana450.arm.runtime.stop_messages import NO_STATE
+from katana450.arm.control.session.supervision import tracking_error
+from katana450.arm.control.state.arm_report import ArmMode, ArmReport
+from katana450.arm.control.state.messages import headline, mood, sentence
+from katana450.arm.control.state.state import State, Status
+from katana450.arm.runtime.pipes.stop_messages import NO_STATE
 from katana450.server.service.hub import Hub
 from katana450.server.service.known_pages import addressed
 from katana450.server.service.participants import Participant

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
-from katana450.arm.control import commands as cmd
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.state import State
-from katana450.arm.control.stop_cause import StopCause
-from katana450.arm.runtime.state_publisher import Snapshot
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
+from katana450.arm.control.state.stop_cause import StopCause
+from katana450.arm.runtime.pipes.state_publisher import Snapshot
 
 
 @dataclass(frozen=True)

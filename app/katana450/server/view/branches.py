@@ -12,10 +12,10 @@ from html import escape
 
 import viser
 
-from katana450.arm.control.commands import Branch
-from katana450.arm.control.messages import degrees, part, short
-from katana450.arm.control.state import State
-from katana450.arm.control.tool_targets import BranchOption
+from katana450.arm.control.commands.commands import Branch
+from katana450.arm.control.session.tool_targets import BranchOption
+from katana450.arm.control.state.messages import degrees, part, short
+from katana450.arm.control.state.state import State
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.projection import ANGLE_WORTH_TELLING, POSITION_WORTH_TELLING
 from katana450.server.view.controls import Listen

@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import viser
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.initial_camera import fitted
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray

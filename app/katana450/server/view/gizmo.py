@@ -17,8 +17,8 @@ import numpy as np
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands import Command, EndDrag, Orient, Position, Turn
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.commands import Command, EndDrag, Orient, Position, Turn
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
 from katana450.maths.geometry import so3

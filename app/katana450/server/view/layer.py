@@ -7,8 +7,8 @@ from typing import ClassVar, NamedTuple
 
 import viser
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.scene import ArmNodes

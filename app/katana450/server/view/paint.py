@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
-from katana450.arm.control.appearance import Appearance, DisplayMode, LinkAppearance
-from katana450.arm.control.state import State
+from katana450.arm.control.state.appearance import Appearance, DisplayMode, LinkAppearance
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import main_colour

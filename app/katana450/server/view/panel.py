@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import viser
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import degrees, millimetres, signed
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.messages import degrees, millimetres, signed
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.server.view import readout

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 
 import viser
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.server.service.hub import Hub
 from katana450.server.view.controls import GestureGate

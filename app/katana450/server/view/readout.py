@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.messages import axis_names, limit_text, signed
-from katana450.arm.control.state import State
+from katana450.arm.control.state.messages import axis_names, limit_text, signed
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

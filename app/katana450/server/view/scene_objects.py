@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import viser
 
-from katana450.arm.control.environment import Environment
-from katana450.arm.control.scene_objects import SceneObject, Shape
-from katana450.arm.control.solid import Solid
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.environment import Environment
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
+from katana450.arm.control.state.solid import Solid
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.creases import Drawn, drawn, glb
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import Props

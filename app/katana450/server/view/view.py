@@ -9,16 +9,16 @@ from typing import NamedTuple
 import numpy as np
 import viser
 
-from katana450.arm.control.messages import title
-from katana450.arm.control.modes import JointTarget, PoseTarget
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State, Status
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.messages import title
+from katana450.arm.control.state.modes import JointTarget, PoseTarget
+from katana450.arm.control.state.state import State, Status
 from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
 from katana450.arm.robot.robot import Robot
-from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.server.view.cameras import Cameras

@@ -8,7 +8,7 @@ import time
 
 import viser
 
-from katana450.arm.runtime.state_publisher import Snapshot, StatePublisher
+from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.server.view.panel_folder import AddFolders
 
 READOUT_INTERVAL = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 import viser
 from viser import _messages as wire
 
-from katana450.arm.control.solid import Colour
+from katana450.arm.control.state.solid import Colour
 
 FLOOR_AT = -0.0255
 """Height [m] of the floor, slightly below the table so that the two do not flicker."""

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from katana450.arm.control.act import Id
+from katana450.arm.control.commands.act import Id
 from katana450.errors import InputError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError

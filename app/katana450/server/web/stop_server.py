@@ -24,8 +24,8 @@ import msgspec
 
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.lease import Person
-from katana450.arm.control.stop_cause import UNNAMED, StopCause, pressed
-from katana450.arm.runtime.stop_messages import NO_STATE, StopPress, StopStatus
+from katana450.arm.control.state.stop_cause import UNNAMED, StopCause, pressed
+from katana450.arm.runtime.pipes.stop_messages import NO_STATE, StopPress, StopStatus
 from katana450.errors import InputError
 from katana450.server.api.fields import API, MAX_PRESS_LENGTH, STOP_PATHS
 from katana450.server.api.outcome_answers import Refused

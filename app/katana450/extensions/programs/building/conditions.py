@@ -9,9 +9,9 @@ from typing import Annotated, ClassVar, Self
 
 import numpy as np
 
-from katana450.arm.control.pouring import BASIN, CUP, is_vessel
-from katana450.arm.control.scene_objects import named
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.pouring import BASIN, CUP, is_vessel
+from katana450.arm.control.state.scene_objects import named
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.declaration import Declared, Group, Kind, record

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from katana450.arm.control.commands import Gripper
-from katana450.arm.control.messages import part
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands.commands import Gripper
+from katana450.arm.control.state.messages import part
+from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT
 from katana450.extensions.programs.building.plan_state import TICK, PlanState

@@ -10,12 +10,12 @@ from typing import TypeVar
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import Command, Joints
-from katana450.arm.control.modes import IDLE
-from katana450.arm.control.plans import path_to, plan_along
-from katana450.arm.control.scene_objects import SceneObject, named
-from katana450.arm.control.session import TOOL_SPEED, Session
-from katana450.arm.control.state import State
+from katana450.arm.control.commands.commands import Command, Joints
+from katana450.arm.control.session.plans import path_to, plan_along
+from katana450.arm.control.session.session import TOOL_SPEED, Session
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.scene_objects import SceneObject, named
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, MoveFingers
 from katana450.extensions.programs.language.step_target import ScriptFrame, StepTarget

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from numpy.polynomial.polynomial import polyfit, polyval
 
-from katana450.arm.control.pouring import is_vessel
-from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.objects.pouring import is_vessel
+from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.planning.approach import UP

@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.pouring import is_vessel
-from katana450.arm.control.scene_objects import SceneObject, Shape
+from katana450.arm.control.objects.pouring import is_vessel
+from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.turns import wrapped

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control.messages import axis_names
+from katana450.arm.control.state.messages import axis_names
 from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.descent import WALL
 from katana450.extensions.general_arms.pose_equations import PoseEquations, RegularPosture

@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from katana450.arm.control.environment import Hand
-from katana450.arm.control.gripper_model import GripperModel
+from katana450.arm.control.objects.environment import Hand
+from katana450.arm.control.objects.gripper_model import GripperModel
 from katana450.errors import InputError
 from katana450.extensions.hands.placed_bodies import PlacedBodies
 from katana450.extensions.hands.sides import MIN_STROKE, SNAP_COSINE, frames_of, sides_of, snapped

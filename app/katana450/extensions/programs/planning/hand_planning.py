@@ -9,10 +9,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.pouring import is_vessel
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.pouring import is_vessel
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.approach import (
     ABOVE,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.messages import axis_names
+from katana450.arm.control.state.messages import axis_names
 from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.language.kinds import XYZ
 from katana450.extensions.programs.language.step_target import ScriptFrame

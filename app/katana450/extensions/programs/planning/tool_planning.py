@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.driven_tool import DrivenTool

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.messages import part
+from katana450.arm.control.state.messages import part
 from katana450.errors import InputError, PathError
 from katana450.extensions.programs.building.actions import Action, FollowPlan, SetSpeed, Task
 from katana450.extensions.programs.building.conditions import Condition, Held, ProgramTime

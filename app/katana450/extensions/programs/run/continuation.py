@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from katana450.arm.control.goals import START_TOLERANCE
-from katana450.arm.control.state import State
+from katana450.arm.control.session.goals import START_TOLERANCE
+from katana450.arm.control.state.state import State
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan, MoveFingers, Task, UseTool
 from katana450.extensions.programs.building.plan_state import (

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.arm_report import ArmReport
-from katana450.arm.control.state import State
+from katana450.arm.control.state.arm_report import ArmReport
+from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, SetSpeed, Task, expected_time

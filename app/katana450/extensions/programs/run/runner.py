@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.messages import finding_text, part
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.messages import finding_text, part
+from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import (
     ACTION_TIMEOUT,

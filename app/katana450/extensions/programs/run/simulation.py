@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.modes import IDLE
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.modes import IDLE
+from katana450.arm.control.state.state import State
 from katana450.arm.drivers.driver import Driver
 from katana450.arm.drivers.simulated import SimulatedDriver
 from katana450.arm.robot.robot import Robot

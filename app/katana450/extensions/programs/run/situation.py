@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.goals import START_TOLERANCE
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
+from katana450.arm.control.session.goals import START_TOLERANCE
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.maths.geometry.arrays import FloatArray
 
 Scene = tuple[tuple[object, ...], ...]

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Annotated
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands import MIN_SPEED
+from katana450.arm.control.commands.commands import MIN_SPEED
 from katana450.extensions.programs.building.step import LocatedStep
 from katana450.extensions.programs.language.declaration import (
     Declared,

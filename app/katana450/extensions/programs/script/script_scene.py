@@ -9,9 +9,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import (
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import (
     MAX_COORDINATE,
     MAX_OBJECTS,
     MAX_SCALE,
@@ -19,9 +20,8 @@ from katana450.arm.control.scene_objects import (
     SceneObject,
     Shape,
 )
-from katana450.arm.control.session import Session
-from katana450.arm.control.solid import MIN_OPACITY, Colour, ObjectAppearance, Solid
-from katana450.arm.control.state import State
+from katana450.arm.control.state.solid import MIN_OPACITY, Colour, ObjectAppearance, Solid
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.language import kinds
 from katana450.extensions.programs.language.attached_files import attached_file, is_file_name

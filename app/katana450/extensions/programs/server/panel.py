@@ -13,8 +13,8 @@ import viser
 
 from katana450.arm.control.actor import Actor
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError, LeaseError
 from katana450.extensions.programs.run.program import Program

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import viser
 
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props

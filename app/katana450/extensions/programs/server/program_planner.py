@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable, Iterable
 from enum import Enum
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.state import State
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.state.state import State
 from katana450.errors import CancelledError, InputError, KatanaError, LeaseError
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import MAX_BYTES

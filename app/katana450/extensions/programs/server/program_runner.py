@@ -14,11 +14,11 @@ from functools import partial
 
 import msgspec
 
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.act import Request
 from katana450.arm.control.actor import Actor
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.act import Request
 from katana450.arm.control.lease import Person
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError, LeaseError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.continuation import Interruption

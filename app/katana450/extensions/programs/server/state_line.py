@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from katana450.arm.control.lease import Person
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.server.program_planner import PlanningPhase
 from katana450.server.api.answers import Progress

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from katana450.arm.control.modes import Jogging, Positioning, Servoing, Tracking
-from katana450.arm.control.state import State
+from katana450.arm.control.state.modes import Jogging, Positioning, Servoing, Tracking
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward

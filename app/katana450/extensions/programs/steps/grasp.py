@@ -9,10 +9,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.messages import part
-from katana450.arm.control.pouring import is_vessel
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.objects.pouring import is_vessel
+from katana450.arm.control.state.messages import part
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import Reason, State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers, UseTool
 from katana450.extensions.programs.building.conditions import Held

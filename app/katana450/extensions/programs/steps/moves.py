@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from katana450.arm.control import commands as cmd
+from katana450.arm.control.commands import commands as cmd
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language import kinds

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from katana450.arm.control.pouring import BASIN, is_vessel
-from katana450.arm.control.scene_objects import MAX_COORDINATE, SceneObject
-from katana450.arm.control.support import check_carried, is_over, surface_below
+from katana450.arm.control.objects.pouring import BASIN, is_vessel
+from katana450.arm.control.objects.support import check_carried, is_over, surface_below
+from katana450.arm.control.state.scene_objects import MAX_COORDINATE, SceneObject
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import MoveFingers
 from katana450.extensions.programs.building.hand_motions import APPROACHES, carry, with_fingers

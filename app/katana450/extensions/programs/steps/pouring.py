@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from katana450.arm.control.pouring import CUP, is_vessel
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
+from katana450.arm.control.objects.pouring import CUP, is_vessel
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import Action, SetSpeed, Wait
 from katana450.extensions.programs.building.hand_motions import carry

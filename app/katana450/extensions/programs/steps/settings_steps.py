@@ -8,11 +8,11 @@ from typing import Annotated
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control import commands as cmd
-from katana450.arm.control.commands import MIN_SPEED
-from katana450.arm.control.scene_objects import SceneObject
-from katana450.arm.control.state import State
-from katana450.arm.control.support import check_carried
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.commands.commands import MIN_SPEED
+from katana450.arm.control.objects.support import check_carried
+from katana450.arm.control.state.scene_objects import SceneObject
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.free_place import girth
 from katana450.extensions.programs.building.actions import (

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from katana450.arm.control.session import TOOL_SPEED
+from katana450.arm.control.session.session import TOOL_SPEED
 from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.building.step import Step

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from katana450.arm.control.session import TOOL_SPEED
+from katana450.arm.control.session.session import TOOL_SPEED
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import CARRY, PlanState, UntimedPath

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.arm.control.arm_report import ArmMode, MeasuredStop
+from katana450.arm.control.state.arm_report import ArmMode, MeasuredStop
 from katana450.extensions.real_arm.codec.replies import (
     AT_REST,
     AXES,

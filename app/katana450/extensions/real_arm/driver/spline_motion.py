@@ -20,7 +20,7 @@ from itertools import islice
 
 import numpy as np
 
-from katana450.arm.control.session import MAX_STEP_TIME
+from katana450.arm.control.session.session import MAX_STEP_TIME
 from katana450.extensions.real_arm.codec.requests import AxisSegment, More, SendSplines
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 

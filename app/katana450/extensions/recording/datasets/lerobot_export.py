@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.progress import progress
 from katana450.extensions.recording.datasets.episode_video import EpisodeVideo

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.atomic import check_writable, write_files, writer_of
 from katana450.errors import InputError

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.simulation import MOMENT, simulated_states

@@ -26,7 +26,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
-from katana450.arm.control.environment import Environment
+from katana450.arm.control.objects.environment import Environment
 from katana450.arm.robot.robot import Robot
 from katana450.cli.version import version
 from katana450.errors import InputError

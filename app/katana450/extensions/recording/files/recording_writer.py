@@ -33,7 +33,7 @@ from mcap.records import (
 )
 from mcap.summary import Summary
 
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.version import version
 from katana450.extensions.recording.codec import Codec, json_text

@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import InputError
 from katana450.extensions.recording.codec import Codec, SharedText, json_form

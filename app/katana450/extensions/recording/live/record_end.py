@@ -17,7 +17,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
+from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.arm.runtime.tick import TickRecord
 
 MAX_REMEMBERED = 500

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from katana450.arm.runtime.guarded_pipe import PIPE_ERRORS, GuardedPipe
+from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import AnyEpisodeRequest, EpisodeGiver

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from katana450.arm.control.event_log import entries_between
-from katana450.arm.control.state import State
+from katana450.arm.control.state.event_log import entries_between
+from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import EpisodeMessage

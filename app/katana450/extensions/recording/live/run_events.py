@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from katana450.arm.control.actor import CommandChannel
-from katana450.arm.control.state import State
+from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 
 STOP, CLEAR_STOP, DRIVER, STEP = "stop", "clear_stop", "driver", "step"

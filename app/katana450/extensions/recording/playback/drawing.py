@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import viser
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.session import Session
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.session.session import Session
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.programs.server.preview import SAME_PLACE, GhostScene

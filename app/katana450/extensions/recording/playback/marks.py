@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from katana450.arm.control.messages import finding_text
-from katana450.arm.control.state import Finding, Reason
+from katana450.arm.control.state.messages import finding_text
+from katana450.arm.control.state.state import Finding, Reason
 from katana450.extensions.recording.codec import json_form
 from katana450.extensions.recording.files.recording_file import Message
 from katana450.extensions.recording.forms import FormError

@@ -7,8 +7,8 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
-from katana450.arm.control.pouring import CUP
-from katana450.arm.control.scene_objects import SceneObject
+from katana450.arm.control.objects.pouring import CUP
+from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.errors import InputError
 from katana450.extensions.recording.files.recording_file import Message, nanoseconds_of
 from katana450.extensions.recording.files.simulation import TickReader, content_of

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from katana450.arm.control.gripper_model import GripperModel
-from katana450.arm.control.state import Status
+from katana450.arm.control.objects.gripper_model import GripperModel
+from katana450.arm.control.state.state import Status
 from katana450.errors import InputError
 from katana450.extensions.programs.language.source import MAX_BYTES, MAX_VALUES
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline

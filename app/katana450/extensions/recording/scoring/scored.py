@@ -9,8 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from katana450.arm.control.session import Session
-from katana450.arm.control.state import Reason, State
+from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import Reason, State
 from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline

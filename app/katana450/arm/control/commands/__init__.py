@@ -1,0 +1,1 @@
+"""Commands of the arm, and the acts that they are."""

@@ -1,0 +1,179 @@
+"""Commands about a whole motion: its begin, its pace, its pause, its plan."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from msgspec import Meta
+
+from katana450.arm.control.commands.act import Command, MotionRequest, Name, Request, Traits
+from katana450.arm.control.commands.checked import check_finite
+from katana450.arm.control.state.state import Finding
+from katana450.errors import InputError
+from katana450.maths.kinematics.branch import Elbow, Shoulder
+from katana450.maths.planning.plan import Plan
+
+MIN_SPEED = 0.01
+"""Minimum fraction of speed. For a slower motion there are Pause and Stop."""
+
+
+class Home(Command, MotionRequest, frozen=True):
+    """Move to the ready posture."""
+
+    traits: ClassVar[Traits] = Traits(joints_only=True, goal="home")
+
+
+class GoToZero(Command, MotionRequest, frozen=True):
+    """Move to the zero posture, in which the arm is stretched along x."""
+
+    traits: ClassVar[Traits] = Traits(joints_only=True, goal="zero")
+
+
+class Branch(Command, MotionRequest, frozen=True):
+    """Move to the target pose on another branch: with another shoulder or elbow.
+
+    Attributes:
+        shoulder: Shoulder of the branch of a five-axis arm.
+        elbow: Elbow of the branch of a five-axis arm.
+        name: Name of the branch, in place of shoulder and elbow; the answer ``branches`` has it.
+    """
+
+    traits: ClassVar[Traits] = Traits(planned=True, goal="branch")
+
+    shoulder: Shoulder | None = None
+    elbow: Elbow | None = None
+    name: Name | None = None
+
+    def __post_init__(self) -> None:
+        five = (self.shoulder is None) + (self.elbow is None)
+        if five != (0 if self.name is None else 2):
+            raise InputError("A branch has a shoulder and an elbow, or a name.")
+
+    @property
+    def full_name(self) -> str:
+        """Name of the branch, also if it is given by shoulder and elbow."""
+        return self.name or f"{self.shoulder}-{self.elbow}"
+
+
+class Hold(Command, MotionRequest, frozen=True):
+    """Come to rest and drop the target."""
+
+    traits: ClassVar[Traits] = Traits(protective=True, joints_only=True)
+
+    @property
+    def finding(self) -> Finding | None:
+        """Cause for which the server itself holds the arm."""
+        return None
+
+
+class HoldFor(Hold, frozen=True):
+    """Hold the arm for a cause, which only the server gives. The arm pauses and reports it."""
+
+    finding: Finding
+
+
+class Pause(Command, Request, frozen=True):
+    """Come to rest on the path and keep the target.
+
+    The requests ``pause``, ``resume`` and ``speed`` also act on a running program. Only its owner
+    may send them then: the page or API program that started it. A program that is being planned
+    starts paused.
+    """
+
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
+
+    @property
+    def finding(self) -> Finding | None:
+        """Cause for which the server itself pauses the arm."""
+        return None
+
+
+class PauseFor(Pause, frozen=True):
+    """Pause for a cause, which only the server gives. The program that drives may resume."""
+
+    finding: Finding
+
+
+class Resume(Command, MotionRequest, frozen=True):
+    """Resume the motion after a pause."""
+
+    traits: ClassVar[Traits] = Traits(pacing=True, supersedes=False, joints_only=True)
+
+
+class Speed(Command, Request, frozen=True):
+    """Set the maximum speed of every joint and of the tool.
+
+    Attributes:
+        value: Fraction of full speed.
+    """
+
+    traits: ClassVar[Traits] = Traits(
+        pacing=True,
+        protective=True,
+        while_stopped=True,
+        supersedes=False,
+        passive=True,
+        joints_only=True,
+        keeps_detour=True,
+        gesture=True,
+    )
+
+    value: Annotated[float, Meta(ge=MIN_SPEED, le=1.0)]
+
+    def __post_init__(self) -> None:
+        check_finite("The speed", self.value)
+        if not MIN_SPEED <= self.value <= 1.0:
+            raise InputError(f"The speed must be from {MIN_SPEED} to 1, not {self.value}.")
+
+
+class Follow(Command, frozen=True, eq=False):
+    """Follow ``plan`` to its end from ``tau`` [s] of it, where the arm has to stand."""
+
+    traits: ClassVar[Traits] = Traits()
+
+    plan: Plan
+    tau: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.plan, Plan):
+            raise InputError(f"`plan` must be a Plan, not {self.plan!r}.")
+        if not 0.0 <= self.tau < self.plan.span:
+            raise InputError(f"`tau` must be from 0 to below {self.plan.span:g}, not {self.tau!r}.")
+
+
+class GoAlong(Command, frozen=True):
+    """Continue or go back on the plan to ``fraction`` of it: 0 is its start, 1 its end."""
+
+    traits: ClassVar[Traits] = Traits()
+
+    fraction: float
+
+    def __post_init__(self) -> None:
+        check_finite("The fraction of the plan", self.fraction)
+        if not 0.0 <= self.fraction <= 1.0:
+            raise InputError(f"The fraction of the plan must be from 0 to 1, not {self.fraction}.")
+
+
+class OfferDetour(Command, frozen=True, eq=False):
+    """Offer ``plan``, from the goal of a drag to the pose beyond its gap; nothing moves."""
+
+    traits: ClassVar[Traits] = Traits(supersedes=False, passive=True)
+
+    plan: Plan
+
+
+class Batch(Command, frozen=True, eq=False):
+    """Execute several commands in one tick: all of them, or none if one is invalid."""
+
+    traits: ClassVar[Traits] = Traits(while_stopped=True, joints_only=True)
+
+    commands: tuple[Command, ...]
+
+    def __post_init__(self) -> None:
+        if any(isinstance(command, Batch) for command in self.commands):
+            raise InputError("A batch cannot contain another batch: list its commands singly.")
+
+    @property
+    def parts(self) -> tuple[Command, ...]:
+        """The commands of the batch."""
+        return self.commands

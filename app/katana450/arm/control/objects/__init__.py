@@ -1,0 +1,1 @@
+"""Objects around the arm: their support, their grip, their water."""

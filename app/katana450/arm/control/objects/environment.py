@@ -1,0 +1,191 @@
+"""The environment of the arm: its collision world, its hand, and the poses of the objects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from katana450.arm.control.objects.gripper_model import GripperModel
+from katana450.arm.control.state.scene_objects import Attachment, SceneObject
+from katana450.arm.control.state.state import State
+from katana450.caching import cached_property
+from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.world import CollisionWorld, Part, obstacle
+from katana450.maths.geometry import se3, so3
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.water.environment import TableTop
+
+
+class GripModel(Protocol):
+    """Forces between the fingers and the object that they hold. All methods are pure."""
+
+    def overload(self, state: State) -> float | None:
+        """Return the load [N] under which the held object slides; None if the fingers hold it."""
+
+    def slid(self, state: State, dt: float) -> SceneObject | None:
+        """Return the held object after it has slid for ``dt`` [s]; None if it leaves the fingers.
+
+        ``state`` has an overload.
+        """
+
+    def report(self, state: State) -> Mapping[str, Any]:
+        """Return forces, pressures and sensor values of ``state`` for the answer to a query."""
+
+
+class FixedJawModel(Protocol):
+    """A fixed jaw, against which the moving jaw pushes objects. Its method is pure."""
+
+    def met(
+        self, world: CollisionWorld, state: State, item: SceneObject
+    ) -> tuple[str, float, SceneObject | None]:
+        """Return the name of the fixed jaw, its distance [m] from ``item``, and the pushed object.
+
+        ``item`` touches the moving jaw. The pushed object is in the base frame, nearer to the fixed
+        jaw. It is None if it touches the jaw already, is not before its face, or cannot be pushed:
+        uphill, or into another object.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """The part of the arm that takes objects.
+
+    Attributes:
+        palm: index of the body in the linkage that carries the fingers; the last body of an arm
+            without fingers.
+        fingers: names of the fingers among the parts.
+        T_palm_tool: (4, 4) the frame of the default tool in the frame of the palm.
+        gripper: the finger joint.
+        sides: names of the fingers on each side of an object, those at the tips first.
+        fixed_jaw: the body of the palm against which a single side closes; None for two.
+        grip_model: the forces in the hand; None if they are not modelled, and objects never slip.
+    """
+
+    palm: int
+    fingers: tuple[str, ...]
+    T_palm_tool: FloatArray
+    gripper: GripperModel
+    sides: tuple[tuple[str, ...], ...]
+    fixed_jaw: FixedJawModel | None = None
+    grip_model: GripModel | None = None
+
+    @property
+    def can_hold(self) -> bool:
+        """True if it has two sides, between which objects are held."""
+        return len(self.sides) + (self.fixed_jaw is not None) >= 2
+
+
+class Environment:
+    """Collision world of the arm with any objects, and the poses of these objects."""
+
+    def __init__(
+        self, world: CollisionWorld | None, hand: Hand | None, table: TableTop | None = None
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            world: the arm and all fixed bodies; None to check no contacts.
+            hand: the hand; None if nothing can be held.
+            table: the support of the objects; None if their support is not checked.
+        """
+        self._world = world
+        self.hand = hand
+        self.table = table
+
+    @cached_property
+    def table_height(self) -> float:
+        """Height of the table in the base frame [m]."""
+        parts = () if self._world is None else self._world.parts
+        tables = [part.T_mover_shape[0][2, 3] for part in parts if part.name == "table"]
+        return float(tables[0]) if tables else 0.0
+
+    def world(self, objects: Sequence[SceneObject]) -> CollisionWorld | None:
+        """Return the collision world with ``objects``; None if contacts are not checked."""
+        if self._world is None:
+            return None
+        standing = [
+            obstacle(
+                scene_object.name, scene_object.T_collision_shape, scene_object.collision_shape
+            )
+            for scene_object in objects
+            if not scene_object.carried
+        ]
+        world = self._world.with_obstacles(standing) if standing else self._world
+        for scene_object in objects:
+            if scene_object.carried and self.hand is not None:
+                part = Part(
+                    scene_object.name,
+                    self.hand.palm,
+                    (frozen(scene_object.T_collision_shape),),
+                    (scene_object.collision_shape,),
+                )
+                world = world.with_carried(part)
+        return world
+
+    def touch(self, world: CollisionWorld, objects: Sequence[SceneObject]) -> FloatArray:
+        """Return the minimum distance (p,) of each pair of ``world`` while the fingers move [m]."""
+        holdable = {
+            scene_object.name
+            for scene_object in objects
+            if scene_object.can_be_held and not scene_object.carried
+        }
+        fingers = set(self.hand.fingers if self.hand is not None and self.hand.can_hold else ())
+        names = [world.parts[number].name for number in world.part_of.tolist()]
+        touching = [
+            bool({names[a], names[b]} & holdable and {names[a], names[b]} & fingers)
+            for a, b in zip(world.first.tolist(), world.second.tolist(), strict=True)
+        ]
+        return np.where(touching, 0.0, MIN_CLEARANCE)
+
+    def pose(self, scene_object: SceneObject, x: FloatArray) -> FloatArray:
+        """Return the pose (4, 4) of ``scene_object`` in the base frame.
+
+        x: (k,) joints and finger joint [rad].
+        """
+        return scene_object.T if not scene_object.carried else self._palm(x) @ scene_object.T
+
+    def taken(self, scene_object: SceneObject, x: FloatArray) -> SceneObject:
+        """Return ``scene_object`` as held by the hand, at the place where it is."""
+        return replace(scene_object, T=self.into_hand(scene_object.T, x), held=True)
+
+    def into_hand(self, T: FloatArray, x: FloatArray) -> FloatArray:
+        """Return the pose ``T`` (4, 4), given in the base frame, in the frame of the hand.
+
+        x: (k,) joints and finger joint [rad].
+        """
+        return se3.inverse(self._palm(x)) @ T
+
+    def mounted(self, scene_object: SceneObject, to: Attachment, x: FloatArray) -> SceneObject:
+        """Return ``scene_object`` fixed to ``to``. An object that the fingers hold is unchanged.
+
+        x: (k,) joints and finger joint [rad].
+        """
+        if scene_object.held or (
+            to is Attachment.HAND and (scene_object.fixed or self.hand is None)
+        ):
+            return scene_object
+        if to is Attachment.HAND:
+            return replace(scene_object, T=self.into_hand(scene_object.T, x), fixed=True)
+        if to is Attachment.TABLE:
+            return self.left(scene_object, x, self.table_height)
+        return replace(scene_object, T=self.pose(scene_object, x), fixed=False)
+
+    def left(self, scene_object: SceneObject, x: FloatArray, height: float = 0.0) -> SceneObject:
+        """Return ``scene_object`` released from the hand, upright on what carries it.
+
+        x: (k,) joints and finger joint [rad].
+        height: of the surface below it [m].
+        """
+        T = self.pose(scene_object, x)
+        yaw = float(np.arctan2(T[1, 0] - T[0, 1], T[0, 0] + T[1, 1]))
+        place = (T[0, 3], T[1, 3], height)
+        T = se3.from_rotation_translation(so3.rotation_z(yaw), place)
+        return replace(scene_object, T=T, held=False, fixed=False)
+
+    def _palm(self, x: FloatArray) -> FloatArray:
+        assert self._world is not None
+        assert self.hand is not None
+        return np.asarray(self._world.linkage.poses(x)[self.hand.palm])

@@ -1,0 +1,1 @@
+"""The session: from state, commands and time to the next state."""

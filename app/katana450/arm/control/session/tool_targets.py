@@ -1,0 +1,268 @@
+"""Transforms of the state of an arm towards targets of its tool: poses, drags, branches, jogs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.commands.tool_commands import StepTool, TurnCommand
+from katana450.arm.control.session.goals import go_on_detour, with_goal, with_mode
+from katana450.arm.control.state.findings import of_jog
+from katana450.arm.control.state.messages import excluded
+from katana450.arm.control.state.modes import (
+    IDLE,
+    Jogging,
+    JointTarget,
+    PoseTarget,
+    Positioning,
+    Target,
+    Tracking,
+)
+from katana450.arm.control.state.state import CAUSES, GRIPPER_REASONS, Reason, State
+from katana450.errors import InputError
+from katana450.maths.collision.clearance import MIN_CLEARANCE
+from katana450.maths.collision.contact import Contact
+from katana450.maths.collision.world import CollisionWorld
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import AnyBranch
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.solution import Solution
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import singular_values
+
+
+@dataclass(frozen=True, eq=False)
+class BranchMetrics:
+    """One branch at a pose, with its cost and its quality.
+
+    Attributes:
+        branch: the branch.
+        q: joint angles (n,) of the branch [rad].
+        within_limits: True if the arm can go there.
+        position_error, rotation_error: difference [m], [rad] from the pose.
+        distance: the largest angle that any joint has to turn [rad].
+        time: duration until all joints are there, each at its own maximum speed [s].
+        smallest_singular_value: 0 in a singularity [1].
+    """
+
+    branch: AnyBranch
+    q: FloatArray
+    within_limits: bool
+    position_error: float
+    rotation_error: float
+    distance: float
+    time: float
+    smallest_singular_value: float
+
+    @staticmethod
+    def of(chain: Chain, posture: Solution | Projection, q: npt.ArrayLike) -> BranchMetrics:
+        """Return the metrics of `posture`, seen from the joint angles `q` (n,) [rad].
+
+        Between two postures inside the limits the straight path in joint space is inside too, so
+        distance and time belong to a path that the arm can follow.
+        """
+        turns = np.abs(posture.q - chain.check_q(q))
+        return BranchMetrics(
+            branch=posture.branch,
+            q=posture.q,
+            within_limits=chain.within_limits(posture.q),
+            position_error=posture.position_error,
+            rotation_error=posture.rotation_error,
+            distance=float(turns.max()),
+            time=float((turns / chain.speed).max()),
+            smallest_singular_value=float(singular_values(chain, posture.q)[-1]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BranchOption:
+    """A branch that the arm can change to.
+
+    Attributes:
+        metrics: its posture, cost and distance from a singularity.
+        contact: the contact that the arm would have at its end; None if there is none.
+        refusal: why the arm cannot take the branch; empty if it can. If it cannot, the metrics are
+            those of the nearest posture on another one.
+    """
+
+    metrics: BranchMetrics
+    contact: Contact | None
+    refusal: str = ""
+
+
+def branch_named(arm: ArmModel, name: str) -> AnyBranch:
+    """Return the branch of that name. Raises InputError with the names of all."""
+    for branch in arm.kinematics.branches:
+        if str(branch) == name:
+            return branch
+    names = ", ".join(map(str, arm.kinematics.branches))
+    raise InputError(f"This arm has no branch {name!r}; its branches are {names}.")
+
+
+def current_target(arm: ArmModel, state: State) -> ToolTarget:
+    """Return the target that a drag starts from: the present tool target, or that of the goal."""
+    if not isinstance(state.target, JointTarget | PoseTarget):
+        return state.target
+    return arm.kinematics_to(state.tool).target_at(state.goal)
+
+
+def target_on_branch(arm: ArmModel, state: State, branch: AnyBranch) -> ToolTarget:
+    """Return the present target in the numbers of ``branch``."""
+    kinematics = arm.kinematics_to(state.tool)
+    return kinematics.target_on(state, current_target(arm, state), branch)
+
+
+def branch_option(arm: ArmModel, state: State, branch: AnyBranch) -> Projection:
+    """Return the posture on ``branch`` whose tool is nearest to the target inside the limits."""
+    kinematics = arm.kinematics_to(state.tool)
+    if isinstance(state.target, PoseTarget):
+        return kinematics.project(state, state.target.T, branch)
+    return kinematics.leap(state, target_on_branch(arm, state, branch), branch)
+
+
+def branch_options(
+    arm: ArmModel, state: State, world: CollisionWorld | None = None
+) -> tuple[BranchOption, ...]:
+    """Return one option for each branch, measured from where the arm is.
+
+    world: the collision world; without one no contacts are reported.
+    """
+    chain = arm.chain_to(state.tool)
+    candidates = [(branch, branch_option(arm, state, branch)) for branch in arm.kinematics.branches]
+    return tuple(
+        BranchOption(
+            replace(BranchMetrics.of(chain, best, state.q), branch=branch),
+            contact_at(world, best.q, state.gripper),
+            branch_refusal(branch, best),
+        )
+        for branch, best in candidates
+    )
+
+
+def branch_refusal(branch: AnyBranch, best: Projection) -> str:
+    """Return why the arm cannot take ``branch``, of which ``best`` is the option; else empty."""
+    is_possible = best.branch == branch or not best.limits
+    return "" if is_possible else excluded(branch, best.limits)
+
+
+def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> Contact | None:
+    """Return the two parts that are too near to each other with the joints at ``q`` (n,) [rad].
+
+    gripper: the finger joint [rad or m].
+    """
+    nearest = None if world is None else world.nearest(np.append(q, gripper))
+    return nearest if nearest is not None and nearest.distance < MIN_CLEARANCE else None
+
+
+KEPT_REASONS = (Reason.PAUSED, Reason.CONTACT, Reason.WAITING, *CAUSES, *GRIPPER_REASONS)
+"""The reasons that a jog keeps; it computes all others again."""
+
+
+def with_pose_target(arm: ArmModel, state: State, target: PoseTarget) -> State:
+    """Return ``state`` with the nearest pose to ``target`` on its branch as the goal."""
+    kinematics = arm.kinematics_to(state.tool)
+    best = kinematics.project(state, target.T, state.branch)
+    findings = kinematics.losses(state, best, yaw_was_given=True)
+    return with_goal(state, best.q, findings, Positioning(target))
+
+
+def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = False) -> State:
+    """Return ``state`` that tracks ``target`` from now on, along the path of the drag.
+
+    let_go: whether the drag has ended already.
+    """
+    since = current_target(arm, state) if state.since is None else state.since
+    return with_mode(state, Tracking(target, since, let_go))
+
+
+def turned(arm: ArmModel, state: State, command: TurnCommand) -> State:
+    """Return ``state`` that tracks its tool target with the orientation of ``command``."""
+    kinematics = arm.kinematics_to(state.tool)
+    target = kinematics.turned(state, current_target(arm, state), command)
+    return dragged(arm, state, target)
+
+
+def stepped(arm: ArmModel, state: State, step: StepTool) -> State:
+    """Return ``state`` with its tool target moved by ``step``."""
+    kinematics = arm.kinematics_to(state.tool)
+    target = kinematics.stepped(state, current_target(arm, state), step)
+    return dragged(arm, state, target, let_go=True)
+
+
+def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
+    """Return ``state`` with its goal moved towards the dragged target, as far as a tick allows."""
+    kinematics = arm.kinematics_to(state.tool)
+    progress = kinematics.track(state, tracking.target, tracking.since)
+    if progress.since is not None:
+        return with_mode(
+            replace(state, goal=progress.best.q), replace(tracking, since=progress.since)
+        )
+    target = JointTarget(progress.best.q) if tracking.let_go else tracking.target
+    findings = kinematics.tracking_losses(state, progress)
+    mode = Positioning(target, progress.beyond_gap)
+    return with_goal(state, progress.best.q, findings, mode)
+
+
+def gone(arm: ArmModel, state: State) -> State:
+    """Return ``state`` that follows the detour on offer to the pose beyond the gap."""
+    assert state.beyond_gap is not None
+    kinematics = arm.kinematics_to(state.tool)
+    losses = kinematics.losses(state, state.beyond_gap, yaw_was_given=False)
+    return go_on_detour(state, losses)
+
+
+def with_reapplied_priority(arm: ArmModel, state: State) -> State:
+    """Return ``state`` with its pose or tool target projected again, under the present priority."""
+    match state.intent:
+        case Positioning(target=PoseTarget() as target):
+            return with_pose_target(arm, state, target)
+        case Positioning(target=JointTarget() as target):
+            # A pose beyond a gap was nearest by the earlier priority.
+            gap = state.beyond_gap is not None
+            return with_mode(state, Positioning(target)) if gap else state
+        case Positioning():
+            return dragged(arm, state, current_target(arm, state))
+        case Tracking() as tracking:
+            return dragged(arm, state, tracking.target, let_go=tracking.let_go)
+    return state
+
+
+def with_branch(arm: ArmModel, state: State, branch: AnyBranch) -> State:
+    """Return ``state`` that moves to ``branch`` with the tool at its target.
+
+    Raises InputError if the limits exclude the branch.
+    """
+    best = branch_option(arm, state, branch)
+    if refusal := branch_refusal(branch, best):
+        raise InputError(f"{refusal}.")
+    target: Target = JointTarget(best.q)
+    if isinstance(state.target, PoseTarget):
+        target = state.target
+    elif not isinstance(state.target, JointTarget):
+        target = target_on_branch(arm, state, branch)
+    findings = arm.kinematics_to(state.tool).losses(
+        state, best, yaw_was_given=isinstance(target, PoseTarget)
+    )
+    return with_goal(replace(state, branch=best.branch), best.q, findings, Positioning(target))
+
+
+def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> State:
+    """Return ``state`` after a tick of a jog, with ``rest`` (n,) as the goal.
+
+    rest: the posture at which a brake begun now ends. So the arm comes to rest there if the jog
+    is not renewed.
+    """
+    kinematics, q = arm.kinematics_to(state.tool), state.setpoint
+    other_findings = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
+    V = kinematics.jog_twist(q, jogging.rates, jogging.frame)
+    held = of_jog(kinematics.chain, q, V)
+    branch = kinematics.branch_of(rest)
+    aimed = replace(state, goal=rest, branch=branch, findings=other_findings + held)
+    if state.t < jogging.until:
+        return aimed
+    # The end of a jog brakes all joints in proportion, so the tool stays on its path.
+    return with_mode(aimed, IDLE if state.motion.at_rest else jogging.ending())

@@ -1,0 +1,1 @@
+"""State of a session, its parts, and the words for them."""

@@ -1,0 +1,130 @@
+"""Findings: the reasons with numbers why the goal is not the target, most useful first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from katana450 import tolerances
+from katana450.arm.control.state.state import Finding, Reason
+from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.projection import (
+    ANGLE_WORTH_TELLING,
+    POSITION_WORTH_TELLING,
+    Projection,
+)
+from katana450.maths.kinematics.tracker import Tracked
+from katana450.maths.kinematics.velocity import limit_distances, limited_jog
+from katana450.maths.motion.limiter import Limits
+
+MIN_JOG_FRACTION = 0.05
+"""Fraction of a jog below which the tool does not move noticeably."""
+
+FULL_JOG_FRACTION = 0.9
+"""Fraction of a jog above which no loss is reported."""
+
+LIMIT_DISTANCE = math.radians(0.5)
+"""[rad] Distance to a limit within which a joint holds up a jog."""
+
+
+def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[Finding, ...]:
+    """Return a finding for each joint of ``q`` (n,) [rad or m] that is beyond a limit.
+
+    slides: (n,) whether each joint is prismatic.
+    """
+    below, above = (
+        q < limits.lower - tolerances.LIMIT_SLACK,
+        q > limits.upper + tolerances.LIMIT_SLACK,
+    )
+    # A slider at its end is converted to degrees and back: the slack covers the rounding.
+    return tuple(
+        Finding(
+            Reason.SLIDE_LIMIT if slides[axis] else Reason.AXIS_LIMIT,
+            float(limits.lower[axis] if below[axis] else limits.upper[axis]),
+            axis,
+        )
+        for axis in np.flatnonzero(below | above).tolist()
+    )
+
+
+def of_projection(
+    chain: Chain, best: Projection, priority: Priority, *, yaw_was_given: bool
+) -> tuple[Finding, ...]:
+    """Return the findings on what the nearest feasible pose ``best`` loses of the target.
+
+    yaw_was_given: whether the target has a yaw, whose loss is reported.
+    """
+    findings = []
+    in_place = best.position_error <= POSITION_WORTH_TELLING
+    pitch_gave_way, roll_error = best.pitch_error > ANGLE_WORTH_TELLING, best.roll_error
+    if not in_place:
+        keeps_pitch = priority is Priority.PITCH and not pitch_gave_way
+        reason = Reason.POSITION_CHANGED if keeps_pitch else Reason.OUT_OF_REACH
+        findings.append(Finding(reason, best.position_error))
+    if yaw_was_given and best.yaw_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.YAW_FIXED, best.yaw_error))
+    elif in_place and not pitch_gave_way:
+        roll_error = max(roll_error, best.rotation_error)
+    if roll_error > ANGLE_WORTH_TELLING:
+        findings.append(Finding(Reason.ROLL_CHANGED, roll_error))
+    if pitch_gave_way and (in_place or priority is Priority.PITCH):
+        findings.append(Finding(Reason.PITCH_CHANGED, best.pitch_error))
+    return (*findings, *causes_of(chain, best)) if findings else ()
+
+
+def causes_of(chain: Chain, best: Projection, *, at_edge: bool = False) -> Iterator[Finding]:
+    """Yield the findings on what keeps the tool of ``best`` from coming nearer to its target.
+
+    ``at_edge``: whether the posture is at the edge of its branch.
+    """
+    if best.axis1:
+        yield Finding(Reason.AXIS_1)
+    if best.reach:
+        yield Finding(Reason.LINKS)
+    elif at_edge:
+        yield Finding(Reason.SINGULAR)
+    for axis in best.limits:
+        ends = float(chain.lower[axis]), float(chain.upper[axis])
+        yield Finding(Reason.AXIS_LIMIT, min(ends, key=lambda end: abs(end - best.q[axis])), axis)
+
+
+def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
+    """Return the findings on what stops a jog at ``q`` (n,) [rad].
+
+    V: twist (6,) of the jog in {S} [rad/s, m/s].
+    """
+    if limited_jog(chain, q, V) < MIN_JOG_FRACTION:
+        return (Finding(Reason.SINGULAR),)
+    near = limit_distances(chain, q) <= LIMIT_DISTANCE
+    # Computed only near a limit, to keep the tick short.
+    if not near.any() or limited_jog(chain, q, V, LIMIT_DISTANCE) > FULL_JOG_FRACTION:
+        return ()
+    ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
+    return tuple(
+        Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
+        for axis in np.flatnonzero(near).tolist()
+    )
+
+
+def of_tracked(chain: Chain, tracked: Tracked, priority: Priority) -> tuple[Finding, ...]:
+    """Return the findings on what following a drag loses.
+
+    The leap across a gap, which a drag never makes, comes first.
+    """
+    losses = of_projection(chain, tracked.best, priority, yaw_was_given=False)
+    if tracked.beyond_gap is None:
+        return losses
+    axis, leap = tracked.leap_ahead()
+    held = Finding(Reason.ACROSS_GAP, leap, axis)
+    if tracked.beyond_gap.position_error <= POSITION_WORTH_TELLING:
+        # The target beyond the gap can be reached, so it is not out of reach.
+        losses = tuple(
+            replace(f, reason=Reason.POSITION_CHANGED) if f.reason is Reason.OUT_OF_REACH else f
+            for f in losses
+        )
+    return (held, *losses)

@@ -1,0 +1,126 @@
+"""The modes of a session: each is one cause that decides where the goal of the arm is.
+
+A session is in exactly one mode. Each mode holds only the fields that it needs, so no data of a
+mode outlasts it. The effect of each command in each mode is in ``transitions``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from katana450.arm.control.state.following import Following
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.projection import Projection
+from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.stream import Stream
+from katana450.maths.planning.plan import Plan
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """Joint angles ``q`` (n,) [rad or m]."""
+
+    q: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTarget:
+    """A full pose ``T`` (4, 4) in {S}."""
+
+    T: FloatArray
+
+
+Target = JointTarget | ToolTarget | PoseTarget
+
+
+@dataclass(frozen=True)
+class Idle:
+    """No target: the arm rests at its goal, or brakes towards it."""
+
+
+IDLE = Idle()
+
+
+@dataclass(frozen=True, eq=False)
+class Positioning:
+    """Travel to a fixed goal, and rest there. The goal is the nearest posture to ``target``.
+
+    Attributes:
+        target: the target, or the goal after the end of a drag.
+        beyond_gap: the pose nearer to the target of a drag that only a leap would reach, on the
+            same branch; None without one.
+        detour: the offered plan from the goal to that pose; None without an offer.
+    """
+
+    target: Target
+    beyond_gap: Projection | None = None
+    detour: Plan | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """A drag: the goal moves along the path of the drag to ``target``, as far as a tick allows.
+
+    Attributes:
+        target: the newest target.
+        since: the target up to which the goal has followed that path.
+        let_go: whether the drag has ended, so that the goal becomes the target at the end of the
+            path.
+    """
+
+    target: ToolTarget
+    since: ToolTarget
+    let_go: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Jogging:
+    """Motion at given rates for a limited time.
+
+    Attributes:
+        rates: (5,) or (6,) velocity of the tool point [m/s], then pitch and roll or the three
+            rotations [rad/s].
+        frame: the frame of the velocity.
+        until: time [s] at which the jog ends unless it is renewed.
+    """
+
+    rates: FloatArray
+    frame: JogFrame
+    until: float
+
+    def ending(self) -> Jogging:
+        """Return the jog with zero rates, with which it ends."""
+        return replace(self, rates=frozen(np.zeros(self.rates.size)))
+
+
+@dataclass(frozen=True, eq=False)
+class Servoing:
+    """A stream of joint angles is followed, for JOG_TIME after its newest sample."""
+
+    stream: Stream
+
+
+Intent = Idle | Positioning | Tracking | Jogging | Servoing
+"""A mode that can begin while the arm is still on a plan."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leaving:
+    """The arm brakes along its plan until it can leave it without touching anything.
+
+    Attributes:
+        along: the place on the plan.
+        then: the mode that has superseded the plan.
+    """
+
+    along: Following
+    then: Intent
+
+
+Mode = Idle | Positioning | Tracking | Jogging | Servoing | Following | Leaving
+
+MODES = (Idle, Positioning, Tracking, Jogging, Servoing, Following)
+"""Columns of the table of transitions. A plan that is being left counts as the mode after it."""

@@ -1,0 +1,1 @@
+"""Export of a robot and its motion as VRML97."""
