@@ -70,7 +70,16 @@ class _Part(NamedTuple):
 
 
 def package_files(path: Path) -> dict[str, bytes]:
-    """Return name and content of the zip of the URDF file at ``path``.
+    """Return name and content of the zip of the URDF file at ``path``; see `packaged`."""
+    files = packaged(path)
+    package, _, _ = next(iter(files)).partition("/")
+    return {f"{package}.zip": zipped(files, mode=0o644)}
+
+
+def packaged(path: Path) -> dict[str, bytes]:
+    """Return the content of each file of the package of the URDF file at ``path``.
+
+    Their paths begin with the name of the package.
 
     Raises RobotDescriptionError if the file is not a URDF, or a mesh is missing or unreadable.
     """
@@ -91,7 +100,7 @@ def package_files(path: Path) -> dict[str, bytes]:
         f"urdf/{plain}.urdf": ET.tostring(root, encoding="utf-8", xml_declaration=True),
         **meshes,
     }
-    return {f"{package}.zip": zipped({f"{package}/{n}": c for n, c in files.items()}, mode=0o644)}
+    return {f"{package}/{name}": content for name, content in files.items()}
 
 
 def _with_meshes(root: ET.Element, folder: Path, prefix: str) -> dict[str, bytes]:

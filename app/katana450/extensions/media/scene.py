@@ -152,8 +152,7 @@ RAY_OFFSET = 2e-4
 """[m] Distance of the start of a shadow ray from its surface, to avoid hits of that surface."""
 
 
-@dataclass(frozen=True, eq=False)
-class Hits:
+class Hits(NamedTuple):
     """The first intersections of n rays.
 
     Attributes:
@@ -172,13 +171,7 @@ class Hits:
 
     def some(self, which: Bools) -> Hits:
         """Return the hits of the rays for which ``which`` (n,) is True."""
-        return Hits(
-            self.directions[which],
-            self.distance[which],
-            self.points[which],
-            self.normals[which],
-            self.item[which],
-        )
+        return Hits._make(values[which] for values in self)
 
 
 class Tracer:
@@ -230,12 +223,11 @@ def first_hits(tracer: Tracer, eye: Floats, directions: Floats, floor: float) ->
     np.divide(floor - eye[2], down, out=to_floor, where=down < -STEEPNESS)
     on_floor = (to_floor > 0.0) & (to_floor < hits.distance)
     distance = np.where(on_floor, to_floor, hits.distance).astype(np.float32)
-    return Hits(
-        directions,
-        distance,
-        _ends(eye, distance, directions),
-        np.where(on_floor[:, None], UPWARD, hits.normals),
-        np.where(on_floor, FLOOR, hits.item).astype(np.int32),
+    return hits._replace(
+        distance=distance,
+        points=_ends(eye, distance, directions),
+        normals=np.where(on_floor[:, None], UPWARD, hits.normals),
+        item=np.where(on_floor, FLOOR, hits.item).astype(np.int32),
     )
 
 

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import io
 import logging
 import mimetypes
 import secrets
-import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,7 +22,7 @@ from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.export.urdf_package import package_files
+from katana450.extensions.export.urdf_package import packaged
 from katana450.extensions.rosbridge.channel import RosChannel, RosLine
 from katana450.extensions.rosbridge.publications import Publications
 from katana450.server.web.admission import client_of
@@ -56,12 +54,10 @@ def description_of(urdf: Path) -> ServedPackage:
     The first call takes seconds.
     """
     try:
-        (content,) = package_files(urdf).values()
+        files = packaged(urdf)
     except RobotDescriptionError as error:
         log.warning("There is no /robot_description: %s", error)
         return ServedPackage("", {})
-    with zipfile.ZipFile(io.BytesIO(content)) as packed:
-        files = {path: packed.read(path) for path in packed.namelist()}
     (text,) = (content.decode() for path, content in files.items() if path.endswith(".urdf"))
     return ServedPackage(text, files)
 
