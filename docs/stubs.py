@@ -12,11 +12,12 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 import numpy as np
 
 import katana450
 from katana450.arm.control.commands.act import Request
-from katana450.client import acts
+from katana450.client import acts, episode_acts
 from katana450.extensions.programs.language.declaration import Schema
 from katana450.library import step_methods
 
@@ -26,6 +27,7 @@ ACTS_HEAD = """\
 # Written by `python -m docs.stubs` from the classes of the acts.
 from typing import Any, Generic, Literal, TypeVar
 
+import msgspec
 import numpy.typing as npt
 
 {imports}
@@ -37,8 +39,9 @@ OWN: tuple[type[Request], ...]
 METHODS: dict[str, type[Request]]
 
 def way_of(kind: type[Request]) -> str: ...
-def signature_of(kind: type[Request]) -> Any: ...
-def documentation_of(kind: type[Request]) -> str: ...
+def signature_of(kind: type[msgspec.Struct]) -> Any: ...
+def documentation_of(kind: type[msgspec.Struct]) -> str: ...
+def add_method(owner: type, name: str, kind: type[msgspec.Struct], way: str) -> None: ...
 
 class Acts(Generic[AtRest, Answered, Sent]):
 """
@@ -49,18 +52,11 @@ RESULTS = {"go": "AtRest", "ask": "Answered", "send": "Sent"}
 
 def acts_stub() -> str:
     """Return the content of ``client/acts.pyi``."""
-    methods: list[str] = []
     named: set[type] = {Request}
-    for name, kind in acts.METHODS.items():
-        hints = get_type_hints(kind)
-        parameters = ["self"]
-        for parameter in list(acts.signature_of(kind).parameters.values())[1:]:
-            default = "" if parameter.default is inspect.Parameter.empty else " = ..."
-            parameters.append(
-                f"{parameter.name}: {type_text(hints[parameter.name], named)}{default}"
-            )
-        result = RESULTS[acts.way_of(kind)]
-        methods.append(method_text(name, parameters, result, acts.documentation_of(kind)))
+    methods = [
+        request_method(name, kind, RESULTS[acts.way_of(kind)], named)
+        for name, kind in acts.METHODS.items()
+    ]
     modules: dict[str, list[str]] = {}
     for kind in sorted(named, key=lambda kind: kind.__name__):
         modules.setdefault(kind.__module__, []).append(kind.__name__)
@@ -68,6 +64,39 @@ def acts_stub() -> str:
         f"from {module} import {', '.join(names)}\n" for module, names in sorted(modules.items())
     )
     return ACTS_HEAD.format(imports=imports) + "\n".join(methods)
+
+
+EPISODES_HEAD = """\
+# Written by `python -m docs.stubs` from the classes of the requests about episodes.
+from typing import Literal
+
+from katana450.server.api.episode_requests import EpisodeRequest
+
+METHODS: dict[str, type[EpisodeRequest]]
+
+class EpisodeActs:
+"""
+
+
+def episodes_stub() -> str:
+    """Return the content of ``client/episode_acts.pyi``."""
+    methods = [
+        request_method(name, kind, "int", set()) for name, kind in episode_acts.METHODS.items()
+    ]
+    return EPISODES_HEAD + "\n".join(methods)
+
+
+def request_method(name: str, kind: type[msgspec.Struct], result: str, named: set[type]) -> str:
+    """Return the stub of the method that makes a request of ``kind``.
+
+    The classes of its parameters are added to ``named``.
+    """
+    hints = get_type_hints(kind)
+    parameters = ["self"]
+    for parameter in list(acts.signature_of(kind).parameters.values())[1:]:
+        default = "" if parameter.default is inspect.Parameter.empty else " = ..."
+        parameters.append(f"{parameter.name}: {type_text(hints[parameter.name], named)}{default}")
+    return method_text(name, parameters, result, acts.documentation_of(kind))
 
 
 def method_text(name: str, parameters: list[str], result: str, about: str) -> str:
@@ -165,6 +194,7 @@ def value_types(schema: Schema) -> list[str]:
 
 STUBS: dict[Path, Callable[[], str]] = {
     PACKAGE / "client" / "acts.pyi": acts_stub,
+    PACKAGE / "client" / "episode_acts.pyi": episodes_stub,
     PACKAGE / "library" / "step_methods.pyi": steps_stub,
 }
 """Content of each file."""

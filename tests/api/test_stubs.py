@@ -12,6 +12,7 @@ import pytest
 from docs.stubs import STUBS
 from katana450.client import AsyncClient, Client
 from katana450.client.acts import METHODS, OWN, Acts
+from katana450.client.files import EpisodeClient
 from katana450.server.api import requests
 
 
@@ -34,6 +35,7 @@ def test_each_act_has_a_method_that_hides_none_of_the_clients() -> None:
 def test_signature_and_documentation_are_those_of_the_class() -> None:
     assert str(inspect.signature(Client.nudge)) == "(self, axis, by)"
     assert str(inspect.signature(Client.kick)) == "(self, person, seconds=60.0, revoke=False)"
+    assert str(inspect.signature(EpisodeClient.judge)) == "(self, outcome, number=None)"
     text = inspect.getdoc(Client.joint) or ""
     assert text.startswith("Move one joint to a value.")
     assert "Args:\n    axis: Number of the joint, counted from 1." in text

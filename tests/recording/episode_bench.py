@@ -7,10 +7,11 @@ from functools import cache
 from pathlib import Path
 
 from katana450.arm.runtime.tick import TickRecord
-from katana450.extensions.recording.episodes.episode import EpisodeGiver, episode_request
+from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.live.ring import Ring
+from katana450.server.api.episode_requests import episode_request
 from tests.recording.recorded import header, run
 
 ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")

@@ -23,7 +23,6 @@ from katana450.extensions.recording.episodes.episode import (
     Episode,
     EpisodeOutcome,
     episode_of,
-    episode_request,
     episodes_of,
     message_of,
 )
@@ -40,6 +39,7 @@ from katana450.extensions.recording.files.recording_writer import RecordingWrite
 from katana450.extensions.recording.files.simulation import session_for, verify_recording
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import EPISODES, STATE
+from katana450.server.api.episode_requests import episode_request
 from tests.recording.episode_bench import ADA, Bench, motion
 from tests.recording.recorded import header
 

@@ -12,7 +12,6 @@ import pytest
 
 from katana450.arm.runtime.pipes.guarded_pipe import disconnect
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes.episode import StartEpisode, StopEpisode
 from katana450.extensions.recording.live import recorder_link
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
@@ -22,6 +21,7 @@ from katana450.extensions.recording.live.recorder_link import (
 )
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import pipe_address
+from katana450.server.api.episode_requests import StartEpisode, StopEpisode
 from tests.recording.episode_bench import ADA, Bench
 from tests.recording.test_recorder import waited_for
 

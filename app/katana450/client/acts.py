@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from inspect import Parameter
 from typing import Any, Generic, TypeVar
 
 import msgspec
 
-from katana450.arm.control.commands.act import MotionRequest, Request, content_names, tag_of
+from katana450.arm.control.commands.act import ENVELOPE, MotionRequest, Request, tag_of
 from katana450.server.api import requests
 
 AtRest, Answered, Sent = TypeVar("AtRest"), TypeVar("Answered"), TypeVar("Sent")
@@ -34,23 +33,26 @@ def way_of(kind: type[Request]) -> str:
     return "go" if issubclass(kind, MotionRequest) else "ask"
 
 
-def signature_of(kind: type[Request]) -> inspect.Signature:
-    """Return the signature of the method that makes an act of ``kind``: its own fields."""
+def signature_of(kind: type[msgspec.Struct]) -> inspect.Signature:
+    """Return the signature of the method that makes a request of ``kind``: its own fields."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     parameters = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)]
-    for name in content_names(kind):
-        default = Parameter.empty if fields[name].required else fields[name].default
+    for name, field in fields.items():
+        if name in ENVELOPE:
+            continue
+        default = Parameter.empty if field.required else field.default
         parameters.append(Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=default))
     return inspect.Signature(parameters)
 
 
-def documentation_of(kind: type[Request]) -> str:
-    """Return the docstring of the method that makes an act of ``kind``."""
+def documentation_of(kind: type[msgspec.Struct]) -> str:
+    """Return the docstring of the method that makes a request of ``kind``."""
     return (inspect.getdoc(kind) or "").replace("Attributes:", "Args:")
 
 
-def _method(name: str, kind: type[Request]) -> Callable[..., Any]:
-    signature, way = signature_of(kind), way_of(kind)
+def add_method(owner: type, name: str, kind: type[msgspec.Struct], way: str) -> None:
+    """Add to ``owner`` the method that passes a request of ``kind`` to its method ``way``."""
+    signature = signature_of(kind)
 
     def method(*args: Any, **fields: Any) -> Any:
         client, *_ = args
@@ -58,10 +60,10 @@ def _method(name: str, kind: type[Request]) -> Callable[..., Any]:
         del values["self"]
         return getattr(client, way)(kind(**values))
 
-    method.__name__, method.__qualname__ = name, f"Acts.{name}"
+    method.__name__, method.__qualname__ = name, f"{owner.__name__}.{name}"
     method.__doc__ = documentation_of(kind)
     vars(method)["__signature__"] = signature
-    return method
+    setattr(owner, name, method)
 
 
 class Acts(Generic[AtRest, Answered, Sent]):
@@ -73,4 +75,4 @@ class Acts(Generic[AtRest, Answered, Sent]):
 
 
 for name, kind in METHODS.items():
-    setattr(Acts, name, _method(name, kind))
+    add_method(Acts, name, kind, way_of(kind))

@@ -1,6 +1,7 @@
 # Written by `python -m docs.stubs` from the classes of the acts.
 from typing import Any, Generic, Literal, TypeVar
 
+import msgspec
 import numpy.typing as npt
 
 from katana450.arm.control.commands.act import Request
@@ -19,8 +20,9 @@ OWN: tuple[type[Request], ...]
 METHODS: dict[str, type[Request]]
 
 def way_of(kind: type[Request]) -> str: ...
-def signature_of(kind: type[Request]) -> Any: ...
-def documentation_of(kind: type[Request]) -> str: ...
+def signature_of(kind: type[msgspec.Struct]) -> Any: ...
+def documentation_of(kind: type[msgspec.Struct]) -> str: ...
+def add_method(owner: type, name: str, kind: type[msgspec.Struct], way: str) -> None: ...
 
 class Acts(Generic[AtRest, Answered, Sent]):
     def operate_arm(self, act: ArmAct, confirmed: bool = ...) -> Answered:

@@ -6,14 +6,16 @@ import urllib.error
 import urllib.request
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 from urllib.parse import urlencode, urlsplit
 
 import msgspec
 
 from katana450.atomic import write_files, writer_of
+from katana450.client.episode_acts import EpisodeActs
 from katana450.errors import KatanaError
 from katana450.server.api import answers
+from katana450.server.api.episode_requests import EpisodeRequest
 from katana450.server.api.fields import ROOT
 
 STOP_TIMEOUT = 2.0
@@ -139,8 +141,8 @@ class _Done(msgspec.Struct):
     number: int
 
 
-class EpisodeClient:
-    """Records and judges the episodes of a server.
+class EpisodeClient(EpisodeActs):
+    """Records and judges the episodes of a server, by a method for each request about them.
 
     Each method waits for the answer; an asyncio program calls it by ``asyncio.to_thread``. Raises
     RefusedError with the reason if the server refuses, and LostError if there is no server, or its
@@ -154,39 +156,10 @@ class EpisodeClient:
         """Return the kept episodes, by number."""
         return tuple(_understood(self._site.fetched(PATH), _List).episodes)
 
-    def ask(self, do: str, **fields: Any) -> int:
-        """Send any request about episodes, such as ``trim``; return the number of its episode.
-
-        ``fields``: those of the request, see docs/recording.md.
-        """
-        content = self._site.fetched(PATH, msgspec.json.encode({"do": do, **fields}))
+    def ask(self, request: EpisodeRequest) -> int:
+        """Send ``request``; return the number of its episode."""
+        content = self._site.fetched(PATH, msgspec.json.encode(request))
         return _understood(content, _Done).number
-
-    def start(self, task: str | None = None) -> int:
-        """Begin an episode and return its number. ``task``: None for that of the last one."""
-        return self.ask("start", task=task)
-
-    def stop(self, outcome: str = "unjudged", number: int | None = None) -> int:
-        """End the episode that runs and return its number.
-
-        Args:
-            outcome: unjudged, success or failure.
-            number: the episode, so that no other one is ended; None for any.
-        """
-        return self.ask("stop", outcome=outcome, number=number)
-
-    def judge(self, outcome: str, number: int | None = None) -> int:
-        """Judge an episode and return its number.
-
-        Args:
-            outcome: unjudged, success or failure.
-            number: the episode; None for the one that runs, which then ends, or else the last one.
-        """
-        return self.ask("judge", outcome=outcome, number=number)
-
-    def discard(self, number: int | None = None) -> int:
-        """Discard an episode and return its number; see ``judge``."""
-        return self.ask("discard", number=number)
 
     def download(self, number: int, out: Path) -> None:
         """Write the file of the kept episode ``number`` to ``out``."""

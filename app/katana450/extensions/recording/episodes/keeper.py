@@ -20,19 +20,9 @@ import msgspec
 
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes.episode import (
-    DescribeEpisode,
-    DiscardEpisode,
     Episode,
     EpisodeGiver,
     EpisodeOutcome,
-    EpisodeRequest,
-    JudgeEpisode,
-    RerecordEpisode,
-    RestoreEpisode,
-    StartEpisode,
-    StopEpisode,
-    TrimEpisode,
-    UndoEpisode,
     message_of,
 )
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, EpisodeMarker
@@ -42,6 +32,18 @@ from katana450.extensions.recording.episodes.running_episode import (
     finish_interrupted,
 )
 from katana450.extensions.recording.live.ring import Ring
+from katana450.server.api.episode_requests import (
+    DescribeEpisode,
+    DiscardEpisode,
+    EpisodeRequest,
+    JudgeEpisode,
+    RerecordEpisode,
+    RestoreEpisode,
+    StartEpisode,
+    StopEpisode,
+    TrimEpisode,
+    UndoEpisode,
+)
 
 UNDO_SECONDS = 10.0
 """[s] Time in which the last judgement can be undone."""

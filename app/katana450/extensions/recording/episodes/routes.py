@@ -17,19 +17,19 @@ from starlette.routing import BaseRoute, Route
 
 from katana450.arm.control.actor import Actor, CommandChannel
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes.episode import (
-    MAX_NUMBER,
-    MAX_REQUEST_BYTES,
-    EpisodeGiver,
-    StartEpisode,
-    episode_request,
-)
+from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder, KeptEpisode
 from katana450.extensions.recording.live.recorder_link import (
     ENTRY,
     RecorderLink,
 )
 from katana450.server.api import answers
+from katana450.server.api.episode_requests import (
+    MAX_NUMBER,
+    MAX_REQUEST_BYTES,
+    StartEpisode,
+    episode_request,
+)
 from katana450.server.api.fields import ROOT
 from katana450.server.service.identity import PAGE
 from katana450.server.service.participants import actor_of

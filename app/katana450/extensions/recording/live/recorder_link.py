@@ -26,9 +26,10 @@ import msgspec
 from katana450.arm.runtime.pipes.guarded_pipe import PIPE_ERRORS, GuardedPipe
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.recording.episodes.episode import AnyEpisodeRequest, EpisodeGiver
+from katana450.extensions.recording.episodes.episode import EpisodeGiver
 from katana450.extensions.recording.live.running_scripts import RunningScripts, ScriptNote
 from katana450.extensions.recording.pseudonyms import Pseudonyms
+from katana450.server.api.episode_requests import AnyEpisodeRequest
 from katana450.server.service.hub import Hub
 
 if TYPE_CHECKING:
