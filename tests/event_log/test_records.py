@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import replace
 from multiprocessing import Pipe
@@ -14,7 +13,7 @@ import pytest
 from katana450.arm.control.actor import Actor, CommandChannel, Grounds
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Command
-from katana450.arm.control.lease import Lease, Person, Role
+from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import Finding, Outcome, Reason, Verdict
 from katana450.client import connect
@@ -33,7 +32,9 @@ from katana450.extensions.event_log.records import (
     record,
 )
 from katana450.server.api import requests
-from katana450.server.service.recorder import MAX_WAITING, LeaseChange, Note, Recorder
+from katana450.server.service.hub import Hub
+from katana450.server.service.identity import Identity
+from katana450.server.service.recorder import MAX_WAITING, Note, Recorder
 from tests.browser.server import APP, AppServer
 from tests.control.test_traits import examples
 from tests.event_log.logs import records
@@ -237,10 +238,15 @@ def test_problem_of_the_writer_is_known_without_another_note() -> None:
 
 @pytest.mark.parametrize("closed", [False, True])
 def test_lease_of_a_driver_who_left_is_recorded_as_free(closed: bool) -> None:
-    held = Lease(BERT.person, left=0.5 if closed else math.inf)
-    after = Lease(ANNA.person)
-    by = replace(ANNA, grounds=None)
-    (found,) = made(Note(1.0, "lease", by, LeaseChange(held, after)))
+    hub = Hub(lambda: 1.0)
+    people = [Identity(name, name, Role.ADMIN) for name in ("Bert", "Anna")]
+    bert, anna = (hub.join(person, "page", lambda _: None) for person in people)
+    hub.acquire(bert)
+    if closed:
+        hub.close(people[0], "page")
+    hub.recorder.enabled = True
+    hub.take(anna)
+    (found,) = made(hub.recorder.notes.get_nowait() or Note(0.0, ""))
     assert (found["what"]["lease"], found["grounds"]) == (
         ("acquired", "the lease was free") if closed else ("taken", "an admin may take the lease")
     )

@@ -29,7 +29,7 @@ from katana450.arm.control.state.state import Outcome, Verdict
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.extensions.event_log.record_content import content_of
 from katana450.extensions.event_log.records import Record, record, text, utc
-from katana450.server.service.recorder import LeaseChange, Note, Recorder
+from katana450.server.service.recorder import Note, Recorder
 from katana450.server.web.limits import SenderBuckets, TokenBucket
 
 STREAM_GAP = 1.0
@@ -43,6 +43,9 @@ MAX_TICKETS = 1024
 
 SUBJECT = ("axis", "name", "trait")
 """Attributes by which commands of one class belong to different streams."""
+
+LEASE_REQUESTS = ("requested", "withdrawn", "declined")
+"""Words of the records about the lease that tell of no change of its holder."""
 
 StreamKey = tuple[str, str, str, object]
 
@@ -134,10 +137,9 @@ class RecordMaker:
                 self._outcomes.append(note)
             case LogEntry():
                 self._finding(note.what)
-            case LeaseChange():
-                self._lease(note, note.what)
             case _:
-                if note.kind in ("stop", "leave"):
+                transfer = note.kind == "lease" and note.what["lease"] not in LEASE_REQUESTS
+                if transfer or note.kind in ("stop", "leave"):
                     self._streams.clear()
                 self._stopped |= note.kind == "stop"
                 self._add(note, content_of(note.what))
@@ -182,31 +184,7 @@ class RecordMaker:
         }
         self._add(Note(entry.t, "finding"), what)
 
-    def _lease(self, note: Note, change: LeaseChange) -> None:
-        before, after = change
-        by = note.actor or SERVER
-        requests = [person for person in after.waiting if person not in before.waiting]
-        ended = [person for person in before.waiting if person not in after.waiting]
-        old, new = before.holder, after.holder
-        what: dict[str, Any]
-        if new != old:
-            self._streams.clear()
-            what, grounds = _transfer(change, by)
-            if old is not None:
-                what["from"] = text(old.name)
-            if new is not None:
-                what["to"] = text(new.name)
-        elif requests:
-            what, grounds = {"lease": "requested", "from": old.name if old else None}, ""
-        elif ended and by is not SERVER:
-            withdrawn = ended[0] == by.person
-            what = {"lease": "withdrawn" if withdrawn else "declined", "to": text(ended[0].name)}
-            grounds = "" if withdrawn else "holds the lease"
-        else:
-            return
-        self._add(note, what, grounds)
-
-    def _add(self, note: Note, what: Any, grounds: str = "") -> None:
+    def _add(self, note: Note, what: Any) -> None:
         """Add the record of ``note``, unless its participant causes too many."""
         record: Record = {
             "time": utc(self._epoch + note.t),
@@ -216,8 +194,9 @@ class RecordMaker:
         }
         if note.ticket and isinstance(what, dict):
             what = {**what, "ticket": note.ticket}
-        if note.actor is not None and note.actor.grounds is not None:
-            grounds = note.actor.grounds.value
+        actor, grounds = note.actor, note.grounds
+        if actor is not None and actor.grounds is not None:
+            grounds = actor.grounds.value
         more = {"what": what, "grounds": grounds, "outcome": note.outcome, "why": text(note.why)}
         record |= {name: value for name, value in more.items() if value}
         if note.always or self._limits.admits(_source(note.actor), record, note.t):
@@ -264,20 +243,6 @@ def _source(actor: Actor | None) -> str:
     if actor is None:
         return ""
     return actor.person.link or actor.person.address or actor.name
-
-
-def _transfer(change: LeaseChange, by: Actor) -> tuple[dict[str, Any], str]:
-    """Return the name of a change of holder, and its grounds."""
-    new = change.after.holder
-    if new is None:
-        if by is SERVER:
-            return {"lease": "expired"}, "the holder was silent"
-        return {"lease": "released"}, "holds the lease"
-    if change.before.driver is None:
-        return {"lease": "acquired"}, "the lease was free"
-    if new == by.person:
-        return {"lease": "taken"}, "an admin may take the lease"
-    return {"lease": "handed over"}, "holds the lease"
 
 
 class RecordLimits:

@@ -178,12 +178,15 @@ class CommandGate:
                 self._revoke()
             self.lease = lease
             self.ended = None
-            self.recorder.lease(before, lease, actor)
+            self.recorder.lease("acquired", before, lease, actor)
 
-    def change(self, event: Callable[[Lease, float], Lease], by: Actor = SERVER) -> None:
+    def change(
+        self, event: Callable[[Lease, float], Lease], by: Actor = SERVER, act: str = ""
+    ) -> None:
         """Apply ``event`` to the lease at the present time. A change of holder holds the arm.
 
-        ``by``: actor in whose name the arm holds. Raises the LeaseError of ``event``.
+        ``by``: actor in whose name the arm holds. ``act``: word for ``event`` in the event log;
+        empty for what is not recorded. Raises the LeaseError of ``event``.
         """
         with self.lock:
             lease = event(self.lease, self._clock())
@@ -194,7 +197,8 @@ class CommandGate:
                     with suppress(InputError):
                         grounds = Grounds.SERVER if by is SERVER else Grounds.LEASE
                         self.arm.deliver(cmd.Hold(), replace(by, grounds=grounds))
-            self.recorder.lease(self.lease, lease, by)
+            if act and lease is not self.lease:
+                self.recorder.lease(act, self.lease, lease, by)
             self.lease = lease
             self.ended = self.ended if lease.holder is None else None
 

@@ -256,18 +256,19 @@ class Hub:
     def take(self, participant: Participant) -> None:
         """Take the lease from its holder for ``participant``. Raises LeaseError if not allowed."""
         drove = [other for other in self.participants if self.giver(other) == self.lease.holder]
-        self.gate.change(lambda lease, t: lease.take(participant.person, t), participant.actor)
-        self._takeover = Takeover(
-            participant.person, frozenset(other.person.key for other in drove)
-        )
+        person, act = participant.person, "taken" if self.lease.driver else "acquired"
+        self.gate.change(lambda lease, t: lease.take(person, t), participant.actor, act)
+        self._takeover = Takeover(person, frozenset(other.person.key for other in drove))
 
     def request(self, participant: Participant) -> None:
         """Request the lease from its holder for ``participant``. Raises LeaseError."""
-        self.gate.change(lambda lease, _: lease.request(participant.person), participant.actor)
+        person = participant.person
+        self.gate.change(lambda lease, _: lease.request(person), participant.actor, "requested")
 
     def withdraw(self, participant: Participant) -> None:
         """Withdraw the request of ``participant`` for the lease."""
-        self.gate.change(lambda lease, _: lease.withdraw(participant.person), participant.actor)
+        person = participant.person
+        self.gate.change(lambda lease, _: lease.withdraw(person), participant.actor, "withdrawn")
 
     def taken_by(self, participant: Participant) -> str | None:
         """Return the name of the holder who took the lease from ``participant``; None if none."""
@@ -276,18 +277,21 @@ class Hub:
 
     def release_lease(self, participant: Participant) -> None:
         """Release the lease of ``participant``. Raises LeaseError if another holds it."""
-        self.gate.change(lambda lease, _: lease.release(participant.person), participant.actor)
+        person = participant.person
+        self.gate.change(lambda lease, _: lease.release(person), participant.actor, "released")
         self._takeover = None
 
     def hand_over(self, participant: Participant, number: int) -> None:
         """Hand the lease to the participant of ``number``; a running program of the giver ends."""
         giver, taker = self.giver(participant), self._numbered(number).person
-        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), participant.actor)
+        actor = participant.actor
+        self.gate.change(lambda lease, t: lease.hand_over(giver, taker, t), actor, "handed over")
 
     def decline(self, participant: Participant, number: int) -> None:
         """Decline the request of the participant of ``number`` for the lease, and notify it."""
         giver, requester = self.giver(participant), self._numbered(number)
-        self.gate.change(lambda lease, _: lease.decline(giver, requester.person), participant.actor)
+        person, actor = requester.person, participant.actor
+        self.gate.change(lambda lease, _: lease.decline(giver, person), actor, "declined")
         why = f"{participant.person.name} declined your request."
         requester.notify({"is": "refused", "why": why})
 
@@ -373,7 +377,7 @@ class Hub:
         driver, silence = self._participants.get(holder.key), self.lease.silence(t)
         if silence >= self._hold_after and self.stopped is None and self.gate.moves():
             self._driver_watch.brake(holder, silence, t, connected=driver is not None)
-        self.gate.change(lambda lease, t: lease.expire(t))
+        self.gate.change(lambda lease, t: lease.expire(t), act="expired")
         silence -= 0.0 if driver is None else driver.heartbeat.delay
         return silence >= self._hold_after and self.lease.holder is not None
 

@@ -23,6 +23,15 @@ MAX_WAITING = 4096
 """Maximum number of notes that wait for their reader; more are counted and dropped, except those
 that are always kept."""
 
+LEASE_GROUNDS = {
+    "acquired": "the lease was free",
+    "taken": "an admin may take the lease",
+    "expired": "the holder was silent",
+    "requested": "",
+    "withdrawn": "",
+}
+"""Grounds of what happens to the lease, where its holder does not do it."""
+
 REFUSED, ACCEPTED = "refused", "accepted"
 """Values of ``Verdict``."""
 
@@ -34,9 +43,10 @@ class Note(NamedTuple):
         t: time [s] on the clock of the states.
         kind: kind of the record.
         actor: the participant; None for the arm's own process.
-        what: a command, request, lease change, outcome or log entry, or a JSON value.
+        what: a command, request, outcome or log entry, or a JSON value.
         outcome: ``accepted`` or ``refused``, if known.
         why: reason in words.
+        grounds: right to do this, in words, where that of the actor does not say it.
         ticket: ticket of a command; 0 without one.
         always: whether the note is kept and its record written, whatever the limits.
     """
@@ -47,15 +57,9 @@ class Note(NamedTuple):
     what: Any = None
     outcome: str = ""
     why: str = ""
+    grounds: str = ""
     ticket: int = 0
     always: bool = False
-
-
-class LeaseChange(NamedTuple):
-    """The lease before and after an event."""
-
-    before: Lease
-    after: Lease
 
 
 class Recorder:
@@ -104,12 +108,16 @@ class Recorder:
         what = {"stop": cause} if first else {"stop": cause, "repeated": True}
         self.note("stop", actor, what, why=why, outcome=ACCEPTED, always=first)
 
-    def lease(self, before: Lease, after: Lease, by: Actor) -> None:
-        """Note a change of the lease, if it is one of its holder or of the requests for it."""
-        if before.holder != after.holder or (
-            before.waiting is not after.waiting and before.waiting != after.waiting
-        ):
-            self.note("lease", by, LeaseChange(before, after))
+    def lease(self, act: str, before: Lease, after: Lease, by: Actor) -> None:
+        """Note that ``act`` changed the holder of the lease, or the requests for it."""
+        old, new = before.holder, after.holder
+        if old == new:
+            # A request comes from its sender; its end is an answer to that one.
+            old = old if len(after.waiting) > len(before.waiting) else None
+            new = next((person for person in before.waiting if person not in after.waiting), None)
+        names = {"from": old and old.name, "to": new and new.name}
+        what = {"lease": act, **{word: name for word, name in names.items() if name}}
+        self.note("lease", by, what, grounds=LEASE_GROUNDS.get(act, "holds the lease"))
 
     def outcomes(self, outcomes: Iterable[TicketOutcome]) -> None:
         """Note the outcomes of commands that were limited or refused."""
