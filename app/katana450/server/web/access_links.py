@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 from itsdangerous import BadSignature, URLSafeSerializer
@@ -31,6 +32,8 @@ SALT, SESSION_SALT = "katana450 access link", "katana450 session of a browser"
 
 MAX_NAME_LENGTH = 40
 MAX_TOKEN_LENGTH = 400
+
+T = TypeVar("T")
 
 LOCK_TIMEOUT, LOCK_INTERVAL = 5.0, 0.02
 """[s] Timeout of a change of the file while another process changes it, and interval of the
@@ -119,28 +122,27 @@ class AccessFile:
 
     def check(self, token: str, now: float) -> tuple[str, Grant] | None:
         """Return number and grant of a token valid at ``now`` [s since the epoch], or None."""
-        if len(token) > MAX_TOKEN_LENGTH:
+        signed = self._signed(token, SALT, tuple[str, float])
+        return None if signed is None else self._granted(signed[0], now, signed[1])
+
+    def check_session(self, cookie: str, now: float) -> tuple[str, Grant] | None:
+        """Return number and grant of the link of a ``cookie``, as ``check`` does of a token."""
+        signed = self._signed(cookie, SESSION_SALT, tuple[str, str])
+        return None if signed is None else self._granted(signed[0], now)
+
+    def _signed(self, text: str, salt: str, kind: type[T]) -> T | None:
+        """Return the value of type ``kind`` that ``text`` holds, signed for the purpose ``salt``.
+
+        None without a valid signature.
+        """
+        if len(text) > MAX_TOKEN_LENGTH:
             return None
         self._refresh_or_keep()
         try:
             # itsdangerous compares signatures in constant time.
-            payload = self._signer().loads(token)
-            number, expires = msgspec.convert(payload, tuple[str, float])
+            return msgspec.convert(self._signer(salt).loads(text), kind)
         except (BadSignature, msgspec.ValidationError):
             return None
-        return self._granted(number, now, expires)
-
-    def check_session(self, cookie: str, now: float) -> tuple[str, Grant] | None:
-        """Return number and grant of the link of a ``cookie``, as ``check`` does of a token."""
-        if len(cookie) > MAX_TOKEN_LENGTH:
-            return None
-        self._refresh_or_keep()
-        try:
-            payload = self._signer(SESSION_SALT).loads(cookie)
-            number, _ = msgspec.convert(payload, tuple[str, str])
-        except (BadSignature, msgspec.ValidationError):
-            return None
-        return self._granted(number, now)
 
     def _granted(
         self, number: str, now: float, expires: float = math.inf
