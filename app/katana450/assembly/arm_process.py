@@ -10,7 +10,7 @@ import sys
 import threading
 from argparse import Namespace
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 from katana450.arm.runtime.pipes.arm_listener import FRONT, RECORD, STOP, ArmListener, Roles
@@ -20,10 +20,8 @@ from katana450.extension import ServerFacts, results
 if TYPE_CHECKING:
     from katana450.arm.control.state.state import State
     from katana450.arm.drivers.driver import Driver
-    from katana450.arm.robot.initial_scene import InitialScene
     from katana450.arm.robot.robot import Robot
     from katana450.arm.runtime.pipes.state_publisher import StatePublisher
-    from katana450.assembly.robot_session import DescribedRobot
     from katana450.maths.geometry.arrays import FloatArray
 
 ARM = "katana450 arm"
@@ -48,16 +46,21 @@ def run_arm(
 
     content: what an earlier process gave to the supervisor; None at the first start.
     """
+    from katana450.arm.robot.object_meshes import Meshes
     from katana450.assembly.robot_session import find_robot
     from katana450.assembly.running_arm import RunningArm
 
-    state = None if content is None else _unpacked(content)
-    robot, scene = _with_scene(config) if state is None else (None, None)
-    described = find_robot(config.settings, config.urdf, config.tool) if robot is None else robot
+    state, scene = None if content is None else _unpacked(content), None
+    described = cache(lambda: find_robot(config.settings, config.urdf, config.tool))
+    if state is None:
+        session = lambda: described().session  # noqa: E731
+        scene = next(results("initial_scene", config.options, session), None)
+    if scene is not None:
+        Meshes(config.folder).put(scene.meshes, ())
     again = content is not None
     make_driver = partial(_driver, config.options)
     arm = RunningArm(
-        config.settings, described, scene, again=again, last=state, make_driver=make_driver
+        config.settings, described(), scene, again=again, last=state, make_driver=make_driver
     )
     roles: Roles = {FRONT: arm.attach, STOP: arm.attach_stop}
     for sender in results("tick_sender", config.options):
@@ -93,25 +96,6 @@ def run_arm(
 def _driver(options: Namespace, robot: Robot, q: FloatArray, gripper: float) -> Driver | None:
     """Return the driver that an extension has for the arm; None if none has."""
     return next(results("driver", options, robot, q, gripper), None)
-
-
-def _with_scene(config: ServerFacts) -> tuple[DescribedRobot | None, InitialScene | None]:
-    """Return the robot if it was read for the scene that an extension starts with, and that."""
-    from katana450.arm.control.session.session import Session
-    from katana450.arm.robot.object_meshes import Meshes
-    from katana450.assembly.robot_session import find_robot
-
-    found_robots: list[DescribedRobot] = []
-
-    def session() -> Session:
-        if not found_robots:
-            found_robots.append(find_robot(config.settings, config.urdf, config.tool))
-        return found_robots[0].session
-
-    scene: InitialScene | None = next(results("initial_scene", config.options, session), None)
-    if scene is not None:
-        Meshes(config.folder).put(scene.meshes, ())
-    return (found_robots[0] if found_robots else None), scene
 
 
 def _keep(state_publisher: StatePublisher, supervisor: SupervisorPipe) -> None:
