@@ -14,7 +14,7 @@ from katana450.client import connect
 from katana450.client.client import Client
 from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
-from katana450.server.web.stop_connection import MAX_HEAD_BYTES
+from katana450.server.web.stop_server import MAX_HEAD_BYTES
 from tests.browser.server import APP, AppServer
 from tests.gateway.client import HOUR
 from tests.gateway.test_watchdogs import under_way

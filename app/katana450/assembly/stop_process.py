@@ -39,8 +39,7 @@ async def _serve(config: ServerFacts, listening: socket.socket, supervisor: Supe
     from katana450.server.web.acceptor import Acceptor
     from katana450.server.web.authenticator import Authenticator
     from katana450.server.web.listen import raise_descriptor_limit
-    from katana450.server.web.stop_connection import StopConnection
-    from katana450.server.web.stop_server import StopServer
+    from katana450.server.web.stop_server import StopConnection, StopServer
 
     settings = config.settings
     address = address_of(settings, listening)
