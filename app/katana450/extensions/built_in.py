@@ -13,8 +13,8 @@ EXTENSIONS = (
             CliCommand(
                 "access",
                 "give people links with which they sign in",
-                f"{HERE}.server_commands.options:add_access_options",
-                f"{HERE}.server_commands.commands:access",
+                f"{HERE}.server_commands.access_command:add_access_options",
+                f"{HERE}.server_commands.access_command:access",
             ),
         ),
         handler=f"{HERE}.server_commands.people_requests:PeopleRequests",
@@ -26,11 +26,11 @@ EXTENSIONS = (
             CliCommand(
                 "log",
                 "show the event log of a server",
-                f"{HERE}.event_log.log_options:add_log_options",
+                f"{HERE}.event_log.log_command:add_log_options",
                 f"{HERE}.event_log.log_command:log",
             ),
         ),
-        serve_options=f"{HERE}.event_log.log_options:add_serve_options",
+        serve_options=f"{HERE}.event_log.log_command:add_serve_options",
         server_log=f"{HERE}.event_log.disk_log:disk_log",
         send_records=f"{HERE}.event_log.record_maker:send_records",
     ),
@@ -44,7 +44,7 @@ EXTENSIONS = (
     ),
     Extension(
         "robot_choice",
-        routes=f"{HERE}.robot_choice.serve_parts:robot_routes",
+        routes=f"{HERE}.robot_choice.choose_robot:late_routes",
         handler=f"{HERE}.robot_choice.choose_robot:RobotChoice",
     ),
     Extension(

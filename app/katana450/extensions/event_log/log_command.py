@@ -1,20 +1,49 @@
-"""``katana450 log``: show the event log of a server."""
+"""``katana450 log`` shows the event log of a server. Its options are read without what it loads."""
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
-from argparse import Namespace
+from pathlib import Path
 
 from katana450.assembly.log_output import printable
 from katana450.errors import InputError
-from katana450.extensions.event_log.disk_log import default_folder
-from katana450.extensions.event_log.log_files import lines_of
 from katana450.extensions.event_log.records import Record
+from katana450.settings import Settings
 
 
-def log(options: Namespace) -> int:
+def add_log_options(parser: argparse.ArgumentParser) -> None:
+    """Add the subcommand show to ``parser``."""
+    acts = parser.add_subparsers(dest="act", required=True, metavar="show")
+    show = acts.add_parser("show", help="print records, the oldest first")
+    show.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        metavar="FOLDER",
+        help="folder of the log (default: that of the server on --port)",
+    )
+    show.add_argument("--port", type=int, default=Settings.port, help=argparse.SUPPRESS)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of ``katana450 serve`` to ``parser``."""
+    logged = parser.add_mutually_exclusive_group()
+    logged.add_argument(
+        "--log",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the event log (default: one for each port, named at the start)",
+    )
+    logged.add_argument("--no-log", action="store_true", help="write no event log")
+
+
+def log(options: argparse.Namespace) -> int:
     """Run ``katana450 log`` and return the exit status: 1 if a line is not a record."""
+    from katana450.extensions.event_log.disk_log import default_folder
+    from katana450.extensions.event_log.log_files import lines_of
+
     folder = options.folder or default_folder(options.port)
     if options.folder is None and not folder.is_dir() and folder.parent.is_dir():
         names = ", ".join(str(path) for path in sorted(folder.parent.iterdir()))

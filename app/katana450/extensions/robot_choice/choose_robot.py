@@ -1,4 +1,4 @@
-"""The request that lets the server drive another robot."""
+"""The request that lets the server drive another robot, and where the list of robots is."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from msgspec import Meta
+from starlette.routing import BaseRoute
 
 from katana450.arm.control.commands.act import Request, Traits
 from katana450.errors import InputError, KatanaError, LeaseError
+from katana450.extensions.late_routes import LateRoutes
 from katana450.extensions.robot_choice.robot_check import checked_robot
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers
+from katana450.server.api.fields import ROOT
 from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.runner import RequestHandler
+from katana450.server.web.http_api import RouteContext
 
 OWN, FIRST = "katana450", "first"
 """Names of the robot of this distribution, and of that with which the server began."""
@@ -46,6 +50,17 @@ class ChooseRobot(Request, frozen=True):
 
     robot: Annotated[str, Meta(min_length=1, max_length=80)]
     arguments: dict[Text, Text] | None = None
+
+
+def late_routes(context: RouteContext) -> list[BaseRoute]:
+    """Return the routes that list robots and upload one, imported with the first request."""
+
+    def make() -> list[BaseRoute]:
+        from katana450.extensions.robot_choice.robot_routes import routes
+
+        return routes(context)
+
+    return LateRoutes([f"{ROOT}/robots"], make).routes()
 
 
 def first_robot(options: Namespace) -> Path:

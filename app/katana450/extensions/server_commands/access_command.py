@@ -1,9 +1,10 @@
-"""Options of ``katana450 access``, read without what its work loads."""
+"""``katana450 access``, which gives people links. Its options are read without what it loads."""
 
 from __future__ import annotations
 
 import argparse
 import re
+import time
 from pathlib import Path
 
 from katana450.arm.control.lease import Role
@@ -59,3 +60,28 @@ def _duration(text: str) -> float:
             f"a time is a number and m, h or d, at most {MAX_DAYS}d, not {text!r}"
         )
     return float(seconds)
+
+
+def access(options: argparse.Namespace) -> int:
+    """Run ``katana450 access`` and return the exit status."""
+    from katana450.server.web.access_links import AccessFile
+    from katana450.server.web.authenticator import public_origin
+
+    now = time.time()
+    if options.act == "give":
+        file = AccessFile.create(options.file)
+        origin = public_origin(options.url)
+        token = file.give(options.name, Role(options.role), now + options.duration)
+        # Browsers send the part after the # to no server, so no log contains it.
+        print(f"{origin}/#{token}")
+        return 0
+    file = AccessFile.open(options.file)
+    if options.act == "revoke":
+        grant = file.revoke(options.number)
+        print(f"The link of {grant.name} is revoked.")
+        return 0
+    for number, grant in file.grants.items():
+        until = time.strftime("%Y-%m-%d %H:%M", time.localtime(grant.expires))
+        state = f"until {until}" if now < grant.expires else f"expired {until}"
+        print(f"{number}  {grant.role.value:8}  {state:24}  {grant.name}")
+    return 0
