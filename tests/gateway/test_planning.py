@@ -22,7 +22,6 @@ from katana450.extensions.programs.server import program_planner
 from katana450.maths.geometry import se3
 from katana450.maths.planning.checkpoint import checkpoint
 from katana450.server.api.program_requests import ProgramOrder
-from katana450.server.service import status
 from katana450.server.service.participants import Participant
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import SCRIPT, Staged
@@ -79,14 +78,10 @@ def followed(table: Staged) -> bool:
     return any(isinstance(command, cmd.Follow) for command in table.arm.commands)
 
 
-def bar(table: Staged, participant: Participant) -> dict[str, Any]:
-    return status.common(table.hub) | status.of(table.hub, participant)
-
-
 def first_progress(table: Staged, participant: Participant) -> dict[str, Any]:
     """Return the bar once the planning thread has reported its first step."""
     due = time.monotonic() + 10.0
-    while (shown := bar(table, participant))["headline"] == "Planning the script 0 %":
+    while (shown := table.bar(participant))["headline"] == "Planning the script 0 %":
         assert time.monotonic() < due
         time.sleep(0.005)
     return shown
@@ -99,14 +94,14 @@ def test_pause_during_planning_starts_the_program_paused(table: Staged, slow: Sl
     table.programs.steer(participant, ProgramOrder.PAUSE)
     assert isinstance(table.arm.commands[-1], cmd.Pause)
     table.arm.rest = replace(table.arm.rest, paused=True)
-    shown = bar(table, participant)
+    shown = table.bar(participant)
     assert shown["headline"] == "Planning Wave 20 %"
     assert shown["why"].startswith("Paused by you. Step 1 of 2: timing paths.")
     assert shown["why"].endswith("Then it waits for Resume.")
     assert (shown["paused"], shown["pace"], shown["orders"]) == (True, "", ["end"])
     finish(table, participant, slow)
     assert table.status == "paused"
-    shown = bar(table, participant)
+    shown = table.bar(participant)
     assert (shown["mood"], shown["headline"]) == ("paused", "Paused by you")
     assert shown["why"].startswith("Wave: speed, step 1 of 2")
     assert not any(isinstance(command, cmd.Resume) for command in table.arm.commands)
@@ -135,10 +130,9 @@ def test_other_commands_during_planning_keep_the_program_from_running(
     participant = table.join(PAGES[0])
     ask(table, participant)
     table.programs.redirected()
-    assert "does not start by itself" in bar(table, participant)["why"]
+    assert "does not start by itself" in table.bar(participant)["why"]
     finish(table, participant, slow)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert progress.status == "ready"
     assert progress.why.startswith("Not run: the arm was given another command")
     assert not table.programs.running
@@ -168,8 +162,8 @@ def test_run_requested_during_a_stop_is_refused(table: Staged, slow: Slow) -> No
 def test_run_request_during_planning_takes_effect_afterwards(table: Staged, slow: Slow) -> None:
     participant, other = (table.join(page, Role.OPERATOR) for page in PAGES)
     ask(table, participant, None)
-    assert bar(table, participant)["orders"] == ["end"]
-    assert bar(table, other)["orders"] == []
+    assert table.bar(participant)["orders"] == ["end"]
+    assert table.bar(other)["orders"] == []
     for order in ProgramOrder:
         with pytest.raises(LeaseError, match="belongs to Window 1"):
             table.programs.steer(other, order)
@@ -204,8 +198,7 @@ def test_planning_of_a_departed_owner_is_cancelled(table: Staged, slow: Slow) ->
     assert not table.programs.waits
     table.programs.script(other, SCRIPT, more=False, speed=1.0)
     finish(table, other, slow)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert (progress.status, progress.by) == ("ready", other.person.name)
 
 
@@ -244,11 +237,10 @@ def test_change_causes_new_planning_with_the_reason(table: Staged, slow: Slow, m
             table.arm.rest = replace(rest, objects=(box,))
     slow.released.clear()
     table.programs.steer(participant, ProgramOrder.RUN)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert progress.status == "planning"
     assert moved in progress.why
-    assert moved in bar(table, participant)["why"]
+    assert moved in table.bar(participant)["why"]
     finish(table, participant, slow)
     assert (table.status, slow.begun) == ("running", 2)
 
@@ -260,15 +252,15 @@ def test_bar_shows_the_progress_of_planning(table: Staged, slow: Slow) -> None:
     assert (shown["mood"], shown["headline"]) == ("planning", "Planning Wave 20 %")
     assert shown["why"] == "Step 1 of 2: timing paths. It does not start by itself."
     table.arm.moves = True
-    shown = bar(table, participant)
+    shown = table.bar(participant)
     assert (shown["mood"], shown["headline"]) == ("moving", "Moving to the target")
     assert shown["why"].startswith("Planning Wave. Step 1 of 2")
     table.arm.moves = False
     table.stop("Anybody")
-    assert bar(table, participant)["mood"] == "stopped"
+    assert table.bar(participant)["mood"] == "stopped"
     table.hub.move(participant, cmd.ClearStop())
     finish(table, participant, slow)
-    assert bar(table, participant)["headline"] == "On target"
+    assert table.bar(participant)["headline"] == "On target"
 
 
 def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
@@ -284,9 +276,9 @@ def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
         hub.move(other, cmd.Pause())
     with pytest.raises(LeaseError, match="Wave holds the arm"):
         hub.move(other, cmd.Speed(1.0))
-    assert (bar(table, owner)["orders"], bar(table, owner)["pace"]) == (["end"], "")
-    assert bar(table, other)["orders"] == []
-    assert bar(table, other)["pace"] == "Wave drives: ask for the arm."
+    assert (table.bar(owner)["orders"], table.bar(owner)["pace"]) == (["end"], "")
+    assert table.bar(other)["orders"] == []
+    assert table.bar(other)["pace"] == "Wave drives: ask for the arm."
     # The page of the owner is reloaded.
     hub.leave(owner)
     again = table.join(PAGES[0])

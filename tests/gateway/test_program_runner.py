@@ -6,6 +6,7 @@ import asyncio
 import time
 from argparse import Namespace
 from dataclasses import replace
+from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -21,7 +22,7 @@ from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from katana450.extensions.programs.server.panel import PanelAccess
 from katana450.extensions.programs.server.program_runner import ProgramRunner
 from katana450.extensions.server_commands.people_requests import PeopleRequests
-from katana450.server.api import requests
+from katana450.server.api import answers, requests
 from katana450.server.api.program_requests import ProgramOrder, Steer
 from katana450.server.service import status
 from katana450.server.service.budget import Budgets
@@ -53,6 +54,17 @@ class Staged(Table):
         assert isinstance(self.hub.runner, ProgramRunner)
         self.programs = self.hub.runner
         self.panel = PanelAccess(self.programs, self.hub, lambda act: act())
+
+    @property
+    def progress(self) -> answers.Progress:
+        """Progress of the program; there must be one."""
+        progress = self.programs.progress()
+        assert progress is not None
+        return progress
+
+    def bar(self, participant: Participant) -> dict[str, Any]:
+        """Return what the bar of the page of ``participant`` shows."""
+        return status.common(self.hub) | status.of(self.hub, participant)
 
     @property
     def status(self) -> str:
@@ -229,8 +241,7 @@ def test_program_of_the_driver_supersedes_the_planning_of_another(table: Staged)
     with pytest.raises(LeaseError, match="being planned"):
         table.programs.script(planner, SCRIPT, more=False, speed=1.0)
     table.plan(driver)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert (progress.status, progress.by) == ("ready", "Window 2")
     (notice,) = table.notices_of[PAGES[0]]
     assert "Window 2, who drives, has sent another program." in notice["why"]
@@ -264,8 +275,7 @@ def test_only_an_unattended_program_runs_on_without_its_owner(table: Staged) -> 
 def test_unattended_program_is_shown_with_its_owner_and_begin(table: Staged) -> None:
     owner = table.join(PAGES[0])
     run(table, owner)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert (progress.unattended, progress.by) == (True, "Window 1")
     assert progress.began is not None
     why = status.common(table.hub)["why"]
@@ -273,8 +283,7 @@ def test_unattended_program_is_shown_with_its_owner_and_begin(table: Staged) -> 
     table.arm.rest = replace(table.arm.rest, paused=True)
     assert "Unattended: started by Window 1" in status.common(table.hub)["why"]
     table.programs.steer(owner, ProgramOrder.END)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert not progress.unattended
 
 

@@ -15,7 +15,7 @@ from katana450.assembly.robot_session import DescribedRobot
 from katana450.extensions.programs.language.source import MAX_BYTES
 from katana450.extensions.programs.script.script import script_schema
 from katana450.server.api import answers
-from katana450.server.api.program_requests import Program, ProgramOrder, Steer
+from katana450.server.api.program_requests import Program
 from katana450.server.web.access_links import AccessFile
 from tests.gateway.client import HOUR
 from tests.gateway.virtual import VirtualServer
@@ -155,30 +155,3 @@ def test_server_checks_the_scene_of_a_script(
             time.sleep(0.02)
     assert program.status == status
     assert program.why.startswith(why)
-
-
-def test_server_reports_the_steps_that_were_not_taken(server: VirtualServer) -> None:
-    text = (
-        "steps:\n  - if:\n      gripper: {at_least: 1}\n      then: [home, {wait: 9}]\n"
-        "      else: [{nudge: {axis: 5, by: 2}}]\n  - nudge: {axis: 5, by: -2}\n"
-    )
-    program = run_to_the_end(server, text)
-    assert (program.status, program.why) == ("done", "")
-    assert (program.step, program.steps, program.skipped) == (5, 5, (2, 3))
-
-
-def run_to_the_end(server: VirtualServer, text: str) -> answers.Progress:
-    """Run a script and return its last progress."""
-    with server.connect("Owner") as arm:
-        arm.ask(Program(text=text))
-        ran = False
-        while True:
-            program = arm.query(answers.State).program
-            assert program is not None
-            if program.status == "ready" and not ran:
-                ran = True
-                arm.ask(Steer(order=ProgramOrder.RUN))
-            elif program.status in ("done", "failed"):
-                break
-            time.sleep(0.02)
-    return program

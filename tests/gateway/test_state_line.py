@@ -18,8 +18,6 @@ from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.server.state_line import duration
 from katana450.server.api.program_requests import ProgramOrder
-from katana450.server.service import status
-from katana450.server.service.participants import Participant
 from tests.gateway.client import Control
 from tests.gateway.test_hub import PAGES
 from tests.gateway.test_program_runner import Staged
@@ -31,10 +29,6 @@ def table(session: Session) -> Staged:
     return Staged(session)
 
 
-def bar(table: Staged, participant: Participant) -> dict[str, Any]:
-    return status.common(table.hub) | status.of(table.hub, participant)
-
-
 def paused(table: Staged, *, value: bool) -> None:
     table.arm.rest = replace(table.arm.rest, paused=value)
 
@@ -43,16 +37,16 @@ def test_pause_names_the_person_and_the_time_until_resume(table: Staged) -> None
     driver, other = (table.join(page) for page in PAGES)
     table.hub.move(driver, cmd.Pause())
     paused(table, value=True)
-    shown = bar(table, driver), bar(table, other)
+    shown = table.bar(driver), table.bar(other)
     assert [each["headline"] for each in shown] == ["Paused by you", "Paused by Window 1"]
     assert shown[0]["paused_at"] == shown[1]["paused_at"] is not None
     assert [each["mood"] for each in shown] == ["paused", "paused"]
     # A second press keeps the first time.
     table.hub.move(driver, cmd.Pause())
-    assert bar(table, driver)["paused_at"] == shown[0]["paused_at"]
+    assert table.bar(driver)["paused_at"] == shown[0]["paused_at"]
     table.hub.move(driver, cmd.Resume())
     paused(table, value=False)
-    shown = bar(table, driver), bar(table, other)
+    shown = table.bar(driver), table.bar(other)
     assert [each["headline"] for each in shown] == ["On target", "On target"]
     assert shown[0]["paused_at"] is None
 
@@ -68,21 +62,21 @@ def test_pause_of_an_unknown_person_has_no_name(table: Staged) -> None:
     """Show a pause that is older than this process."""
     participant = table.join(PAGES[0])
     paused(table, value=True)
-    shown = bar(table, participant)
+    shown = table.bar(participant)
     assert (shown["headline"], shown["paused_at"]) == ("Paused", None)
 
 
 def test_pace_is_refused_with_a_reason_to_all_but_the_driver(table: Staged) -> None:
     driver, other = (table.join(page, Role.OPERATOR) for page in PAGES)
-    assert bar(table, driver)["pace"] == bar(table, other)["pace"] == ""
+    assert table.bar(driver)["pace"] == table.bar(other)["pace"] == ""
     table.touch(driver.person.key)
-    assert bar(table, driver)["pace"] == ""
-    assert bar(table, other)["pace"] == "Window 1 drives: ask for the arm."
+    assert table.bar(driver)["pace"] == ""
+    assert table.bar(other)["pace"] == "Window 1 drives: ask for the arm."
 
 
 def test_viewer_may_not_pace(table: Staged) -> None:
     participant = table.join(PAGES[0], Role.VIEWER)
-    assert bar(table, participant)["pace"] == "You may watch, not drive."
+    assert table.bar(participant)["pace"] == "You may watch, not drive."
 
 
 def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
@@ -92,10 +86,10 @@ def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
     table.arm.rest = replace(rest, motion=replace(rest.motion, qd=rest.motion.qd + 0.1))
     table.stop("Anybody")
     table.wait(0.2, participant)
-    shown = bar(table, participant)
+    shown = table.bar(participant)
     assert (shown["stop"], shown["headline"]) == ("confirmed", "Stopping…")
     table.arm.rest = rest
-    assert bar(table, participant)["headline"] == "Stopped"
+    assert table.bar(participant)["headline"] == "Stopped"
 
 
 def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -> None:
@@ -103,16 +97,15 @@ def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -
     table.plan(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 5\n")
     table.programs.steer(owner, ProgramOrder.RUN)
     table.wait(10.5, owner)
-    shown = bar(table, other)
+    shown = table.bar(other)
     assert shown["mood"] == "program"
     assert shown["headline"] == "Nap: wait, step 1 of 2, 25 s left"
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     assert progress.seconds_left == pytest.approx(24.5, abs=0.2)
     table.programs.steer(owner, ProgramOrder.PAUSE)
     paused(table, value=True)
-    assert bar(table, owner)["headline"] == "Paused by you"
-    shown = bar(table, other)
+    assert table.bar(owner)["headline"] == "Paused by you"
+    shown = table.bar(other)
     assert (shown["mood"], shown["headline"]) == ("paused", "Paused by Window 1")
     assert shown["why"].startswith("Nap: wait, step 1 of 2, 25 s left.")
 
@@ -124,22 +117,22 @@ def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
     table.wait(10.5, owner)
     table.programs.steer(owner, ProgramOrder.END)
     table.wait(0.1, owner)
-    shown = bar(table, other)
+    shown = table.bar(other)
     assert (shown["headline"], shown["end"]) == ("Nap: ended at step 1 of 2", "step 1 of 2")
     assert shown["why"] == "Window 1 ended it. Continue resumes it there."
-    shown = bar(table, owner)
+    shown = table.bar(owner)
     assert shown["why"] == "You ended it. Continue resumes it there."
     assert (shown["orders"], shown["continues"]) == (["continue"], ["Nap", 1, 2])
     table.programs.steer(owner, ProgramOrder.CONTINUE)
     table.wait(32.0, owner)
-    assert bar(table, owner)["headline"] == "Nap: done in 42 s"
+    assert table.bar(owner)["headline"] == "Nap: done in 42 s"
     table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")
-    shown = bar(table, owner)
+    shown = table.bar(owner)
     assert (shown["mood"], shown["headline"]) == ("limited", "The script: cannot run")
     assert "999" in shown["why"]
     # As the planning worker reports a motion.
     table.programs.redirected()
-    assert bar(table, owner)["headline"] == "On target"
+    assert table.bar(owner)["headline"] == "On target"
 
 
 def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
@@ -151,8 +144,7 @@ def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.5)
     table.wait(0.1, participant)
-    progress = table.programs.progress()
-    assert progress is not None
+    progress = table.progress
     (plan,) = (each.action.plan for each in program.tasks if isinstance(each.action, FollowPlan))
     assert plan.duration_at(0.5) > 1.2 * plan.duration
     assert progress.seconds_left == pytest.approx(0.4 + plan.duration_at(0.5), abs=0.1)

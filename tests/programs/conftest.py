@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +15,12 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.assembly.robot_session import describe_robot
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.run import runner
-from katana450.extensions.programs.run.program import Program
+from katana450.extensions.programs.run.program import Program, compiled
 from katana450.extensions.programs.run.runner import Phase, Run
+from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 
@@ -44,6 +48,11 @@ class Stage:
     def begin(self) -> State:
         return self.session.begin(self.session.ready, 0.0, 0.0)
 
+    def planned(self, text: str, state: State | None = None, **options: Any) -> Program:
+        """Return the program of a script that begins in ``state``, or ready with the scene."""
+        state = self.begin() if state is None else state
+        return compiled(parse(text), self.plan_context, state, **options)
+
     def tick(self, program: Program, run: Run, state: State) -> tuple[Run, State]:
         run, commands = runner.step(program, run, state, state.t)
         state = self.session.step(state, commands, state.t + TICK)
@@ -65,11 +74,22 @@ class Stage:
 
     def play(self, program: Program, state: State, most: int = 5000) -> tuple[Run, list[State]]:
         """Run ``program`` to its end; return the run and all states."""
-        run, states = Run(state.t), [state]
+        run, states = Run(state.t, number=program.first), [state]
         while run.phase is Phase.RUNNING and len(states) < most:
             run, state = self.tick(program, run, state)
             states.append(state)
         return run, states
+
+    def point(self, state: State) -> FloatArray:
+        """Return the tool point ``tcp`` in the base frame [mm]."""
+        context = self.plan_context
+        T = context.T_base_shoulder @ forward(context.arm.chain_to("tcp"), state.q)
+        return np.asarray(1e3 * T[:3, 3])
+
+    def rests(self, states: Sequence[State]) -> list[FloatArray]:
+        """Return the tool points [mm] in the base frame from which the arm begins to move."""
+        pairs = pairwise(states)
+        return [self.point(a) for a, b in pairs if a.motion.at_rest and not b.motion.at_rest]
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,6 @@ from katana450.errors import CancelledError, InputError
 from katana450.extensions.programs.building.plan_state import PlanState, UntimedPath
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run.compiler import FINDING, TIMING, Compiler, PlanningStage
-from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.planning.checkpoint import checked_by
 from tests.programs.conftest import Stage, pour_text
@@ -34,7 +33,7 @@ def stood(stage: Stage, name: str) -> tuple[float, float]:
 def test_an_object_that_would_overlap_another_is_refused(stage: Stage) -> None:
     text = puts(("cup", stood(stage, "basin")))
     with pytest.raises(ScriptError, match="cup would stand in basin"):
-        compiled(parse(text), stage.plan_context, stage.begin())
+        stage.planned(text)
 
 
 @pytest.mark.parametrize("name", ["cup", "basin"])
@@ -46,12 +45,12 @@ def test_an_object_beyond_the_table_is_refused_before_anything_moves(
     x, y = spot
     said = rf"line 3.*{name} would be in the air at x {x:.1f}, y {y:.1f} mm: nothing carries it"
     with pytest.raises(ScriptError, match=said) as refused:
-        compiled(parse(text), stage.plan_context, stage.begin())
+        stage.planned(text)
     assert "from x -250 to 750 and from y -700 to 700 mm" in str(refused.value)
 
 
 def test_an_object_at_the_edge_of_the_table_is_carried(stage: Stage) -> None:
-    program = compiled(parse(puts(("cup", (740.0, 690.0)))), stage.plan_context, stage.begin())
+    program = stage.planned(puts(("cup", (740.0, 690.0))))
     _, states = stage.play(program, stage.begin())
     at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].objects}
     assert at["cup"] == pytest.approx((740.0, 690.0))
@@ -65,9 +64,9 @@ def test_a_repeated_step_is_planned_again_after_objects_have_moved(stage: Stage)
         "        - put: {object: cup, x: 0, y: -400}\n"
         "        - put: {object: basin, x: 420, y: 0}\n"
     )
-    assert compiled(parse(once), stage.plan_context, stage.begin()).steps == 5
+    assert stage.planned(once).steps == 5
     with pytest.raises(ScriptError, match=r"line 7.* and basin would overlap by .* are required"):
-        compiled(parse(once.replace("times: 1", "times: 2")), stage.plan_context, stage.begin())
+        stage.planned(once.replace("times: 1", "times: 2"))
 
 
 LINES = "tool: tcp\nsteps:\n  - line: {by: {z: 20}}\n  - line: {by: {y: 20}}\n  - home\n"
@@ -75,7 +74,7 @@ LINES = "tool: tcp\nsteps:\n  - line: {by: {z: 20}}\n  - line: {by: {y: 20}}\n  
 
 def test_planning_reports_each_step_of_both_phases(stage: Stage) -> None:
     stages: list[PlanningStage] = []
-    compiled(parse(LINES), stage.plan_context, stage.begin(), report=stages.append)
+    stage.planned(LINES, report=stages.append)
     phases = [(phase, step) for phase in (FINDING, TIMING) for step in range(1, 5)]
     assert [(each.phase, each.step) for each in stages] == phases
     fractions = [each.fraction for each in stages]
@@ -94,7 +93,7 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
                 raise CancelledError("enough")
 
         with pytest.raises(CancelledError, match="enough"), checked_by(check):
-            compiled(parse(LINES), stage.plan_context, stage.begin(), report=reached.append)
+            stage.planned(LINES, report=reached.append)
         assert reached[-1] == (phase, 3, 4)
     gaps: list[float] = []
     begun = time.thread_time()
@@ -106,7 +105,7 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
         begun = now
 
     with checked_by(measure):
-        compiled(parse(pour_text()), stage.plan_context, stage.begin())
+        stage.planned(pour_text())
     assert len(gaps) > 1000
     assert max(gaps) < 0.25
 

@@ -17,9 +17,8 @@ from katana450.arm.control.state.state import State
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.continuation import RETURN, Interruption, continued
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
-from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import steps_of
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
@@ -44,7 +43,7 @@ POUR = Path(katana450.extensions.programs.__file__).parent / "library" / "pour.y
 
 @pytest.fixture(scope="module")
 def program(stage: Stage) -> Program:
-    return compiled(parse(SCRIPT), stage.plan_context, stage.begin())
+    return stage.planned(SCRIPT)
 
 
 def given(stage: Stage, state: State, *commands: cmd.Command) -> State:
@@ -85,12 +84,14 @@ def interruption_of(program: Program, run: Run, state: State) -> Interruption:
     return found
 
 
+def rest_of(stage: Stage, program: Program, run: Run, state: State) -> Program:
+    """Return the program that continues ``run`` from ``state``."""
+    return continued(interruption_of(program, run, state), stage.plan_context, state)
+
+
 def played(stage: Stage, program: Program, state: State) -> list[State]:
     """Return the states of the run of ``program``, which must succeed."""
-    run, states = Run(state.t, number=program.first), [state]
-    while run.phase is Phase.RUNNING and len(states) < 5000:
-        run, state = stage.tick(program, run, state)
-        states.append(state)
+    run, states = stage.play(program, state)
     assert (run.phase, run.why) == (Phase.DONE, "")
     return states
 
@@ -120,7 +121,7 @@ def after_return(rest: Program, states: list[State]) -> list[State]:
 def test_stopped_program_continues_on_its_path(stage: Stage, program: Program, ticks: int) -> None:
     whole = played(stage, program, stage.begin())
     run, state = stopped_after(stage, program, min(ticks, len(whole) - 20))
-    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    rest = rest_of(stage, program, run, state)
     states = played(stage, rest, state)
     assert states[-1].setpoint == pytest.approx(whole[-1].setpoint, abs=1e-9)
     assert states[-1].gripper == whole[-1].gripper
@@ -132,9 +133,9 @@ def test_stopped_program_continues_on_its_path(stage: Stage, program: Program, t
 
 def test_stopped_twice_it_still_continues(stage: Stage, program: Program) -> None:
     run, state = stopped_after(stage, program, 60)
-    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    rest = rest_of(stage, program, run, state)
     run, state = stopped_after(stage, rest, 25, state)
-    again = continued(interruption_of(rest, run, state), stage.plan_context, state)
+    again = rest_of(stage, rest, run, state)
     states = played(stage, again, state)
     assert off_path(program, after_return(again, states)) < 5e-3
     assert states[-1].setpoint == pytest.approx(program_end(program), abs=1e-9)
@@ -195,14 +196,14 @@ def test_completed_run_is_no_interruption(stage: Stage, program: Program) -> Non
 
 def test_speed_in_force_applies_to_the_rest(stage: Stage, program: Program) -> None:
     run, state = stopped_after(stage, program, 60)
-    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    rest = rest_of(stage, program, run, state)
     state = replace(state, speed=0.1)
     assert {each.speed for each in played(stage, rest, state)[5:]} == {0.8}
 
 
 @pytest.fixture(scope="module")
 def pour(stage: Stage) -> Program:
-    return compiled(parse(POUR.read_text()), stage.plan_context, stage.begin())
+    return stage.planned(POUR.read_text())
 
 
 def cup(state: State) -> int:

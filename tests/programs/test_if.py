@@ -12,7 +12,7 @@ from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
 from katana450.extensions.programs.run.compiler import MAX_COPIES, Compiler
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.simulation import Timeline, moments
 from katana450.extensions.programs.script.script import parse
@@ -47,7 +47,7 @@ def nested(stage: Stage, empty: State) -> Program:
 
 
 def planned(stage: Stage, text: str, state: State) -> Program:
-    return compiled(parse(HEAD + text), stage.plan_context, state)
+    return stage.planned(HEAD + text, state)
 
 
 def with_water(stage: Stage, ml: float) -> State:
@@ -98,7 +98,7 @@ def test_measured_state_chooses_the_alternative(
     assert turned(state, states[-1], 5) == pytest.approx(angle)
     assert turned(state, states[-1], 1) == pytest.approx(3.0)
     assert run.choices == choices
-    assert runner.skipped(nested, run) == skipped
+    assert runner.progress(nested, run, states[-1]).skipped == skipped
 
 
 def test_step_after_different_ends_is_planned_for_each(nested: Program) -> None:
@@ -219,7 +219,7 @@ steps:
   - repeat: {times: 2, index: i, steps: [{call: {name: turn, with: {by: (i + 1) * 2}}}]}
   - call: turn
 """
-    program = compiled(parse(text), stage.plan_context, empty)
+    program = stage.planned(text, empty)
     assert program.steps == 9
     for ml, angle in ((0.0, -11.0), (60.0, 11.0)):
         state = with_water(stage, ml)

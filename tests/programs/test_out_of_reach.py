@@ -14,8 +14,6 @@ from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.planning.out_of_reach import unreached
-from katana450.extensions.programs.run.program import compiled
-from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
@@ -121,7 +119,7 @@ def test_roll_beyond_its_limit_is_named(begin: PlanState) -> None:
 
 def refusal(stage: Stage, steps: str, frame: str = "base") -> str:
     with pytest.raises(ScriptError) as refused:
-        compiled(parse(f"frame: {frame}\nsteps:\n{steps}"), stage.plan_context, stage.begin())
+        stage.planned(f"frame: {frame}\nsteps:\n{steps}")
     return str(refused.value)
 
 
@@ -146,10 +144,10 @@ def test_object_out_of_reach_is_reported_in_the_frame_of_the_script(stage: Stage
 def test_nearest_place_is_possible(stage: Stage) -> None:
     move = "steps:\n  - move: "
     with pytest.raises(ScriptError) as refused:
-        compiled(parse(f"{move}{{x: 700, y: 0, z: 0}}"), stage.plan_context, stage.begin())
+        stage.planned(f"{move}{{x: 700, y: 0, z: 0}}")
     _, remedy, rest = str(refused.value).split("`")
     assert rest == " with this pitch."
-    compiled(parse(f"{move}{remedy}"), stage.plan_context, stage.begin())
+    stage.planned(f"{move}{remedy}")
 
 
 def test_farthest_place_of_a_line_is_named(stage: Stage) -> None:

@@ -14,7 +14,7 @@ from katana450.errors import InputError
 from katana450.extensions.programs.building.actions import FollowPlan, Task
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry import se3, so3
@@ -40,7 +40,7 @@ def box(
 
 def planned(stage: Stage, steps: str, *objects: SceneObject) -> tuple[Program, State]:
     start = replace(stage.begin(), objects=objects, poured=None)
-    return compiled(parse(f"frame: base\nsteps:\n{steps}"), stage.plan_context, start), start
+    return stage.planned(f"frame: base\nsteps:\n{steps}", start), start
 
 
 def played(stage: Stage, steps: str, *objects: SceneObject) -> dict[str, SceneObject]:
@@ -209,7 +209,7 @@ def test_program_is_planned_for_a_stopped_arm_as_for_a_free_one(
     free, start = planned(stage, steps, box("part", NEAR))
     halted = stage.session.step(start, [command], start.t + TICK)
     assert halted.stopped is not None or halted.paused
-    program = compiled(parse(f"frame: base\nsteps:\n{steps}"), stage.plan_context, halted)
+    program = stage.planned(f"frame: base\nsteps:\n{steps}", halted)
     assert list(map(summary, program.tasks)) == list(map(summary, free.tasks))
 
 
@@ -265,4 +265,4 @@ def test_mistakes_are_reported_with_their_place(step: str, message: str) -> None
 def test_cup_is_poured_only_if_held_from_the_front(stage: Stage) -> None:
     text = "frame: base\nsteps:\n- pick: {object: cup, side: above}\n"
     with pytest.raises(ScriptError, match="from above the wrist could not pour it"):
-        compiled(parse(text), stage.plan_context, stage.begin())
+        stage.planned(text)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.tool import ToolTarget
@@ -29,7 +26,7 @@ steps:
 
 
 def planned(stage: Stage, steps: str) -> Program:
-    return compiled(parse(HEAD + steps), stage.plan_context, stage.begin())
+    return stage.planned(HEAD + steps)
 
 
 def end(stage: Stage, program: Program) -> ToolTarget:
@@ -42,16 +39,6 @@ def in_base(stage: Stage, p: FloatArray) -> FloatArray:
     """Return the point ``p`` (3,) [m] of {S} in the base frame [mm]."""
     T = stage.plan_context.T_base_shoulder
     return np.asarray(1e3 * (T[:3, :3] @ p + T[:3, 3]))
-
-
-def rests(stage: Stage, states: list[State]) -> list[FloatArray]:
-    """Return the points [mm] in the base frame from which the arm begins to move."""
-    chain = stage.plan_context.arm.chain_to("tcp")
-    return [
-        in_base(stage, ToolTarget.at(chain, a.q).position)
-        for a, b in pairwise(states)
-        if a.motion.at_rest and not b.motion.at_rest
-    ]
 
 
 def test_line_goes_to_a_named_pose_with_its_pitch(stage: Stage) -> None:
@@ -95,7 +82,7 @@ def test_blend_of_0_rests_in_each_corner(stage: Stage, step: str) -> None:
         "      blend: 0\n",
     )
     _, states = stage.play(program, stage.begin())
-    assert rests(stage, states)[1:] == [
+    assert stage.rests(states)[1:] == [
         pytest.approx(np.array([320, -40, 150]), abs=1e-6),
         pytest.approx(np.array([320, 0, 150]), abs=1e-6),
     ]

@@ -9,10 +9,9 @@ import pytest
 
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.measures import water_measures
-from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.water.flow import Water
 from katana450.maths.water.units import MILLILITRE, ML, counted
@@ -20,7 +19,7 @@ from tests.programs.conftest import Stage, pour_text
 
 
 def planned(stage: Stage, **spots: tuple[float, float] | None) -> Program:
-    return compiled(parse(pour_text(**spots)), stage.plan_context, stage.begin())
+    return stage.planned(pour_text(**spots))
 
 
 def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
@@ -94,7 +93,7 @@ steps:
 def poured(stage: Stage, full: float, *parts: float) -> Water:
     """Pour parts of a cup [ml] into the basin; return the water at the end."""
     pours = "".join(f"- pour: {{into: basin, ml: {part:g}}}\n" for part in parts)
-    program = compiled(parse(PART.format(full, pours)), stage.plan_context, stage.begin())
+    program = stage.planned(PART.format(full, pours))
     run, states = stage.play(program, stage.begin(), most=20_000)
     assert run.phase is Phase.DONE
     assert states[-1].poured is not None
@@ -122,4 +121,4 @@ def test_half_of_the_water_is_poured(stage: Stage, full: float) -> None:
 )
 def test_part_that_cannot_be_poured_is_refused(stage: Stage, pour: str, message: str) -> None:
     with pytest.raises(ScriptError, match=message):
-        compiled(parse(PART.format(100, pour)), stage.plan_context, stage.begin())
+        stage.planned(PART.format(100, pour))

@@ -12,7 +12,6 @@ from katana450.errors import InputError
 from katana450.extensions.programs.building.plan_state import PlanState
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import ScriptFrame
-from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse
 from tests.programs.conftest import Stage
 
@@ -65,7 +64,7 @@ def test_path_beyond_a_limit_is_reported_in_the_frame_of_the_script(
         f"  - move: {{x: 330, y: 120, z: {z}, pitch: 40, roll: 0}}\n  - line: {{by: {{y: -240}}}}\n"
     )
     with pytest.raises(ScriptError, match="over its limit") as refused:
-        compiled(parse(text), stage.plan_context, stage.begin())
+        stage.planned(text)
     found = re.search(r"at \((\S+), (\S+), (\S+)\) mm in (.*?),", str(refused.value))
     assert found is not None
     assert found[4] == name
@@ -93,5 +92,5 @@ def test_point_below_the_table_is_refused_for_the_finger(
     stage: Stage, step: str, message: str
 ) -> None:
     with pytest.raises(ScriptError) as refused:
-        compiled(parse(f"{ABOVE}  - {step}\n"), stage.plan_context, stage.begin())
+        stage.planned(f"{ABOVE}  - {step}\n")
     assert message in str(refused.value)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-import katana450.extensions.programs
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
-from katana450.arm.control.state.state import State
 from katana450.extensions.programs.building.actions import ACTION_TIMEOUT, FollowPlan
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.run import runner
@@ -21,11 +17,8 @@ from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import steps_of
-from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.programs.conftest import Stage
-
-LIBRARY = sorted((Path(katana450.extensions.programs.__file__).parent / "library").glob("*.yaml"))
 
 SHORT = """\
 tool: tcp
@@ -45,23 +38,13 @@ steps:
 
 @pytest.fixture(scope="module")
 def program(stage: Stage) -> Program:
-    return compiled(parse(SHORT), stage.plan_context, stage.begin())
-
-
-def point(stage: Stage, state: State) -> np.ndarray:
-    """Return the tool point in the base frame [mm]."""
-    T = stage.plan_context.T_base_shoulder @ forward(
-        stage.plan_context.arm.chain_to("tcp"), state.q
-    )
-    return np.asarray(1e3 * T[:3, 3])
+    return stage.planned(SHORT)
 
 
 def test_the_run_follows_the_script(stage: Stage, program: Program) -> None:
     run, states = stage.play(program, stage.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
-    rests = [
-        point(stage, a) for a, b in pairwise(states) if a.motion.at_rest and not b.motion.at_rest
-    ]
+    rests = stage.rests(states)
     assert np.allclose(rests[1], [320, -40, 150], atol=1e-6)
     assert np.allclose(rests[2], [320, 20, 150], atol=1e-6)
     # 40 deg about y, seen from its centre: x = 20 sin 40, z = 20 cos 40.
@@ -71,7 +54,7 @@ def test_the_run_follows_the_script(stage: Stage, program: Program) -> None:
     R = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]])
     centre = np.array([300.0, 0.0, 150.0])
     assert np.allclose(rests[4], centre + R @ (rests[3] - centre) + [0, 0, 20], atol=1e-6)
-    assert np.allclose(point(stage, states[-1]), [320, -40, 150], atol=1e-6)
+    assert np.allclose(stage.point(states[-1]), [320, -40, 150], atol=1e-6)
     assert states[-1].gripper == stage.plan_context.arm.gripper.upper
 
 
@@ -81,16 +64,12 @@ def test_lines_have_rounded_corners_and_end_at_rest(stage: Stage) -> None:
         "  - lines: {through: [{x: 320, y: 40, z: 150}, {x: 360, y: 40, z: 150, pitch: 60}, "
         "{x: 360, y: 40, z: 190}], blend: 0.4}"
     )
-    run, states = stage.play(
-        compiled(parse(text), stage.plan_context, stage.begin()), stage.begin()
-    )
+    run, states = stage.play(stage.planned(text), stage.begin())
     assert (run.phase, run.why) == (Phase.DONE, "")
-    rests = [
-        point(stage, a) for a, b in pairwise(states) if a.motion.at_rest and not b.motion.at_rest
-    ]
+    rests = stage.rests(states)
     assert len(rests) == 2
-    assert np.allclose(point(stage, states[-1]), [360, 40, 190], atol=1e-6)
-    way = [point(stage, state) for state in states]
+    assert np.allclose(stage.point(states[-1]), [360, 40, 190], atol=1e-6)
+    way = [stage.point(state) for state in states]
     for corner, near in (([320, 40, 150], 8.0), ([360, 40, 150], 8.0)):
         assert 0.5 < min(np.linalg.norm(p - corner) for p in way) < near
     target = ToolTarget.at(stage.plan_context.arm.chain_to("tcp"), states[-1].q)
@@ -264,7 +243,7 @@ def test_an_impossible_step_is_refused_with_its_line(
     stage: Stage, steps: str, line: int, said: str
 ) -> None:
     with pytest.raises(ScriptError, match=said) as refused:
-        compiled(parse("steps:\n" + steps), stage.plan_context, stage.begin())
+        stage.planned("steps:\n" + steps)
     assert refused.value.problems[0].line == line
 
 
@@ -273,15 +252,8 @@ def test_repetitions_are_planned_once(stage: Stage) -> None:
         "steps:\n  - repeat: {times: 8, steps: [{joints: [20, -60, 85, 8, 0]}, home, "
         "{gripper: open}, {gripper: closed}]}"
     )
-    program = compiled(parse(text), stage.plan_context, stage.begin())
+    program = stage.planned(text)
     plans = {id(task.action.plan) for task in program.tasks if isinstance(task.action, FollowPlan)}
     # The fingers are neither open nor closed at first, so the first repetition differs.
     assert len(plans) == 4
     assert program.steps == 32
-
-
-@pytest.mark.parametrize("path", LIBRARY, ids=lambda path: path.stem)
-def test_the_scripts_of_the_library_can_be_read(path: Path) -> None:
-    script = parse(path.read_text(encoding="utf-8"))
-    assert script.name
-    assert replace(script, name="x").steps

@@ -11,7 +11,6 @@ import pytest
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.run.program import compiled
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
 from katana450.extensions.programs.script.teach import TaughtPose, taught
@@ -49,7 +48,7 @@ def test_a_script_of_poses_is_read_as_poses() -> None:
 
 
 def test_a_script_of_poses_goes_through_them(stage: Stage) -> None:
-    program = compiled(parse(TAUGHT), stage.plan_context, stage.begin())
+    program = stage.planned(TAUGHT)
     ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
     assert np.degrees([q[0] for q in ends]) == pytest.approx([10.0, 30.0, 40.0] * 3)
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.state.state import ActiveStop
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.simulation import Moment, Timeline, moments
-from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
 from katana450.maths.water.units import MILLILITRE
 from tests.programs.conftest import Stage
@@ -19,7 +18,7 @@ from tests.programs.conftest import Stage
 
 @pytest.fixture(scope="module")
 def poured(stage: Stage) -> tuple[Program, Timeline, list[Moment]]:
-    program = compiled(parse(script_text(library_file("pour"))), stage.plan_context, stage.begin())
+    program = stage.planned(script_text(library_file("pour")))
     timeline = Timeline.of(program)
     return program, timeline, list(moments(program, timeline, stage.session, stage.begin()))
 
@@ -57,15 +56,13 @@ def test_cup_is_carried_and_emptied(
         for each in moment.state.objects:
             if each.held:
                 T = stage.session.environment.pose(each, moment.state.x)
-                hand = stage.session.environment.hand
-                assert hand is not None
                 assert np.linalg.norm(T[:3, 3]) > 0.2
                 assert T[2, 3] > -1e-3
 
 
 def test_stop_and_pause_of_the_arm_do_not_hinder_the_preview(stage: Stage) -> None:
     text = "steps:\n  - joints: [20, -68, 85, 8, 0]\n  - wait: 1\n  - joints: [0, -68, 85, 8, 0]"
-    program = compiled(parse(text), stage.plan_context, stage.begin())
+    program = stage.planned(text)
     timeline = Timeline.of(program)
     state = replace(stage.begin(), stopped=ActiveStop(0.0, 0.0), paused=True, speed=0.1)
     *_, last = moments(program, timeline, stage.session, state)
@@ -74,12 +71,12 @@ def test_stop_and_pause_of_the_arm_do_not_hinder_the_preview(stage: Stage) -> No
 
 
 def test_preview_of_a_failing_program_ends_there(stage: Stage) -> None:
-    program = compiled(parse("steps: [home]"), stage.plan_context, stage.begin())
+    program = stage.planned("steps: [home]")
     assert [
         moment.t for moment in moments(program, Timeline.of(program), stage.session, stage.begin())
     ] == [0.0]
     text = "steps:\n  - joints: [20, -68, 85, 8, 0]\n  - joints: [0, -68, 85, 8, 0]"
-    program = compiled(parse(text), stage.plan_context, stage.begin())
+    program = stage.planned(text)
     timeline = Timeline.of(program)
     # The arm stands elsewhere by now.
     q = stage.begin().setpoint + 0.3

@@ -17,8 +17,7 @@ from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.building.plan_state import PlanContext
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.planning.trajectory_path import CubicSpline, TrajectoryPath
-from katana450.extensions.programs.run.continuation import continued
-from katana450.extensions.programs.run.program import Program, compiled
+from katana450.extensions.programs.run.program import Program
 from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.script import parse
 from katana450.maths.geometry.arrays import FloatArray
@@ -29,9 +28,9 @@ from katana450.maths.planning.path import joint_derivatives
 from tests.programs.conftest import TICK, Stage
 from tests.programs.test_continuation import (
     after_return,
-    interruption_of,
     off_path,
     played,
+    rest_of,
     stopped_after,
 )
 
@@ -77,17 +76,17 @@ def test_spline_passes_its_values_smoothly(steps: list[float], seed: int) -> Non
 
 
 def test_times_that_cannot_be_kept_are_named_with_the_reason(stage: Stage) -> None:
-    fast = compiled(parse(script([[0.0, *READY], [0.01, 60.0, *READY[1:]]])), *begun(stage))
+    fast = stage.planned(script([[0.0, *READY], [0.01, 60.0, *READY[1:]]]))
     (note,) = fast.notes
     assert note == (
         "Line 2, trajectory: Asked to take 0.01 s, it takes 1.56 s: axis 1 would turn at "
         "6000 deg/s, and its limit is 126.6."
     )
     # A slow one only needs time to start.
-    started = compiled(parse(script([[0.0, *READY], [1.0, 10.0, *READY[1:]]])), *begun(stage))
+    started = stage.planned(script([[0.0, *READY], [1.0, 10.0, *READY[1:]]]))
     (note,) = started.notes
     assert note.endswith("s: the accelerations from rest and to rest are limited.")
-    assert compiled(parse(script(swing(60.0))), *begun(stage)).notes == ()
+    assert stage.planned(script(swing(60.0))).notes == ()
 
 
 @pytest.mark.parametrize(("times", "row"), [((0, 1, 1, 2), 3), ((0, 2, 1), 3), ((5, 5), 2)])
@@ -96,7 +95,7 @@ def test_row_with_a_repeated_time_is_named(
 ) -> None:
     rows = [[t, float(number), *READY[1:]] for number, t in enumerate(times)]
     with pytest.raises(ScriptError, match=rf"Row {row} has the time {times[row - 1]} s\."):
-        compiled(parse(script(rows)), *begun(stage))
+        stage.planned(script(rows))
 
 
 def begun(stage: Stage) -> tuple[PlanContext, State]:
@@ -105,7 +104,7 @@ def begun(stage: Stage) -> tuple[PlanContext, State]:
 
 def test_gentle_trajectory_keeps_its_times(stage: Stage) -> None:
     rows = swing(4.0)
-    program = compiled(parse(script(rows)), stage.plan_context, stage.begin())
+    program = stage.planned(script(rows))
     path, span = plan_of(program)
     assert span == pytest.approx(path.duration, rel=1e-9) == 4.0
     run, states = stage.play(program, stage.begin())
@@ -120,7 +119,7 @@ def test_gentle_trajectory_keeps_its_times(stage: Stage) -> None:
 
 
 def test_fast_trajectory_is_slowed_to_the_limits(stage: Stage) -> None:
-    program = compiled(parse(script(swing(0.8, 40.0))), stage.plan_context, stage.begin())
+    program = stage.planned(script(swing(0.8, 40.0)))
     path, span = plan_of(program)
     assert path.duration == 0.8
     assert span > 1.2
@@ -133,7 +132,7 @@ def test_fast_trajectory_is_slowed_to_the_limits(stage: Stage) -> None:
 def test_speed_of_a_part_is_kept_where_another_part_is_too_fast(stage: Stage) -> None:
     rows = swing(4.0)
     fast = [[4.0 + t, *angles] for t, *angles in swing(0.8, 40.0)[1:]]
-    program = compiled(parse(script(rows + fast)), stage.plan_context, stage.begin())
+    program = stage.planned(script(rows + fast))
     action = program.tasks[-1].action
     assert isinstance(action, FollowPlan)
     scaling = action.plan.segments[0].scaling
@@ -144,7 +143,7 @@ def test_speed_of_a_part_is_kept_where_another_part_is_too_fast(stage: Stage) ->
 
 def test_arm_first_goes_to_the_start(stage: Stage) -> None:
     rows = [[t + 7.5, a + 30.0, *rest] for t, a, *rest in swing(3.0)]
-    program = compiled(parse(script(rows)), stage.plan_context, stage.begin())
+    program = stage.planned(script(rows))
     assert [task.name for task in program.tasks][-2:] == ["trajectory: approach", "trajectory"]
     run, states = stage.play(program, stage.begin())
     assert run.phase is Phase.DONE
@@ -162,10 +161,10 @@ def with_box(stage: Stage, q: FloatArray) -> State:
 
 
 def test_stopped_trajectory_continues_on_its_path(stage: Stage) -> None:
-    program = compiled(parse(script(swing(4.0, 30.0))), stage.plan_context, stage.begin())
+    program = stage.planned(script(swing(4.0, 30.0)))
     path, _ = plan_of(program)
     run, state = stopped_after(stage, program, 150)
-    rest = continued(interruption_of(program, run, state), stage.plan_context, state)
+    rest = rest_of(stage, program, run, state)
     states = played(stage, rest, state)
     np.testing.assert_allclose(states[-1].setpoint, path.end, atol=1e-9)
     assert np.degrees(max(each.setpoint[0] for each in states)) == pytest.approx(30.0, abs=0.05)
@@ -176,7 +175,7 @@ def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:
     rows = [[100.0 + t, *angles] for t, *angles in swing(4.0, 40.0)]
     there = np.radians((40.0, *READY[1:]))
     with pytest.raises(ScriptError) as caught:
-        compiled(parse(script(rows)), stage.plan_context, with_box(stage, there))
+        stage.planned(script(rows), with_box(stage, there))
     text = str(caught.value)
     assert "line 2" in text
     assert " and box would " in text
@@ -200,7 +199,7 @@ def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:
 )
 def test_mistakes_are_named(stage: Stage, rows: list[list[float]], why: str) -> None:
     with pytest.raises(ScriptError, match=why):
-        compiled(parse(script(rows)), stage.plan_context, stage.begin())
+        stage.planned(script(rows))
 
 
 @pytest.mark.parametrize("through", ["5", "[1, 2]", "{a: 1}", "text", "[[], []]"])
@@ -224,13 +223,11 @@ def test_derivatives_are_those_of_the_path(stage: Stage) -> None:
 def test_fingers_must_hold_what_is_named(stage: Stage) -> None:
     text = "steps:\n  - gripper: open\n  - gripper: {to: closed, holding: cup}\n"
     with pytest.raises(ScriptError, match="hold nothing instead of cup"):
-        compiled(parse(text), stage.plan_context, stage.begin())
+        stage.planned(text)
 
 
 def test_example_runs(stage: Stage) -> None:
-    program = compiled(
-        parse(EXAMPLE.read_text(encoding="utf-8")), stage.plan_context, stage.begin()
-    )
+    program = stage.planned(EXAMPLE.read_text(encoding="utf-8"))
     path, span = plan_of(program)
     assert span >= path.duration == 3.0
     run, _ = stage.play(program, stage.begin())
@@ -251,7 +248,7 @@ def test_feed_bounds_the_speed_of_the_tool_point(stage: Stage, step: str) -> Non
     text = (
         f"frame: base\nsteps:\n  - move: {{x: 340, y: 0, z: 190, pitch: 50, roll: 0}}\n  - {step}\n"
     )
-    program = compiled(parse(text), stage.plan_context, begin)
+    program = stage.planned(text, begin)
     _, states = stage.play(program, begin, 20_000)
     chain = stage.plan_context.arm.chain
     points = forward_batch(chain, np.array([state.setpoint for state in states]))[:, :3, 3]
