@@ -64,7 +64,7 @@ tests: $(dev_ok)
 	  [ $$status -ne 1 ] || { $(pytest) --last-failed --last-failed-no-failures none; status=$$?; }; exit $$status
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
-# more of what `make test` does a few times: 200 STOPs instead of 12, 500 drags of each arm instead of 10;
+# more of what `make test` does a few times: 200 STOPs instead of 12, 500 drags of each arm instead of 5;
 # KATANA450_DRAGS=10000 sets another number.
 test-long: $(dev_ok) $(js_ok) browser exchange types ## every test with all its cases
 	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)

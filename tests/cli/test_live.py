@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.browser.server import free_port
 from tests.commands import completed
 
@@ -19,6 +21,7 @@ def run(folder: Path, url: str) -> subprocess.CompletedProcess[str]:
     return completed([KATANA450, "run", script.name, "--url", url], cwd=folder, seconds=90)
 
 
+@pytest.mark.long
 def test_server_is_started_beside_an_app_py_of_the_user(tmp_path: Path) -> None:
     (tmp_path / "app.py").write_text("open('run-by-mistake', 'w').close()\n", encoding="utf-8")
     done = run(tmp_path, f"http://127.0.0.1:{free_port()}")

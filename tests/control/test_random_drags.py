@@ -35,7 +35,7 @@ from tests.robot.public_arms import SO101, written
 
 TICK = 0.01
 
-DRAGS = MANY_DRAGS if LONG else 10
+DRAGS = MANY_DRAGS if LONG else 5
 """Number of drags of each arm."""
 
 HARD_DRAGS = (1703, 4081, 6261, 6817)

@@ -133,7 +133,7 @@ def stage(arm: MountedArm) -> Stage:
     return Stage(arm)
 
 
-@pytest.mark.cases(4)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize(
     "name",
     [

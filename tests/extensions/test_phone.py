@@ -69,6 +69,7 @@ def server() -> Iterator[AppServer]:
         yield server
 
 
+@pytest.mark.long
 def test_server_tells_its_address(server: AppServer) -> None:
     url = f"{server.url}/api/v1/phone"
     code, _, body = ask(url, Host=f"10.0.0.7:{server.port}")

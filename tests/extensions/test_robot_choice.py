@@ -223,6 +223,7 @@ async def problem_with(server: AppServer, name: str, words: str) -> str:
     return str(problem)
 
 
+@pytest.mark.long
 def test_robot_that_cannot_be_read_leaves_the_present_one(server: AppServer) -> None:
     _, answer = upload(server, b"<robot name='a'><link name='l'/></robot>", "broken.urdf")
     name = answer["robot"]["name"]

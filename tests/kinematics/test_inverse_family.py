@@ -169,6 +169,7 @@ def by_axis_1(
     return at_canonical(chain, [one, two, three, phi - two - three, five])
 
 
+@pytest.mark.cases(9)
 @pytest.mark.parametrize("distance", [10.0**k for k in range(-15, -2)])
 @pytest.mark.parametrize("lateral", [False, True])
 def test_near_axis_1_no_digit_is_lost(

@@ -52,6 +52,7 @@ def gap(
     return np.where(allowed, np.hypot(pu - u, pv - v), np.inf)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("elbow", ["up", "down"])
 def test_found_posture_is_the_nearest(elbow: str, side: int, rng: np.random.Generator) -> None:

@@ -99,7 +99,7 @@ def nearest_at_pitch(
     return float(least.min())
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(8))
 def test_no_search_satisfies_a_priority_better(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)

@@ -58,6 +58,7 @@ def with_hints(chain: Chain, T: FloatArray, priority: Priority) -> list[Projecti
     ]
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("priority", [Priority.POSE, Priority.POSITION])
 def test_no_hint_and_no_branch_is_better(chain: Chain, priority: Priority) -> None:
     for T in targets(chain, np.random.default_rng(3), 30):

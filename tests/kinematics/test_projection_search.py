@@ -40,6 +40,7 @@ def test_no_search_beats_it(chain: Chain, lengths: FloatArray) -> None:
     assert_no_search_beats_it(chain, lengths, poses, None)
 
 
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("branch", BRANCHES, ids=str)
 def test_no_search_on_its_branch_beats_it(
     chain: Chain, lengths: FloatArray, branch: Branch

@@ -58,7 +58,7 @@ def test_all_water_reaches_the_basin_and_none_the_table(stage: Stage) -> None:
     check_poured(stage, planned(stage), room=2.0)
 
 
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("cup", "basin", "said"),
     [
@@ -109,7 +109,7 @@ def test_half_of_the_water_is_poured(stage: Stage, full: float) -> None:
     assert water.total == counted(full * ML)
 
 
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("pour", "message"),
     [

@@ -39,6 +39,7 @@ def refusal(begin: PlanState, frame: str, p: tuple[float, ...], pitch: float) ->
     return ""
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("frame", ["shoulder", "base"])
 def test_suggested_places_are_reached(begin: PlanState, frame: str) -> None:
     rng = np.random.default_rng(19)

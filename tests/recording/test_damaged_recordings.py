@@ -24,7 +24,7 @@ def test_recovery_continues_after_a_damaged_chunk(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], damaged: str
 ) -> None:
     path = tmp_path / "run.mcap"
-    record(path, 3000, 4)
+    record(path, 1500, 4)
     with RecordingFile.open(path) as file:
         ticks = file.counts()[COMMANDS]
     with path.open("rb") as opened:

@@ -23,6 +23,7 @@ TICKS = 6000 if LONG else 660
 """Ticks of a minute, as in a file of a server, or fewer."""
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize(
     ("commands", "seed"),
     [
