@@ -17,9 +17,8 @@ from tests.cli.lines import ask
 from tests.cli.test_lines import random_postures
 
 
-def forms(arm: MountedArm, q: FloatArray, decimals: int) -> list[dict[str, Any]]:
-    """Return the pose of ``q`` (5,) in every form, printed with ``decimals``."""
-    T = forward(arm.chain, q)
+def forms(T: FloatArray, decimals: int = 17) -> list[dict[str, Any]]:
+    """Return the pose ``T`` (4, 4) in every form, printed with ``decimals``."""
     w, x, y, z = so3.to_quaternion(T[:3, :3]).round(decimals).tolist()
     p = T[:3, 3].round(decimals).tolist()
     rpy = np.round(so3.to_rpy(T[:3, :3]), decimals).tolist()
@@ -36,14 +35,7 @@ def test_every_form_of_a_pose_gives_the_same_solutions(arm: MountedArm, frame: s
     T_frame_shoulder = arm.T_base_shoulder if frame == "base" else np.eye(4)
     for q in random_postures(arm, 20):
         T = T_frame_shoulder @ forward(arm.chain, q)
-        p, wxyz = T[:3, 3].tolist(), so3.to_quaternion(T[:3, :3]).tolist()
-        requests: list[dict[str, Any]] = [
-            {"T": T.tolist()},
-            {"p": p, "wxyz": wxyz},
-            {"p": p, "xyzw": [*wxyz[1:], wxyz[0]]},
-            {"p": p, "rpy": list(so3.to_rpy(T[:3, :3]))},
-        ]
-        for answer in ask("ik", requests, "--frame", frame):
+        for answer in ask("ik", forms(T), "--frame", frame):
             assert min(np.abs(np.array(s["q"]) - q).max() for s in answer["solutions"]) < 1e-6
             assert answer["rotation_misfit"] < 1e-12
 
@@ -72,7 +64,7 @@ def test_printed_quaternions_are_taken_and_their_rounding_reported(
 ) -> None:
     rounding = 0.5 * 10.0**-decimals
     for q in random_postures(arm, 50):
-        for answer in ask("ik", forms(arm, q, decimals)[1:]):
+        for answer in ask("ik", forms(forward(arm.chain, q), decimals)[1:]):
             assert answer["rotation_misfit"] <= 2.0 * rounding
 
 

@@ -38,24 +38,24 @@ class SilentLine:
         self._gone.set()
 
 
-def test_error_while_goals_continue_ends_the_connection(caplog: pytest.LogCaptureFixture) -> None:
-    async def ask() -> list[tuple[int, str]]:
-        hub, line = Hub(time.monotonic), SilentLine()
-        publications = Publications(hub, lambda: "")
-        channel = RosChannel(hub, line, Budgets(hub.clock).of("a"), publications)
-        client = hub.join(Identity("session", "A client", Role.OPERATOR), "a", channel.notify)
+@pytest.mark.anyio
+async def test_error_while_goals_continue_ends_the_connection(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    hub, line = Hub(time.monotonic), SilentLine()
+    publications = Publications(hub, lambda: "")
+    channel = RosChannel(hub, line, Budgets(hub.clock).of("a"), publications)
+    client = hub.join(Identity("session", "A client", Role.OPERATOR), "a", channel.notify)
 
-        def fail() -> bool:
-            raise ZeroDivisionError
+    def fail() -> bool:
+        raise ZeroDivisionError
 
-        channel._comes_to_rest = fail  # type: ignore[method-assign]
-        channel._acting.set()
+    channel._comes_to_rest = fail  # type: ignore[method-assign]
+    channel._acting.set()
+    with caplog.at_level(logging.ERROR):
         async with asyncio.timeout(20.0):
             await channel.run(client)
-        return line.closed
-
-    with caplog.at_level(logging.ERROR):
-        ((code, why),) = asyncio.run(ask())
+    ((code, why),) = line.closed
     assert code == 1011
     assert "internal error" in why
     assert "ZeroDivisionError" in caplog.text

@@ -47,69 +47,64 @@ async def offers(client: ClientConnection) -> tuple[Offers, Offers, list[str]]:
     return topics, services, capabilities
 
 
+@pytest.mark.anyio
 @pytest.mark.long
 @needs_package(FOXGLOVE)
-def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) -> None:
     before = os.environ.get("PYTHONPATH", "")
     monkeypatch.setenv("PYTHONPATH", f"{FOXGLOVE.folder}{os.pathsep}{before}".rstrip(os.pathsep))
     port = free_port()
-
-    async def act() -> None:
-        with AppServer((*APP, "--foxglove", str(port))) as server:
-            protocols = [Subprotocol("foxglove.sdk.v1")]
-            # As a page of any site connects: the library does not check its origin.
-            page = connect(
-                f"ws://127.0.0.1:{port}",
-                subprotocols=protocols,
-                origin=Origin("https://elsewhere.example"),
-            )
-            old = [Subprotocol("foxglove.websocket.v1")]
-            with pytest.raises(InvalidStatus) as refused:
-                await connect(f"ws://127.0.0.1:{port}", subprotocols=old)
-            assert refused.value.response.status_code == 400
-            assert refused.value.response.body.startswith(
-                b"Missing expected sec-websocket-protocol"
-            )
-            async with asyncio.timeout(30.0), page as client:
-                topics, services, capabilities = await offers(client)
-                # Nothing but the STOP is accepted: no topics and parameters of clients.
-                assert set(services) == {"/stop"}
-                assert capabilities == ["services"]
-                stop = services["/stop"]
-                assert topics["/tf"]["schemaName"] == "foxglove.FrameTransforms"
-                assert topics["/joint_states"]["schemaName"] == "foxglove.JointStates"
-                wanted = {k: topics[each]["id"] for k, each in enumerate(topics)}
-                listed = [{"id": k, "channelId": channel} for k, channel in wanted.items()]
-                await client.send(json.dumps({"op": "subscribe", "subscriptions": listed}))
-                counts = dict.fromkeys(wanted, 0)
-                while min(counts.values()) < 10:
-                    data = await client.recv()
-                    if isinstance(data, bytes) and data[0] == MESSAGE_DATA:
-                        number, _, content = *struct.unpack("<IQ", data[1:13]), data[13:]
-                        counts[number] += 1
-                        topic = list(topics)[number]
-                        if topic == "/tf":
-                            assert b"pan_link" in content
-                            assert b"tcp" in content
-                        elif topic == "/joint_states":
-                            assert b"axis_5" in content
-                        else:
-                            assert json.loads(content)["status"] == "ok"
-                call = struct.pack("<BIII", CALL_SERVICE, stop["id"], 7, 4) + b"json" + b"{}"
-                await client.send(call)
-                while True:
-                    data = await client.recv()
-                    if isinstance(data, bytes) and data[0] == SERVICE_RESPONSE:
-                        break
-                assert b'"success": true' in data
-                while True:
-                    state = json.loads(ask(f"{server.url}/api/v1/state")[2])
-                    if state["stop"] == "confirmed":
-                        break
-                    await asyncio.sleep(0.05)
-                assert "Foxglove" in state["stopped"]
-
-    asyncio.run(act())
+    with AppServer((*APP, "--foxglove", str(port))) as server:
+        protocols = [Subprotocol("foxglove.sdk.v1")]
+        # As a page of any site connects: the library does not check its origin.
+        page = connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=protocols,
+            origin=Origin("https://elsewhere.example"),
+        )
+        old = [Subprotocol("foxglove.websocket.v1")]
+        with pytest.raises(InvalidStatus) as refused:
+            await connect(f"ws://127.0.0.1:{port}", subprotocols=old)
+        assert refused.value.response.status_code == 400
+        assert refused.value.response.body.startswith(b"Missing expected sec-websocket-protocol")
+        async with asyncio.timeout(30.0), page as client:
+            topics, services, capabilities = await offers(client)
+            # Nothing but the STOP is accepted: no topics and parameters of clients.
+            assert set(services) == {"/stop"}
+            assert capabilities == ["services"]
+            stop = services["/stop"]
+            assert topics["/tf"]["schemaName"] == "foxglove.FrameTransforms"
+            assert topics["/joint_states"]["schemaName"] == "foxglove.JointStates"
+            wanted = {k: topics[each]["id"] for k, each in enumerate(topics)}
+            listed = [{"id": k, "channelId": channel} for k, channel in wanted.items()]
+            await client.send(json.dumps({"op": "subscribe", "subscriptions": listed}))
+            counts = dict.fromkeys(wanted, 0)
+            while min(counts.values()) < 10:
+                data = await client.recv()
+                if isinstance(data, bytes) and data[0] == MESSAGE_DATA:
+                    number, _, content = *struct.unpack("<IQ", data[1:13]), data[13:]
+                    counts[number] += 1
+                    topic = list(topics)[number]
+                    if topic == "/tf":
+                        assert b"pan_link" in content
+                        assert b"tcp" in content
+                    elif topic == "/joint_states":
+                        assert b"axis_5" in content
+                    else:
+                        assert json.loads(content)["status"] == "ok"
+            call = struct.pack("<BIII", CALL_SERVICE, stop["id"], 7, 4) + b"json" + b"{}"
+            await client.send(call)
+            while True:
+                data = await client.recv()
+                if isinstance(data, bytes) and data[0] == SERVICE_RESPONSE:
+                    break
+            assert b'"success": true' in data
+            while True:
+                state = json.loads(ask(f"{server.url}/api/v1/state")[2])
+                if state["stop"] == "confirmed":
+                    break
+                await asyncio.sleep(0.05)
+            assert "Foxglove" in state["stopped"]
 
 
 @needs_package(FOXGLOVE)

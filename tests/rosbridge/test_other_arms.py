@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,13 @@ from tests.rosbridge.ros_client import TWIST, ros, twist
 from tests.rosbridge.test_motion import stream
 
 
+@pytest.mark.anyio
 @pytest.mark.long
-def test_twist_moves_and_turns_the_tool_of_six_axes(tmp_path: Path) -> None:
+async def test_twist_moves_and_turns_the_tool_of_six_axes(tmp_path: Path) -> None:
     urdf = tmp_path / "ur5e.urdf"
     urdf.write_text(ur5e(), encoding="utf-8")
-
-    async def act(url: str) -> None:
-        async with ros(url) as client:
+    with AppServer((*APP, "--urdf", str(urdf))) as server:
+        async with ros(server.url) as client:
             before = np.array((await client.state())["T"])
             await stream(client, TWIST, twist(vz=-0.2), 0.8)
             after = np.array((await client.when(lambda state: not state["moving"]))["T"])
@@ -39,6 +38,3 @@ def test_twist_moves_and_turns_the_tool_of_six_axes(tmp_path: Path) -> None:
             assert np.abs(after[:3, 3] - before[:3, 3]).max() < 0.002
             # Nothing was refused: neither the twists nor the end of a stream.
             assert not [op for op in client.heard if op["op"] == "status"]
-
-    with AppServer((*APP, "--urdf", str(urdf))) as server:
-        asyncio.run(act(server.url))

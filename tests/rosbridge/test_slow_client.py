@@ -17,6 +17,8 @@ from tests.browser.server import SIMULATION_APP, AppServer
 from tests.gateway.client import ask
 from tests.rosbridge.ros_client import FOLLOW, ros, trajectory
 
+pytestmark = pytest.mark.anyio
+
 SECONDS = 6.0
 """[s] Time in which 1.5 MB would be sent to a client that reads."""
 
@@ -61,75 +63,61 @@ def deaf_client(url: str, *ops: dict[str, Any]) -> socket.socket:
     return line
 
 
+def loop(url: str) -> dict[str, Any]:
+    return dict(json.loads(ask(f"{url}/api/v1/loop")[2]))
+
+
 @pytest.mark.long
-def test_client_that_reads_nothing_costs_little() -> None:
-    with ExitStack() as lines_open:
-        _cost(lines_open)
-
-
-def _cost(lines_open: ExitStack) -> None:
-    """Measure with clients that are closed with ``lines_open``."""
-
-    def loop(url: str) -> dict[str, Any]:
-        return dict(json.loads(ask(f"{url}/api/v1/loop")[2]))
-
-    async def act() -> None:
-        with AppServer(SIMULATION_APP) as server:
-            async with ros(server.url) as client:
-                # What the first client of each kind costs for good is not counted.
-                for topic in TOPICS:
-                    await client.say("subscribe", topic=topic)
-                    await client.message(topic)
-                await client.home()
-                away = [0.5, -1.1, 1.4, 0.2, 0.3]
-                for goal in (away, [0.0, -1.19, 1.48, 0.14, 0.0]):
-                    await client.result(await client.goal(FOLLOW, trajectory((1.0, goal))))
-                before = memory(server.front)
-                # Only the end of each message is written after the buffers of the kernel are full.
-                subscriptions = [{"op": "subscribe", "topic": topic} for topic in TOPICS]
-                lines = [
-                    lines_open.enter_context(deaf_client(server.url, *subscriptions))
-                    for _ in range(4)
-                ]
-                await asyncio.sleep(0.5)
-                number = await client.goal(FOLLOW, trajectory((SECONDS, away)))
-                await client.when(lambda state: state["moving"])
-                lost, began = loop(server.url)["lost"], time.monotonic()
-                longest = 0.0
-                while time.monotonic() - began < SECONDS / 2:
-                    asked = time.monotonic()
-                    await client.call("/rosapi/topics")
-                    longest = max(longest, time.monotonic() - asked)
-                    await asyncio.sleep(0.05)
-                assert longest < 0.5
-                assert loop(server.url)["lost"] - lost <= MAX_LOST
-                assert (await client.result(number))["status"] == 4
-                cost = (memory(server.front) - before) / len(lines)
-                print(f"{cost:.0f} kB for each client; longest answer {1e3 * longest:.0f} ms")
-                assert cost < MAX_KB
+async def test_client_that_reads_nothing_costs_little() -> None:
+    with ExitStack() as lines_open, AppServer(SIMULATION_APP) as server:
+        async with ros(server.url) as client:
+            # What the first client of each kind costs for good is not counted.
+            for topic in TOPICS:
+                await client.say("subscribe", topic=topic)
+                await client.message(topic)
+            await client.home()
+            away = [0.5, -1.1, 1.4, 0.2, 0.3]
+            for goal in (away, [0.0, -1.19, 1.48, 0.14, 0.0]):
+                await client.result(await client.goal(FOLLOW, trajectory((1.0, goal))))
+            before = memory(server.front)
+            # Only the end of each message is written after the buffers of the kernel are full.
+            subscriptions = [{"op": "subscribe", "topic": topic} for topic in TOPICS]
+            lines = [
+                lines_open.enter_context(deaf_client(server.url, *subscriptions)) for _ in range(4)
+            ]
+            await asyncio.sleep(0.5)
+            number = await client.goal(FOLLOW, trajectory((SECONDS, away)))
+            await client.when(lambda state: state["moving"])
+            lost, began = loop(server.url)["lost"], time.monotonic()
+            longest = 0.0
+            while time.monotonic() - began < SECONDS / 2:
                 asked = time.monotonic()
-                await client.call("/stop")
-                assert time.monotonic() - asked < 0.5
-
-    asyncio.run(act())
+                await client.call("/rosapi/topics")
+                longest = max(longest, time.monotonic() - asked)
+                await asyncio.sleep(0.05)
+            assert longest < 0.5
+            assert loop(server.url)["lost"] - lost <= MAX_LOST
+            assert (await client.result(number))["status"] == 4
+            cost = (memory(server.front) - before) / len(lines)
+            print(f"{cost:.0f} kB for each client; longest answer {1e3 * longest:.0f} ms")
+            assert cost < MAX_KB
+            asked = time.monotonic()
+            await client.call("/stop")
+            assert time.monotonic() - asked < 0.5
 
 
 @pytest.mark.long
-def test_goal_of_a_client_that_answers_no_ping_ends() -> None:
-    async def act() -> None:
-        with AppServer(SIMULATION_APP) as server:
-            async with ros(server.url) as client:
-                goal = trajectory((8.0, [0.8, -1.1, 1.4, 0.2, 0.3]))
-                op = {"op": "send_action_goal", "id": "g", "action": FOLLOW, "args": goal}
-                line = deaf_client(server.url, op)
-                lines_open.callback(line.close)
-                await client.when(lambda state: state["moving"])
-                began = time.monotonic()
-                state = await client.when(lambda state: not state["moving"])
-                assert time.monotonic() - began < 4.0
-                assert state["program"]["status"] == "stopped"
-                assert "no heartbeats" in state["program"]["why"]
-                assert state["q"][0] < 0.7
-
-    with ExitStack() as lines_open:
-        asyncio.run(act())
+async def test_goal_of_a_client_that_answers_no_ping_ends() -> None:
+    with ExitStack() as lines_open, AppServer(SIMULATION_APP) as server:
+        async with ros(server.url) as client:
+            goal = trajectory((8.0, [0.8, -1.1, 1.4, 0.2, 0.3]))
+            op = {"op": "send_action_goal", "id": "g", "action": FOLLOW, "args": goal}
+            line = deaf_client(server.url, op)
+            lines_open.callback(line.close)
+            await client.when(lambda state: state["moving"])
+            began = time.monotonic()
+            state = await client.when(lambda state: not state["moving"])
+            assert time.monotonic() - began < 4.0
+            assert state["program"]["status"] == "stopped"
+            assert "no heartbeats" in state["program"]["why"]
+            assert state["q"][0] < 0.7
