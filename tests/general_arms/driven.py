@@ -54,3 +54,10 @@ def settled(session: Session, state: State, commands: Iterable[cmd.Command] = ()
 def pose(session: Session, state: State) -> FloatArray:
     """Return the pose (4, 4) of the tool."""
     return forward(session.require_arm().chain_to(state.tool), state.q)
+
+
+def ready(chain: Chain) -> tuple[Session, State, FloatArray]:
+    """Return a session of an arm, its state at rest, and the pose (4, 4) of its tool there."""
+    session = session_of(chain)
+    state = begun(session)
+    return session, state, pose(session, state)

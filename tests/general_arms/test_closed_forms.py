@@ -260,24 +260,10 @@ def test_angles_are_in_the_turn_inside_the_limits() -> None:
         assert any(each.exact and each.within_limits for each in found)
 
 
-@pytest.mark.parametrize(
-    ("T", "message"),
-    [
-        (np.eye(3), "shape"),
-        (np.full((4, 4), math.nan), "nan"),
-        (2.0 * np.eye(4), "last row"),
-        (np.diag((1.0, 1.0, -1.0, 1.0)), "reflection"),
-        (np.diag((1.0, 1.1, 1.0, 1.0)), "not a rotation"),
-        ([["a"] * 4] * 4, "give plain finite numbers"),
-    ],
-)
-def test_wrong_pose_is_refused(T: object, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        closed_form(UR5E).inverse(T)  # type: ignore[arg-type]
-
-
 def test_wrong_hint_and_wrong_poses_are_refused() -> None:
     solver = closed_form(UR5E)
+    with pytest.raises(InputError, match="reflection"):
+        solver.inverse(np.diag((1.0, 1.0, -1.0, 1.0)))
     with pytest.raises(InputError, match=r"shape \(5,\)"):
         solver.inverse(np.eye(4), np.zeros(5))
     with pytest.raises(InputError, match="finite angle"):

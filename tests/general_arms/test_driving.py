@@ -25,7 +25,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame, singular_values
-from tests.general_arms.driven import TICK, begun, pose, run, session_of, settled
+from tests.general_arms.driven import TICK, begun, pose, ready, run, session_of, settled
 from tests.general_arms.published_arms import (
     FOUR,
     OPENMANIPULATOR_X,
@@ -76,9 +76,7 @@ def test_ready_posture_stands_up_in_front_of_the_base(
 
 @every(SIX_AND_MORE)
 def test_drag_moves_the_tool_point_and_keeps_its_orientation(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     state = settled(session, start, [cmd.Position(T[:3, 3] + SMALL)])
     reached = pose(session, state)
     np.testing.assert_allclose(reached[:3, 3], T[:3, 3] + SMALL, atol=1e-7)
@@ -89,9 +87,7 @@ def test_drag_moves_the_tool_point_and_keeps_its_orientation(chain: Chain) -> No
 
 @every(FOUR)
 def test_four_axes_keep_the_pitch_in_a_drag(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     aside = (se3.exp(0.7 * chain.S[:, 0]) @ T)[:3, 3]
     state = settled(session, start, [cmd.Position(aside)])
     np.testing.assert_allclose(pose(session, state)[:3, 3], aside, atol=1e-7)
@@ -102,9 +98,7 @@ def test_four_axes_keep_the_pitch_in_a_drag(chain: Chain) -> None:
 
 @every(SIX_AND_MORE)
 def test_ring_turns_the_tool_about_its_point(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     state = settled(session, start, [cmd.Orient(TURN @ T[:3, :3])])
     reached = pose(session, state)
     np.testing.assert_allclose(reached[:3, 3], T[:3, 3], atol=1e-7)
@@ -112,9 +106,7 @@ def test_ring_turns_the_tool_about_its_point(chain: Chain) -> None:
 
 
 def test_ring_pitches_four_axes() -> None:
-    session = session_of(OPENMANIPULATOR_X)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(OPENMANIPULATOR_X)
     pitched = so3.exp(0.2 * OPENMANIPULATOR_X.S[:3, 3]) @ T[:3, :3]
     state = settled(session, start, [cmd.Orient(pitched)])
     np.testing.assert_allclose(pose(session, state)[:3, :3], pitched, atol=1e-6)
@@ -123,9 +115,7 @@ def test_ring_pitches_four_axes() -> None:
 
 @every(SIX_AND_MORE)
 def test_typed_pose_is_taken(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     T[:3, 3] += SMALL
     T[:3, :3] = TURN @ T[:3, :3]
     state = settled(session, start, [cmd.Pose(T)])
@@ -135,10 +125,9 @@ def test_typed_pose_is_taken(chain: Chain) -> None:
 
 @every(ARMS)
 def test_pose_out_of_reach_has_its_reason_in_words(chain: Chain) -> None:
-    session = session_of(chain)
-    T = pose(session, begun(session))
+    session, start, T = ready(chain)
     T[:3, 3] = 10.0 * T[:3, 3]
-    state = session.step(begun(session), [cmd.Pose(T)], TICK)
+    state = session.step(start, [cmd.Pose(T)], TICK)
     assert state.outcomes[0].verdict is Verdict.LIMITED
     assert state.findings[0].reason is Reason.OUT_OF_REACH
     assert "mm out of reach" in sentence(state)
@@ -147,9 +136,7 @@ def test_pose_out_of_reach_has_its_reason_in_words(chain: Chain) -> None:
 
 @every(ARMS)
 def test_step_adds_up_along_the_tool(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     step = cmd.StepTool(np.array([0.0, 0.0, 0.01, 0.0, 0.0, 0.0]))
     state = settled(session, run(session, start, [step]), [step])
     np.testing.assert_allclose(pose(session, state)[:3, 3], T[:3, 3] + (0, 0, 0.02), atol=1e-7)
@@ -157,9 +144,7 @@ def test_step_adds_up_along_the_tool(chain: Chain) -> None:
 
 @every(SIX_AND_MORE)
 def test_step_turns_about_an_axis_of_the_tool(chain: Chain) -> None:
-    session = session_of(chain)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
     step = cmd.StepTool(np.array([0.0, 0.0, 0.0, 0.0, 0.1, 0.0]), JogFrame.TOOL)
     reached = pose(session, settled(session, start, [step]))
     np.testing.assert_allclose(reached[:3, :3], T[:3, :3] @ so3.rotation_y(0.1), atol=1e-6)
@@ -246,9 +231,8 @@ def test_command_of_six_axes_is_refused_by_five(
 
 @pytest.mark.parametrize("chain", [UR5E, PANDA], ids=["UR5e", "Panda"])
 def test_other_branch_keeps_the_pose(chain: Chain) -> None:
-    session = session_of(chain)
-    arm, start = session.require_arm(), begun(session)
-    T = pose(session, start)
+    session, start, T = ready(chain)
+    arm = session.require_arm()
     choices = session.choices(start)
     assert [each.metrics.branch for each in choices] == list(arm.kinematics.branches)
     usable = [
@@ -283,9 +267,7 @@ def test_branch_that_the_limits_exclude_has_a_reason_and_is_refused_with_it(name
 
 
 def test_priority_decides_what_is_kept_out_of_reach() -> None:
-    session = session_of(UR5E)
-    start = begun(session)
-    T = pose(session, start)
+    session, start, T = ready(UR5E)
     far = cmd.Position(2.0 * T[:3, 3])
     lost = {}
     for priority in session.require_arm().kinematics.priorities:

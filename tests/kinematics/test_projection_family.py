@@ -107,19 +107,6 @@ def test_no_search_finds_a_nearer_point_or_turn(seed: int) -> None:
     assert exact > 0
 
 
-def test_feasible_pose_of_a_member_is_unchanged(rng: np.random.Generator) -> None:
-    for _ in range(120):
-        chain = limited_member(rng)
-        for q in rng.uniform(chain.lower, chain.upper, size=(3, 5)):
-            T = forward(chain, q)
-            for p in (project(chain, T, q_hint=q), project(chain, T, branch=branch_of(chain, q))):
-                assert p.position_error < 1e-12
-                assert p.rotation_error < 1e-10
-                assert p.yaw_error < 1e-10
-                assert p.limits == ()
-                assert not p.reach
-
-
 def test_every_branch_has_a_solution_and_the_best_is_taken(rng: np.random.Generator) -> None:
     for _ in range(25):
         chain = limited_member(rng)
