@@ -3,43 +3,27 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.branch_words import SECOND
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.solution import Solutions
+from katana450.maths.kinematics.kinematics import Kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class GeneralKinematics(ABC):
+class GeneralKinematics(Kinematics):
     """The `Kinematics` of one chain that also tell its branches apart."""
-
-    chain: Chain
-
-    @property
-    @abstractmethod
-    def method(self) -> str:
-        """The method in words."""
 
     @property
     @abstractmethod
     def branches(self) -> tuple[str, ...]:
         """The names of the branches, in the order of the solutions."""
-
-    @abstractmethod
-    def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
-        """Return a posture for each branch; see `Kinematics.inverse`."""
-
-    @abstractmethod
-    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
-        """Return joint angles (N, branches, n) [rad]; see `Kinematics.inverse_batch`."""
 
     @property
     def swivel(self) -> int | None:

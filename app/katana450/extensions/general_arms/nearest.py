@@ -73,7 +73,7 @@ class NearestPose(Projection):
         reason: the same in words; empty if the target is met within the precision of the arm.
     """
 
-    reason: str
+    reason: str = ""
 
 
 def nearest_pose(
@@ -201,11 +201,7 @@ def projected(
         branch=branch,
         position_error=position,
         rotation_error=rotation,
-        yaw_error=0.0,
-        pitch_error=0.0,
-        roll_error=0.0,
         limits=limits,
-        axis1=False,
         reach=position > POSITION_WORTH_TELLING
         and not limits
         and is_out_of_reach(chain, np.asarray(q), reached, T),

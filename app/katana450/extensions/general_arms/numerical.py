@@ -30,7 +30,6 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.kinematics import inverse_one_by_one
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turns
 
@@ -208,10 +207,6 @@ class Numerical(GeneralKinematics):
         pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.clamp(q_hint)
         return Solutions(self.chain, pose, [self.solve(pose, hint)], self.branches)
-
-    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
-        """Return the joint angles (N, 1, n) [rad]; see `Kinematics.inverse_batch`."""
-        return inverse_one_by_one(self, T)
 
     def solve(
         self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS

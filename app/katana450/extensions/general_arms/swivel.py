@@ -43,7 +43,6 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.kinematics import inverse_one_by_one
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turns
 
@@ -185,10 +184,6 @@ class SevenAxes(GeneralKinematics):
         pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
         return Solutions(self.chain, pose, self.best(pose, hint).tolist(), self.branches)
-
-    def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
-        """Return the joint angles (N, 8, 7) [rad]; see `Kinematics.inverse_batch`."""
-        return inverse_one_by_one(self, T)
 
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
         """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,22 +17,27 @@ from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.solver import inverse
 
 
-class Kinematics(Protocol):
+@dataclass(frozen=True, eq=False)
+class Kinematics(ABC):
     """Inverse kinematics of one chain.
 
     Attributes:
         chain: the chain, whose `M` is the pose of the tool.
-        method: the method in a few words, for people.
-        branches: the branches, in the order of the solutions.
     """
 
-    @property
-    def chain(self) -> Chain: ...  # noqa: D102
-    @property
-    def method(self) -> str: ...  # noqa: D102
-    @property
-    def branches(self) -> tuple[AnyBranch, ...]: ...  # noqa: D102
+    chain: Chain
 
+    @property
+    @abstractmethod
+    def method(self) -> str:
+        """The method in a few words, for people."""
+
+    @property
+    @abstractmethod
+    def branches(self) -> tuple[AnyBranch, ...]:
+        """The branches, in the order of the solutions."""
+
+    @abstractmethod
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a solution for each branch of the pose `T` (4, 4) = T_S_tool [m].
 
@@ -44,20 +50,15 @@ class Kinematics(Protocol):
 
         Raises InputError for the first invalid pose.
         """
-
-
-def inverse_one_by_one(kinematics: Kinematics, T: npt.ArrayLike) -> FloatArray:
-    """Return `Kinematics.inverse_batch` of a method that solves one pose at a time."""
-    q = [[solution.q for solution in kinematics.inverse(pose)] for pose in validated_poses(T)]
-    return np.array(q).reshape(len(q), len(kinematics.branches), kinematics.chain.n)
+        q = [[solution.q for solution in self.inverse(pose)] for pose in validated_poses(T)]
+        return np.array(q).reshape(len(q), len(self.branches), self.chain.n)
 
 
 @dataclass(frozen=True, eq=False)
-class FiveAxisKinematics:
+class FiveAxisKinematics(Kinematics):
     """The closed form of the five-axis family behind the interface."""
 
-    chain: Chain
-    method: str = "closed form for five axes: pan, three parallel axes, roll"
+    method: ClassVar[str] = "closed form for five axes: pan, three parallel axes, roll"
     branches: ClassVar[tuple[AnyBranch, ...]] = BRANCHES
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:

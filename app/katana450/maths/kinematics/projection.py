@@ -62,12 +62,12 @@ class Projection:
     branch: AnyBranch
     position_error: float
     rotation_error: float
-    yaw_error: float
-    pitch_error: float
-    roll_error: float
-    limits: tuple[int, ...]
-    axis1: bool
-    reach: bool
+    yaw_error: float = 0.0
+    pitch_error: float = 0.0
+    roll_error: float = 0.0
+    limits: tuple[int, ...] = ()
+    axis1: bool = False
+    reach: bool = False
 
 
 def project(
