@@ -9,11 +9,17 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.commands.arm_commands import HAZARDS, ArmAct
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import clear_refusal
 from katana450.arm.control.session.supervision import CONTACT_DISTANCE
-from katana450.arm.control.state.arm_report import ACTS, ArmMode, ArmReport, MeasuredStop
+from katana450.arm.control.state.arm_report import (
+    ACTS,
+    HAZARDS,
+    ArmAct,
+    ArmMode,
+    ArmReport,
+    MeasuredStop,
+)
 from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State, Verdict

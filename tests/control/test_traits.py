@@ -10,10 +10,10 @@ import pytest
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.commands.act import Command, Traits, classes_of
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.session.plans import plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.appearance import AppearanceTrait
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.control.state.scene_objects import Attachment, SceneObject, Shape
 from katana450.arm.control.state.state import Finding, Reason, State
 from katana450.arm.runtime.mailbox import Mailbox

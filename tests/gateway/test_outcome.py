@@ -12,9 +12,9 @@ import pytest
 from msgspec.inspect import FloatType, IntType, StructType, type_info
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.control.state.messages import PRIORITIES
 from katana450.arm.control.state.state import Outcome
 from katana450.client import Client, RefusedError

@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode, ArmReport
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport
 from katana450.arm.drivers.driver import Driver, DriverAnswer
 from katana450.maths.geometry.arrays import FloatArray
 from tests.real_arm.paper_arm import JOINTS

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode, ArmReport
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport
 from katana450.extensions.real_arm.codec import replies
 from katana450.extensions.real_arm.codec.replies import ArmReply, AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (

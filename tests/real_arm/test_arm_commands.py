@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands.arm_commands import ArmAct, OperateArm
+from katana450.arm.control.commands.arm_commands import OperateArm
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.client import Client, connect
 from katana450.extensions.real_arm.codec import requests as req
 from katana450.extensions.real_arm.emulator.arm import EmulatedArm

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.errors import InputError
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.codecs import refusal_bytes, reply_bytes

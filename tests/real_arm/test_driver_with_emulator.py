@@ -11,8 +11,7 @@ from contextlib import contextmanager, nullcontext
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.extensions.real_arm.codec import requests
 from katana450.extensions.real_arm.codec.codecs import RequestReceived
 from katana450.extensions.real_arm.driver.katana_driver import MAX_SILENCE, KatanaDriver

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     CommandMotor,

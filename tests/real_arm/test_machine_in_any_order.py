@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from katana450.arm.control.commands.arm_commands import ArmAct
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.extensions.real_arm.codec.replies import AxisStatus, FirmwareError
 from katana450.extensions.real_arm.codec.requests import (
     ArmRequest,

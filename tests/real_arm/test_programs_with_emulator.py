@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import katana450.extensions.programs
-from katana450.arm.control.commands.arm_commands import ArmAct
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.control.state.state import State
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.simulation import plan_script, simulated

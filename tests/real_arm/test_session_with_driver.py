@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.commands import commands as cmd
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.control.state.state import Reason, State
 from katana450.arm.runtime.clock import MonotonicClock
 from katana450.arm.runtime.loop import ControlLoop

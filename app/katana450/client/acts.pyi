@@ -5,8 +5,8 @@ import msgspec
 import numpy.typing as npt
 
 from katana450.arm.control.commands.act import Request
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.commands.tool_commands import Frame
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.control.state.scene_objects import Attachment, Shape
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.state.arm_report import ArmReport
+from katana450.arm.control.state.arm_report import ArmAct, ArmReport
 from katana450.maths.geometry.arrays import FloatArray
 
 

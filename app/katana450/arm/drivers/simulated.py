@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from katana450.arm.control.arm import ArmModel
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.joints import JointSet
 from katana450.arm.control.session.silence import SilenceProfile
+from katana450.arm.control.state.arm_report import ArmAct
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, frozen

@@ -1,4 +1,4 @@
-"""Report of a driver on its arm: the mode, the measured joints and what they are compared with."""
+"""Acts of a person at a real arm, and the report of its driver: mode, measured and due joints."""
 
 from __future__ import annotations
 
@@ -6,8 +6,38 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.maths.geometry.arrays import FloatArray
+
+
+class ArmAct(Enum):
+    """Act of a person at a real arm."""
+
+    CONNECT = "connect"
+    """Connect to the arm, and only read it."""
+    DISCONNECT = "disconnect"
+    """End the connection."""
+    CALIBRATE = "calibrate"
+    """Let the arm find its joint angles: it moves by itself to its mechanical stops."""
+    ENGAGE = "engage"
+    """Let the motors hold the arm where it is. It must be calibrated since it was switched on."""
+    RELEASE = "release"
+    """Switch the motors off: the arm falls."""
+    UNBLOCK = "unblock"
+    """Let the arm hold again after a collision or an error."""
+
+    @property
+    def hazard(self) -> str:
+        """The hazard that a person must confirm before this act; empty if there is none."""
+        return HAZARDS.get(self, "")
+
+
+HAZARDS = {
+    ArmAct.CALIBRATE: "The arm moves by itself to its mechanical stops, for about 30 s, and may "
+    "not obey STOP meanwhile. Clear the space around it, and keep a hand on its switch.",
+    ArmAct.ENGAGE: "The joint angles are right only if the arm was calibrated since it was "
+    "switched on.",
+    ArmAct.RELEASE: "Motors off means the arm falls. Hold it by hand.",
+}
 
 
 class ArmMode(Enum):

@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.state.arm_report import ArmMode
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError, KatanaError

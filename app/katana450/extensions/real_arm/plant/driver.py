@@ -7,9 +7,8 @@ from collections import deque
 
 import numpy as np
 
-from katana450.arm.control.commands.arm_commands import ArmAct
 from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.state.arm_report import ArmMode, ArmReport, MeasuredStop
+from katana450.arm.control.state.arm_report import ArmAct, ArmMode, ArmReport, MeasuredStop
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.weight import loads_of
