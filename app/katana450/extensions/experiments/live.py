@@ -28,7 +28,8 @@ def run_live(text: str, script: Script, options: Namespace) -> int:
     """Run ``text`` on the server at ``options.url``; return the exit status. Raises KatanaError."""
     with _server_at(script, options) as url, connect(url, NAME, options.token) as arm:
         try:
-            _send_script(arm, text, options)
+            # ``options.scene`` replaces the scene of the script.
+            arm.send_script(text if options.scene is None else without_scene(text), options.speed)
             _planned_program(arm)
             arm.ask(Steer(order=ProgramOrder.RUN, unattended=options.unattended))
             _follow(arm)
@@ -52,19 +53,11 @@ def _runs(arm: Client) -> bool:
     return program is not None and program.unattended
 
 
-def _send_script(arm: Client, text: str, options: Namespace) -> None:
-    """Send the script, which the server then plans. ``options.scene`` replaces its own scene."""
-    if options.scene is not None:
-        text = without_scene(text)
-    arm.send_script(text, options.speed)
-
-
 def _planned_program(arm: Client) -> None:
     """Wait until the script is planned. Raises KatanaError with its errors."""
     while (now := arm.query(answers.State).program) is not None and now.status == "planning":
         if now.steps and sys.stderr.isatty():
-            line = f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}"
-            print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
+            _show(f"{now.task}, step {now.step} of {now.steps}, {now.fraction:4.0%}")
         time.sleep(1.0 / PROGRESS_RATE)
     # A program that runs at once may have ended already.
     if now is None or now.status in UNPLANNED_STATUSES:
@@ -84,7 +77,7 @@ def _follow(arm: Client) -> None:
         if now.status != "running":
             line += f" ({now.status})"
         if terminal:
-            print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
+            _show(line)
         elif f"{now.step} {now.task}" != shown:
             shown = f"{now.step} {now.task}"
             print(line, flush=True)
@@ -96,6 +89,11 @@ def _follow(arm: Client) -> None:
             print("Done.")
             return
     raise LostError("The server closed the connection.")
+
+
+def _show(line: str) -> None:
+    """Show ``line`` in place of the last one of the terminal."""
+    print(f"\r{line:<70}", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager

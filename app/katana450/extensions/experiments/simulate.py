@@ -17,7 +17,7 @@ from katana450.arm.robot.props import load_props
 from katana450.cli.version import version
 from katana450.extensions.importers.formats.scene_file import load_initial_scene
 from katana450.extensions.media.report import NONE, Report
-from katana450.extensions.programs.building.actions import FollowPlan, Task
+from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.run.compiler import ConditionalJump
 from katana450.extensions.programs.run.measured_run import MeasuredRun
 from katana450.extensions.programs.run.program import Program
@@ -108,14 +108,12 @@ def _begin(session: Session, scene: Path) -> State:
 
 def _choices(program: Program, simulation: Simulation) -> Iterator[str]:
     """Yield which alternative the simulation has taken at each ``if``."""
-    tasks = {task.number: task for task in program.tasks if _is_choice(task)}
+    tasks = {
+        task.number: task for task in program.tasks if isinstance(task.action, ConditionalJump)
+    }
     for number, held in simulation.run.choices:
         task = tasks[number]
         yield f"Line {task.line}, {task.name}: {'then' if held else 'else'}."
-
-
-def _is_choice(task: Task) -> bool:
-    return isinstance(task.action, ConditionalJump)
 
 
 def _print_tasks(program: Program) -> None:
