@@ -187,7 +187,7 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
     program = planned(stage, text, empty)
     run, _ = stage.play(program, empty)
     assert run.choices == ((1, holds),)
-    taken = program.tasks[program.predicted[-1]].action
+    taken = program.tasks[program.schedule[-1].number].action
     assert taken.fraction(empty, 0.1) == (1.0 if holds else 0.5)
 
 

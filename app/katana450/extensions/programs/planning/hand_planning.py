@@ -211,20 +211,15 @@ class HandPlanning:
             turn = self.plane.turn(middle, self.plane.beside_at(R, inside))
         return self.planning.target(frozen(middle - so3.rotation_z(turn) @ R @ inside), R)
 
-    def drawn_back(self, q: FloatArray, away: float) -> ToolTarget:
-        """Return the tool at `q`, drawn back by ``away`` [m] along x of the grasp frame."""
-        target = self.planning.at(q)
-        return target.moved(frozen(target.position - away * self._R(q)[:, 0]))
-
     def retreat(self, q: FloatArray, away: float) -> ToolTarget:
         """Return the tool with which the hand leaves an object that it released at `q`.
 
         It is drawn back by ``away`` [m] and, for a fixed jaw, moved by JAW_ROOM along -y of the
         grasp frame, so that this jaw leaves the object.
         """
-        back = self.drawn_back(q, away)
-        aside = JAW_ROOM * self._R(q)[:, 1]
-        return back.moved(frozen(back.position - aside)) if self.one_jaw else back
+        target, (x, y, _) = self.planning.at(q), self._R(q).T
+        aside = JAW_ROOM if self.one_jaw else 0.0
+        return target.moved(frozen(target.position - away * x - aside * y))
 
     def branches_to(self, q: FloatArray, target: ToolTarget) -> Sequence[AnyBranch | None]:
         """Return the branches on which a grasp at ``target`` is tried, that of `q` first.

@@ -129,11 +129,6 @@ class Program:
                     latest[following] = end, speed
         return latest[len(self.tasks)][0]
 
-    @property
-    def predicted(self) -> tuple[int, ...]:
-        """The tasks that are executed if all is as predicted, in their order."""
-        return tuple(task.number for task in self.schedule)
-
     @cached_property
     def schedule(self) -> tuple[ExpectedTask, ...]:
         """The predicted tasks in their order, with their expected times."""

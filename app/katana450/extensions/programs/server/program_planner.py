@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 from enum import Enum
+from functools import partial
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.state import State
@@ -122,33 +123,19 @@ class Planning:
     def progress(self, by: str) -> answers.Progress:
         """Return the progress of a program that has not begun. ``by`` is its owner's name."""
         program, now = self.program, self.stage
-        if self.cancelled is not None or self.refused is not None:
-            stage = PlanningPhase.REFUSED if self.cancelled is None else PlanningPhase.CANCELLED
-            why = self.cancelled or self.refused or ""
-            return answers.Progress(name=self.name, by=by, status=stage.value, why=why)
-        if program is None:
-            return answers.Progress(
-                name=self.name,
-                by=by,
-                status=PlanningPhase.PLANNING.value,
-                step=0 if now is None else now.step,
-                steps=0 if now is None else now.steps,
-                task="" if now is None else now.phase,
-                fraction=0.0 if now is None else now.fraction,
-                why=self.note,
-            )
-        return answers.Progress(
-            name=program.name,
-            by=by,
-            status=PlanningPhase.READY.value,
-            steps=program.steps,
-            seconds=program.duration,
-            why=self.note or " ".join(program.notes),
-        )
-
-    def report(self, stage: PlanningStage) -> None:
-        """Show ``stage``, which begins."""
-        self.stage = stage
+        progress = partial(answers.Progress, name=self.name, by=by)
+        if self.cancelled is not None:
+            return progress(status=PlanningPhase.CANCELLED.value, why=self.cancelled)
+        if self.refused is not None:
+            return progress(status=PlanningPhase.REFUSED.value, why=self.refused)
+        if program is not None:
+            why = self.note or " ".join(program.notes)
+            status, steps, seconds = PlanningPhase.READY.value, program.steps, program.duration
+            return progress(status=status, steps=steps, seconds=seconds, why=why)
+        planning = partial(progress, status=PlanningPhase.PLANNING.value, why=self.note)
+        if now is None:
+            return planning()
+        return planning(step=now.step, steps=now.steps, task=now.phase, fraction=now.fraction)
 
     def _plan(self, job: Callable[[Planning], Program]) -> None:
         try:
@@ -312,7 +299,8 @@ class ProgramPlanner:
             planning.name = script.name
             if script.scene is not None:
                 script.scene.check_present(context.session, state)
-            return compiled(script, context, state, speed, planning.report, first_step=first_step)
+            report = partial(setattr, planning, "stage")
+            return compiled(script, context, state, speed, report, first_step=first_step)
 
         self.planning = Planning(
             text, speed, state, job, self._hub.clock, note, first_step=first_step
