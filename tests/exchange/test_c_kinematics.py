@@ -137,16 +137,9 @@ def compare(compiled: Compiled, chain: Chain, poses: int, seed: int) -> dict[str
 
 
 @needs("gcc")
-def test_katana_has_the_same_answers(katana: Robot, katana_in_c: Compiled) -> None:
-    worst = compare(katana_in_c, katana.require_arm().chain, 200, 450)
-    assert max(worst.values()) <= SAME
-
-
-@needs("gcc")
-@pytest.mark.long
-def test_katana_has_the_same_answers_at_10_000_poses(katana: Robot, katana_in_c: Compiled) -> None:
-    worst = compare(katana_in_c, katana.require_arm().chain, 10_000, 22)
-    print({name: f"{value:.2g}" for name, value in worst.items()})
+@pytest.mark.parametrize("poses", [200, pytest.param(10_000, marks=pytest.mark.long)])
+def test_katana_has_the_same_answers(katana: Robot, katana_in_c: Compiled, poses: int) -> None:
+    worst = compare(katana_in_c, katana.require_arm().chain, poses, 450)
     assert max(worst.values()) <= SAME
 
 

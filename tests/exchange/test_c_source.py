@@ -1,4 +1,4 @@
-"""Tests of the C export: compiles without warnings, draws correctly and fast, follows a server."""
+"""Tests of the C export: compiles without warnings, draws correctly, follows a server."""
 
 from __future__ import annotations
 
@@ -21,15 +21,7 @@ from tests.exchange.conftest import GANTRY, GANTRY_POSE, POSES
 from tests.exchange.silhouette import SIZE, overlap, placed, seen, silhouette
 from tests.exchange.tools import SCREEN, VIEWER, needs, run
 
-resource = pytest.importorskip("resource")
-
 pytestmark = pytest.mark.long
-
-BUILD = 20.0
-"""[s] Maximum processor time of a build."""
-
-FRAME = 1.0 / 30.0
-"""[s] Maximum processor time of a picture."""
 
 
 def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
@@ -39,19 +31,11 @@ def written(folder: Path, robot: Robot, pose: tuple[float, ...]) -> Path:
     return folder
 
 
-def processor() -> float:
-    """Return the processor time [s] of all children that have ended."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return float(used.ru_utime + used.ru_stime)
-
-
 @pytest.fixture(scope="module")
 def viewer(tmp_path_factory: pytest.TempPathFactory, katana: Robot) -> Path:
     """Return the Katana's viewer, built by gcc."""
     folder = written(tmp_path_factory.mktemp("c"), katana, POSES[1])
-    before = processor()
     run("make", "viewer", "CC=gcc", "CFLAGS=-O2 -Werror", folder=folder, seconds=120.0)
-    assert processor() - before < BUILD
     return folder / "viewer"
 
 
@@ -111,18 +95,6 @@ def test_kinematics_build_without_opengl(tmp_path: Path, katana: Robot) -> None:
     run("cmake", "--build", tmp_path / "build")
     assert (tmp_path / "build" / "libkinematics.a").is_file()
     assert not (tmp_path / "build" / "viewer").exists()
-
-
-@needs(*VIEWER)
-def test_a_picture_is_quick(viewer: Path) -> None:
-    """Processor time is measured, because the machine may be shared."""
-    used = []
-    for frames in (20, 70):
-        before = processor()
-        output = run(*SCREEN, viewer, "--size", f"{SIZE}x{SIZE}", "--frames", str(frames))
-        used.append(processor() - before)
-        assert re.fullmatch(r"[0-9.]+ frames/s\n", output)
-    assert (used[1] - used[0]) / 50.0 < FRAME
 
 
 @needs(*VIEWER)

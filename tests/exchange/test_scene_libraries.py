@@ -22,13 +22,16 @@ WORD = re.compile(r'"(?:[^"\\]|\\.)*"|[^\s,\[\]{}"]+')
 
 NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?")
 
-TRIANGLES = """\
-import array, sys
+OPENED = """\
+import array, json, sys
 from pivy import coin
 source = coin.SoInput()
 assert source.openFile(sys.argv[1])
 world = coin.SoDB.readAll(source)
 world.ref()
+"""
+
+TRIANGLES = """\
 numbers = array.array("d")
 def keep(_, action, *corners):
     matrix = action.getModelMatrix()
@@ -41,12 +44,6 @@ numbers.tofile(open(sys.argv[2], "wb"))
 """
 
 PLACES = """\
-import json, sys
-from pivy import coin
-source = coin.SoInput()
-assert source.openFile(sys.argv[1])
-world = coin.SoDB.readAll(source)
-world.ref()
 found = {}
 for name in sys.argv[2:]:
     node = coin.SoNode.getByName(name)
@@ -93,7 +90,7 @@ def exported(folder: Path, pose: tuple[float, ...]) -> Path:
 @pytest.mark.parametrize("pose", POSES)
 def test_coin_places_every_triangle(tmp_path: Path, katana: Robot, pose: tuple[float, ...]) -> None:
     """Its pictures stay black without a graphics card, so its triangles are compared."""
-    (tmp_path / "triangles.py").write_text(TRIANGLES)
+    (tmp_path / "triangles.py").write_text(OPENED + TRIANGLES)
     found = tmp_path / "triangles.bin"
     run(PYTHON, tmp_path / "triangles.py", exported(tmp_path, pose), found)
     points = np.fromfile(found).reshape(-1, 3)
@@ -113,7 +110,7 @@ def test_coin_places_the_tool_and_every_link_by_name(
     tmp_path: Path, katana: Robot, pose: tuple[float, ...]
 ) -> None:
     """Read absolute poses as Simulink's VR Source does by `tcp.translation_abs`."""
-    (tmp_path / "places.py").write_text(PLACES)
+    (tmp_path / "places.py").write_text(OPENED + PLACES)
     links = [link.name for link in katana.links]
     assert {"tcp", "flange"} < set(links)
     printed = run(PYTHON, tmp_path / "places.py", exported(tmp_path, pose), *links)

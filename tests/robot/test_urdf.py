@@ -1,27 +1,18 @@
-"""A URDF file is read once, by yourdfpy, and its plain values are complete."""
+"""A URDF file is read by yourdfpy, as plain values that are complete."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
-from xml.parsers import expat
 
 import pytest
-import yourdfpy
 
-from katana450 import disk_cache
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.urdf import Urdf, urdf_of
 from katana450.arm.robot.visual import GREY
 from katana450.errors import RobotDescriptionError
-from katana450.extensions.export.c_source import c_files
-from katana450.extensions.export.glb import glb_files
-from katana450.extensions.export.vrml.vrml_files import vrml_files, world_of
-from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from tests.exchange.conftest import GANTRY
 from tests.robot.public_arms import PX150, J, urdf, written
 
 ARMS = Path(__file__).parent / "arms"
@@ -79,37 +70,6 @@ def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("path", [URDF_PATH, GANTRY])
-def test_file_is_parsed_once(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    opened: list[object] = []
-    create = expat.ParserCreate
-
-    def counted(*args: str | None, **options: str | None) -> expat.XMLParserType:
-        opened.append(args)
-        return create(*args, **options)  # type: ignore[arg-type]
-
-    parse = yourdfpy.URDF.load
-
-    def parsed(file: Any, **options: bool) -> yourdfpy.URDF:
-        opened.append(file)
-        return parse(file, **options)
-
-    # Nothing is kept from an earlier test.
-    monkeypatch.setattr(disk_cache, "_folder", lambda: None)
-    monkeypatch.setattr(expat, "ParserCreate", counted)
-    monkeypatch.setattr(yourdfpy.URDF, "load", parsed)
-    robot = load(path)
-    values = robot.values(())
-    for files in (
-        vrml_files(robot, world_of(robot, values)),
-        c_files(robot, values),
-        glb_files(robot, values),
-    ):
-        assert all(files.values())
-    # One pass of the checks, one of yourdfpy.
-    assert len(opened) == 2
-
-
 def test_libraries_are_loaded_when_they_are_needed() -> None:
     script = (
         "import sys; from katana450.arm.robot.loader import load;"
@@ -151,17 +111,6 @@ def test_file_that_yourdfpy_reads_in_part_is_refused(tmp_path: Path, part: str) 
     path.write_text(f"<robot name='far'><link name='root'/>{part}</robot>")
     with pytest.raises(RobotDescriptionError, match=r"far\.urdf cannot be read"):
         load(path)
-
-
-def test_robot_without_arm_says_why() -> None:
-    robot = load(GANTRY)
-    assert robot.arm is None
-    with pytest.raises(
-        RobotDescriptionError, match=r"gantry\.urdf has 2 axes \(rail.*only by turning"
-    ):
-        robot.require_arm()
-    assert robot.why.startswith("gantry.urdf has 2 axes")
-    assert load().why == ""
 
 
 def test_joint_that_cannot_be_moved_rests_in_an_arm_and_in_no_export(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.control.joints import JointSet
+from katana450.arm.control.state.messages import axis_names
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.visual import Visual
@@ -234,6 +235,15 @@ class Robot:
             speed=frozen([_speed(joint) for joint in driven]),
             why=self.why,
         )
+
+    @property
+    def joint_labels(self) -> tuple[str, ...]:
+        """Label of each joint that is driven: its number, as in messages, and its name.
+
+        Joints of an arm that the file only numbers have the names of a five-axis arm.
+        """
+        names = self.joint_group.names if self.arm is None else axis_names(self.arm.chain.names)
+        return tuple(f"{number} {name}" for number, name in enumerate(names, start=1))
 
     @property
     def joint_notes(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from katana450.arm.control.state.arm_report import ArmReport
 from katana450.arm.control.state.margins import Margins
 from katana450.arm.control.state.messages import MAX_CONDITION, finding_text, sentence
 from katana450.arm.control.state.solid import Colour
-from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.loop_timing import LoopTiming
@@ -253,7 +252,7 @@ def _joint_links(robot: Robot, names: Sequence[str]) -> list[answers.JointLink]:
             path=[member.name for member in robot.path_to(moved[name])],
             axis=robot.joints[name].axis.tolist(),
         )
-        for name, label in zip(names, joint_labels(robot), strict=True)
+        for name, label in zip(names, robot.joint_labels, strict=True)
     ]
 
 

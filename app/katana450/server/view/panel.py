@@ -12,7 +12,6 @@ import viser
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.messages import degrees, millimetres, signed
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.joint_labels import joint_labels
 from katana450.arm.robot.robot import Robot
 from katana450.server.view import readout
 from katana450.server.view.branches import BranchList, Find
@@ -61,7 +60,7 @@ class Panel:
         """
         self._robot, self._gui = robot, server.gui
         self._model = robot.joint_group if robot.arm is None else robot.arm
-        self._labels, self._per_si = joint_labels(robot), readout.per_si(self._model.slides)
+        self._labels, self._per_si = robot.joint_labels, readout.per_si(self._model.slides)
         listen = listener(gestures)
         self._shown_at = -math.inf
         for caution in robot.cautions:

@@ -67,28 +67,20 @@ def _numbers(words: list[str]) -> list[float]:
     return [number for number in numbers if math.isfinite(number)]
 
 
-IGNORED_STATEMENTS = frozenset(
-    [
-        *("vt", "vn", "vp", "g", "o", "s", "mg", "usemap", "maplib", "bevel", "c_interp"),
-        *("d_interp", "lod", "shadow_obj", "trace_obj"),
-    ]
-)
-"""Statements that change no surface."""
+FREE_FORM = """
+cstype deg bmat step curv curv2 surf parm trim hole scrv sp end con res bzp bsp cdc cdp ctech stech
+"""
+
+NO_SURFACE = """
+vt vn vp g o s mg usemap maplib bevel c_interp d_interp lod shadow_obj trace_obj
+"""
 
 LEFT_OUT = {
-    "p": "points",
-    "l": "lines",
-    "call": "other files that it calls",
-    "csh": "commands",
-    **dict.fromkeys(
-        [
-            *("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole"),
-            *("scrv", "sp", "end", "con", "res", "bzp", "bsp", "cdc", "cdp", "ctech", "stech"),
-        ],
-        "free-form curves and surfaces",
-    ),
+    **dict.fromkeys(NO_SURFACE.split(), ""),
+    **dict.fromkeys(FREE_FORM.split(), "free-form curves and surfaces"),
+    **{"p": "points", "l": "lines", "call": "other files that it calls", "csh": "commands"},
 }
-"""Statements that are not read, and their names in messages."""
+"""Statements that are not read, and their names in messages; empty if they change no surface."""
 
 
 def read_obj(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:
@@ -135,9 +127,9 @@ class _Lines:
             self._paint = self._materials.get(" ".join(words[1:]), PLAIN)
         elif kind == "mtllib":
             self._library(words[1:])
-        elif kind in LEFT_OUT:
+        elif LEFT_OUT.get(kind):
             self._left_out[LEFT_OUT[kind]] += 1
-        elif kind not in IGNORED_STATEMENTS:
+        elif kind not in LEFT_OUT:
             raise self._wrong(line, f"{kind[:20]!r} is not an OBJ statement")
 
     def reading(self) -> MeshReading:
