@@ -71,7 +71,7 @@ def test_a_bent_extrusion_is_a_mitred_tube() -> None:
 def test_the_sides_of_solids_can_be_left_out() -> None:
     tube = shown("Cylinder { bottom FALSE top FALSE }")
     disc = shown("Cylinder { side FALSE top FALSE }")
-    assert (len(tube.faces), len(disc.faces)) == (64, 30)
+    assert (len(tube.faces), len(disc.faces)) == (64, 32)
     assert sides(disc)[1] == 0.0
 
 

@@ -208,9 +208,10 @@ def of_script(name: str, urdf: Path) -> Playback:
 def of_pose(pose: Sequence[float], urdf: Path) -> Playback:
     """Return the robot at rest with its driven joints at ``pose`` [rad, m]; ready if empty."""
     robot, session = _described(urdf)
-    if not pose:
-        return Playback(robot, session, [_at_rest(session)], 1.0)
-    return Playback(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
+    if pose:
+        return Playback(robot, session, [_standing(robot, session, robot.values(pose))], 1.0)
+    gripper = 0.0 if session.arm is None else session.arm.gripper.clamp(0.0)
+    return Playback(robot, session, [session.begin(session.ready, gripper, 0.0)], 1.0)
 
 
 def of_trajectory(path: Path, urdf: Path) -> Playback:
@@ -231,12 +232,6 @@ def _described(urdf: Path) -> tuple[Robot, Session]:
     for note in notes:
         print(f"katana450: {note}", file=sys.stderr)
     return robot, session
-
-
-def _at_rest(session: Session) -> State:
-    """Return the state of an arm at rest in its ready posture."""
-    gripper = 0.0 if session.arm is None else session.arm.gripper.clamp(0.0)
-    return session.begin(session.ready, gripper, 0.0)
 
 
 def _standing(robot: Robot, session: Session, values: dict[str, float], t: float = 0.0) -> State:

@@ -23,6 +23,7 @@ from katana450.extensions.importers.formats.gltf_document import (
 )
 from katana450.extensions.importers.formats.surface import (
     MAX_COPIES,
+    NOTHING,
     MeshBuilder,
     MeshReading,
     MeshSurface,
@@ -40,10 +41,6 @@ MESHOPT = "_meshopt_compression"
 
 NO_SURFACE = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture", "KHR_techniques_")
 """Prefixes of required extensions that change no surface, and are not reported."""
-
-
-NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-"""The surface of a primitive without vertices."""
 
 
 def read_gltf(data: bytes, name: str, companions: Companions | None = None) -> MeshReading:

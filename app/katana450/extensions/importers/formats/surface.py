@@ -190,6 +190,10 @@ class MeshSurface:
         return MeshSurface(vertices, faces, None if self.colours is None else self.colours[whole])
 
 
+NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+"""The surface of a part without vertices or size."""
+
+
 def _used(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Return the vertices that ``faces`` use, and ``faces`` with the new indices."""
     used = np.zeros(len(vertices), dtype=bool)

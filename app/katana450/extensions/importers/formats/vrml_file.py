@@ -10,7 +10,8 @@ from __future__ import annotations
 import posixpath
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from katana450.extensions.export.vrml.vrml_world import HEADER, Node, Value
 from katana450.extensions.importers.archive import Companions
 from katana450.extensions.importers.formats.surface import (
     MAX_COPIES,
+    NOTHING,
     MeshBuilder,
     MeshReading,
     MeshSurface,
@@ -31,9 +33,6 @@ from katana450.maths.geometry.arrays import FloatArray, IntArray
 
 ROUND = 32
 """Number of sides that approximate a circle."""
-
-NOTHING = MeshSurface(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
-"""The surface of a node without a size."""
 
 LENGTHS = {
     "Box": ("size",),
@@ -113,14 +112,18 @@ def _box(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
 
 def _cone(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     radius, height = number(node, "bottomRadius", 1.0), number(node, "height", 2.0)
-    ring = [(radius, -height / 2.0), (0.0, height / 2.0)]
-    return _turned(ring, flag(node, "bottom"), flag(node, "side"), False, name)
+    low, tip = (radius, -height / 2.0), (0.0, height / 2.0)
+    bottom, side = flag(node, "bottom"), flag(node, "side")
+    return _turned([((0.0, low[1]), low)] * bottom + [(low, tip)] * side, name)
 
 
 def _cylinder(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     radius, height = number(node, "radius", 1.0), number(node, "height", 2.0)
-    ring = [(radius, -height / 2.0), (radius, height / 2.0)]
-    return _turned(ring, flag(node, "bottom"), flag(node, "side"), flag(node, "top"), name)
+    low, high = (radius, -height / 2.0), (radius, height / 2.0)
+    segments = [((0.0, low[1]), low)] * flag(node, "bottom")
+    segments += [(low, high)] * flag(node, "side")
+    segments += [(high, (0.0, high[1]))] * flag(node, "top")
+    return _turned(segments, name)
 
 
 def _sphere(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
@@ -128,41 +131,20 @@ def _sphere(node: Node, name: str, _left_out: Counter[str]) -> MeshSurface:
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, ROUND // 2 + 1)
     profile = np.column_stack((np.cos(angles), np.sin(angles))) * radius
     profile[[0, -1], 0] = 0.0
-    return _turned(profile, False, True, False, name)
+    return _turned(pairwise(map(tuple, profile.tolist())), name)
 
 
-def _turned(
-    profile: Sequence[tuple[float, float]] | FloatArray,
-    bottom: bool,
-    side: bool,
-    top: bool,
-    name: str,
-) -> MeshSurface:
-    """Return the surface of a profile (k, 2) of radius and y, bottom to top, turned about y."""
-    outline = np.asarray(profile, dtype=np.float64)
+def _turned(segments: Iterable[tuple[Sequence[float], Sequence[float]]], name: str) -> MeshSurface:
+    """Return the surface of segments, each of two points (radius, y) upwards, turned about y."""
     turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
     ring = np.column_stack((np.sin(turn), np.zeros(ROUND), np.cos(turn)))
-    points = (outline[:, None, :1] * ring + outline[:, None, 1:] * (0.0, 1.0, 0.0)).reshape(-1, 3)
-    corners: list[IntArray] = []
-    sizes: list[int] = []
+    rings = [radius * ring + (0.0, y, 0.0) for segment in segments for radius, y in segment]
     corner, next_corner = np.arange(ROUND), np.roll(np.arange(ROUND), -1)
-    if side:
-        for row in range(len(outline) - 1):
-            low, high = row * ROUND, (row + 1) * ROUND
-            quads = np.column_stack(
-                (low + corner, low + next_corner, high + next_corner, high + corner)
-            )
-            corners.append(quads.ravel())
-            sizes += [4] * ROUND
-    if bottom:
-        corners.append(corner[::-1])
-        sizes.append(ROUND)
-    if top:
-        corners.append((len(outline) - 1) * ROUND + corner)
-        sizes.append(ROUND)
-    flat = np.concatenate([np.zeros(0, dtype=np.int64), *corners])
+    quads = np.column_stack((corner, next_corner, ROUND + next_corner, ROUND + corner)).ravel()
+    corners = quads + 2 * ROUND * np.arange(len(rings) // 2)[:, None]
+    points = np.concatenate([np.zeros((0, 3)), *rings])
     # At the axis, two corners are one.
-    return of_polygons(points, flat, np.array(sizes, dtype=np.int64), name).tidy()
+    return of_polygons(points, corners.ravel(), np.full(corners.size // 4, 4), name).tidy()
 
 
 def _face_set(node: Node, name: str, left_out: Counter[str]) -> MeshSurface:
