@@ -15,7 +15,7 @@ from starlette.routing import BaseRoute
 from katana450.arm.control.commands.act import Request, Traits
 from katana450.errors import InputError, KatanaError, LeaseError
 from katana450.extensions.late_routes import LateRoutes
-from katana450.extensions.robot_choice.robot_check import checked_robot
+from katana450.extensions.robot_choice.robot_check import FIRST, OWN, checked_robot, first_robot
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers
 from katana450.server.api.fields import ROOT
@@ -23,9 +23,6 @@ from katana450.server.service.hub import Hub
 from katana450.server.service.participants import Participant
 from katana450.server.service.runner import RequestHandler
 from katana450.server.web.http_api import RouteContext
-
-OWN, FIRST = "katana450", "first"
-"""Names of the robot of this distribution, and of that with which the server began."""
 
 Text = Annotated[str, Meta(max_length=200)]
 
@@ -61,11 +58,6 @@ def late_routes(context: RouteContext) -> list[BaseRoute]:
         return routes(context)
 
     return LateRoutes([f"{ROOT}/robots"], make).routes()
-
-
-def first_robot(options: Namespace) -> Path:
-    """Return the file of the robot with which the server began, as its ``options`` name it."""
-    return Path(getattr(options, "first_urdf", options.urdf))
 
 
 class RobotChoice(RequestHandler):

@@ -1,6 +1,6 @@
-"""A trial of reading a robot in a disposable process, before a server changes to it.
+"""The robot at the start, and a trial of reading another in a disposable process.
 
-``checked_robot`` starts it as ``python -m katana450.extensions.robot_choice.robot_check FILE
+``checked_robot`` starts the trial as ``python -m katana450.extensions.robot_choice.robot_check FILE
 NAME:=VALUE``. It limits its memory and time, reads the robot as the server will, and writes JSON to
 standard output: {"urdf": path}, or {"why": reason}.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from argparse import Namespace
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
@@ -18,11 +19,19 @@ from katana450.arm.robot.visual import mesh_file
 from katana450.errors import InputError, KatanaError
 from katana450.platform_support import hanging_time, limit_resources
 
+OWN, FIRST = "katana450", "first"
+"""Names of the robot of this distribution, and of that with which the server began."""
+
 SECONDS = 30.0
 """[s] Maximum processor time of reading a robot."""
 
 MAX_MEMORY_BYTES = 4 << 30
 """[bytes] Maximum memory for reading a robot."""
+
+
+def first_robot(options: Namespace) -> Path:
+    """Return the file of the robot with which the server began, as its ``options`` name it."""
+    return Path(getattr(options, "first_urdf", options.urdf))
 
 
 def checked_robot(path: Path, arguments: Mapping[str, str]) -> Path:

@@ -17,7 +17,7 @@ from katana450.arm.control.actor import CommandChannel
 from katana450.errors import ConfigurationError, InputError
 from katana450.extensions.gallery.arms_command import listed_robots
 from katana450.extensions.importers.archive import MAX_ARCHIVE_BYTES, ChoiceError
-from katana450.extensions.robot_choice.choose_robot import FIRST, OWN, first_robot
+from katana450.extensions.robot_choice.robot_check import FIRST, OWN, first_robot
 from katana450.extensions.robot_choice.uploaded_robots import keep_robot, uploaded_robots
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers
