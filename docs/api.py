@@ -206,7 +206,7 @@ def page() -> str:
 def added_requests() -> dict[str, tuple[type[Request], ...]]:
     """Return the requests of extensions, by the name of the extension, as a server has them."""
     parts = sorted(extensions(), key=lambda extension: not extension.runner)
-    classes = {each.name: each.runner or each.handler for each in parts}
+    classes = {part.name: part.runner or part.handler for part in parts}
     return {name: load(target).request_types for name, target in classes.items() if target}
 
 
@@ -234,16 +234,16 @@ def _json(value: Any) -> str:
 def _shape(schema: dict[str, Any]) -> str:
     if "$ref" in schema:
         name: str = schema["$ref"].rpartition("/")[2]
-        added = (sys.modules[each[0].__module__] for each in added_requests().values())
+        added = (sys.modules[parts[0].__module__] for parts in added_requests().values())
         places = (requests, answers, *added)
-        kind: Any = next((vars(each)[name] for each in places if name in vars(each)), None)
+        kind: Any = next((vars(place)[name] for place in places if name in vars(place)), None)
         if hasattr(kind, "__members__"):
-            return " or ".join(f'`"{each.value}"`' for each in kind)
+            return " or ".join(f'`"{member.value}"`' for member in kind)
         return name
     if "anyOf" in schema:
-        return " or ".join(_shape(each) for each in schema["anyOf"])
+        return " or ".join(_shape(choice) for choice in schema["anyOf"])
     if "enum" in schema:
-        return " or ".join(f'`"{each}"`' for each in schema["enum"])
+        return " or ".join(f'`"{value}"`' for value in schema["enum"])
     if schema.get("type") == "array":
         item = schema["items"] or schema["prefixItems"][0]
         length = schema.get("minItems")

@@ -168,7 +168,7 @@ def instruments(page: ViserPage) -> None:
 
 def send(arm: Client, text: str) -> None:
     """Send the text of a script to the server, which plans it."""
-    parts = [text[at : at + 600] for at in range(0, len(text), 600)]
+    parts = [text[start : start + 600] for start in range(0, len(text), 600)]
     for number, part in enumerate(parts, start=1):
         arm.ask(Program(text=part, more=number < len(parts), speed=SPEED))
 

@@ -78,9 +78,9 @@ def kind_of(nodeid: str) -> str:
     path = PurePath(nodeid.partition("::")[0])
     if path.parent == GATEWAY:
         return SERVERS[path.name >= SECOND_HALF] if starts_servers(path) else IN_PROCESS
-    for each in (path, *path.parents):
-        if each.as_posix() in KINDS:
-            return KINDS[each.as_posix()]
+    for place in (path, *path.parents):
+        if place.as_posix() in KINDS:
+            return KINDS[place.as_posix()]
     return path.as_posix()
 
 

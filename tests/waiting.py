@@ -14,11 +14,11 @@ PERIOD = 0.02
 
 def until(true: Callable[[], object], seconds: float = 20.0) -> float:
     """Wait until ``true`` returns a true value; return the time that it took [s]."""
-    begun = time.monotonic()
+    start = time.monotonic()
     while not true():
-        assert time.monotonic() - begun < seconds
+        assert time.monotonic() - start < seconds
         time.sleep(PERIOD)
-    return time.monotonic() - begun
+    return time.monotonic() - start
 
 
 def state_when(

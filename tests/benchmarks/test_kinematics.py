@@ -56,9 +56,9 @@ def test_wrong_answers_and_doubles_do_not_count() -> None:
     right = inverse(chain, task.T[0])[0].q
     turned = right + np.array([2.0 * np.pi, 0.0, 0.0, 0.0, 0.0])
     wrong = right + np.array([0.0, 2.0 * SOLVED_POSITION, 0.0, 0.0, 2e-5])
-    found = quality(chain, task.T, [np.array([right, turned, wrong])])
-    assert found.branches == 1.0
-    assert found.worst > 1e-7
+    figures = quality(chain, task.T, [np.array([right, turned, wrong])])
+    assert figures.branches == 1.0
+    assert figures.worst > 1e-7
     missed = quality(chain, task.T, [np.array([wrong])])
     assert missed.solved == missed.branches == missed.usable == 0.0
     assert quality(chain, task.T, [np.empty((0, 5))]).solved == 0.0

@@ -52,7 +52,7 @@ def test_arms_have_their_published_dimensions(arm: ArmData, published: Chain) ->
 
 
 def test_closed_form_and_search_solve_the_poses() -> None:
-    entries = [each for each in (*CLOSED, *NUMERICAL) if each.peer is None]
+    entries = [solver for solver in (*CLOSED, *NUMERICAL) if solver.peer is None]
     rows = measured(UR5E, entries, UR5E.task(random_postures(12)), 2, NOWHERE)
     assert [row.failed for row in rows] == ["", "", "", ""]
     for row in rows:

@@ -48,20 +48,22 @@ def code_blocks(*languages: str) -> list[CodeBlock]:
     return [
         CodeBlock(
             document.relative_to(ROOT).as_posix(),
-            text[: found.start()].count("\n") + 1,
-            found[1].strip(),
-            found[2],
+            text[: fence.start()].count("\n") + 1,
+            fence[1].strip(),
+            fence[2],
         )
         for document in DOCUMENTS
         for text in [document.read_text(encoding="utf-8")]
-        for found in FENCE.finditer(text)
-        if not languages or found[1].strip() in languages
+        for fence in FENCE.finditer(text)
+        if not languages or fence[1].strip() in languages
     ]
 
 
 def code_block(document: str, start: str) -> CodeBlock:
     """Return the block of a document whose text begins with ``start``."""
-    (found,) = (
-        each for each in code_blocks() if each.document == document and each.text.startswith(start)
+    (block,) = (
+        candidate
+        for candidate in code_blocks()
+        if candidate.document == document and candidate.text.startswith(start)
     )
-    return found
+    return block

@@ -134,7 +134,7 @@ def run(command: str) -> str:
 def test_every_block_names_a_language_that_is_checked_or_has_a_reason() -> None:
     blocks = code_blocks()
     assert len(blocks) > 25
-    unknown = [str(each) for each in blocks if each.language not in CHECKED | set(NOT_CHECKED)]
+    unknown = [str(block) for block in blocks if block.language not in CHECKED | set(NOT_CHECKED)]
     assert not unknown, f"name the language behind the fence; one of {sorted(CHECKED)} if it can be"
 
 
@@ -223,9 +223,9 @@ def test_requests_of_the_shell_are_answered(server: AppServer) -> None:
     block = code_block("docs/api.md", "KEY=")
     printed = run(block.text.replace(PRINTED_URL, server.url)).replace("}{", "}\n{")
     *motions, state = map(json.loads, printed.splitlines())
-    ends = [each["end"]["how"] for each in motions if "end" in each]
+    ends = [motion["end"]["how"] for motion in motions if "end" in motion]
     assert ends == ["reached"] * 5
-    assert [each["is"] for each in motions] == ["done"] * 6
+    assert [motion["is"] for motion in motions] == ["done"] * 6
     assert (state["is"], state["holder"], state["moving"]) == ("state", None, False)
     assert state["q"] == motions[-1]["end"]["q"]
 

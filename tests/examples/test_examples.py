@@ -164,9 +164,10 @@ def test_ten_boxes_arrive_where_the_script_says(stage: Stage) -> None:
     run, states = stage.play(program, start, most=20_000)
     assert run.phase is Phase.DONE
     before, after = (
-        {each.name: 1e3 * each.T[:3, 3] for each in state.objects} for state in (start, states[-1])
+        {thing.name: 1e3 * thing.T[:3, 3] for thing in state.objects}
+        for state in (start, states[-1])
     )
     assert len(before) == 10
     for name, (x, y, z) in before.items():
         np.testing.assert_allclose(after[name], (x, -y, z), rtol=0, atol=1e-6)
-    assert all(each.T[2, 2] == pytest.approx(1.0, abs=1e-12) for each in states[-1].objects)
+    assert all(thing.T[2, 2] == pytest.approx(1.0, abs=1e-12) for thing in states[-1].objects)

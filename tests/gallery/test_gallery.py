@@ -20,7 +20,9 @@ from tests.gallery.stand_in import write_package
 
 
 def _forget(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in [each for each in sys.modules if each.partition(".")[0] == "robot_descriptions"]:
+    for name in [
+        module for module in sys.modules if module.partition(".")[0] == "robot_descriptions"
+    ]:
         monkeypatch.delitem(sys.modules, name)
 
 
@@ -32,8 +34,8 @@ def arms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "cache"))
-    found = write_package(tmp_path)
-    yield found
+    package = write_package(tmp_path)
+    yield package
     _forget(monkeypatch)
 
 
@@ -79,7 +81,7 @@ def test_the_list_states_maker_and_licence(capsys: pytest.CaptureFixture[str]) -
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["NAME", "ROBOT", "MAKER", "LICENCE"]
     rows = {line.split()[0]: line for line in lines[1:10]}
-    assert set(rows) == {each.name for each in listed_robots().values() if each.urdf}
+    assert set(rows) == {robot.name for robot in listed_robots().values() if robot.urdf}
     assert rows["so_arm101"].endswith("Apache-2.0")
     assert "Universal Robots" in rows["ur5e"]
     assert "9 robots" in lines[-1]

@@ -274,9 +274,9 @@ def test_a_revolute_screw_keeps_its_axis_and_turns_the_rest(
     assert screws.pitch(S) == pytest.approx(0.0, abs=1e-15)
     T = se3.exp(S * theta)
     np.testing.assert_allclose(T[:3, :3] @ r + T[:3, 3], r, atol=1e-14)
-    beside = r + np.cross(omega, [0.3, 0.5, -0.2])
-    turned = T[:3, :3] @ beside + T[:3, 3]
-    expected = r + np.cos(theta) * (beside - r) + np.sin(theta) * np.cross(omega, beside - r)
+    moved = r + np.cross(omega, [0.3, 0.5, -0.2])
+    turned = T[:3, :3] @ moved + T[:3, 3]
+    expected = r + np.cos(theta) * (moved - r) + np.sin(theta) * np.cross(omega, moved - r)
     np.testing.assert_allclose(turned, expected, atol=1e-14)
 
 

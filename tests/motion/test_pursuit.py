@@ -25,11 +25,12 @@ def test_braked_agrees_with_the_limiter() -> None:
     rng, limiter = np.random.default_rng(1), Limiter(LIMITS)
     for _ in range(300):
         q, qd, qdd = (
-            rng.uniform(-each, each) for each in (LIMITS.upper, LIMITS.speed, LIMITS.acceleration)
+            rng.uniform(-limit, limit)
+            for limit in (LIMITS.upper, LIMITS.speed, LIMITS.acceleration)
         )
-        found = braked(q, qd, qdd, LIMITS.acceleration, LIMITS.jerk)
+        brake = braked(q, qd, qdd, LIMITS.acceleration, LIMITS.jerk)
         np.testing.assert_allclose(
-            found, limiter.stopping_point(JointMotion(q, qd, qdd)), rtol=0, atol=1e-9
+            brake, limiter.stopping_point(JointMotion(q, qd, qdd)), rtol=0, atol=1e-9
         )
 
 
@@ -75,9 +76,9 @@ def test_uneven_arrival_adds_no_noise_to_the_rates() -> None:
             stream = Stream.begin(arrived, q, None)
             continue
         stream = stream.followed_by(arrived, q, None, np.array([2.5]))
-        seen = stream.at(arrived + 0.005)
+        sample = stream.at(arrived + 0.005)
         if number > 50:
-            off.append(abs(seen.qd[0] - 0.84 * math.cos(math.tau * (t - 0.035) / 3.0)))
+            off.append(abs(sample.qd[0] - 0.84 * math.cos(math.tau * (t - 0.035) / 3.0)))
     assert stream is not None
     assert stream.jitter == pytest.approx(0.003, rel=0.6)
     assert np.mean(off) < 0.06

@@ -13,9 +13,9 @@ from tests.mutants.mutant import mutants, score
 def main(words: list[str]) -> int:
     """Run the tests of the selected faults; return 1 if they miss one."""
     chosen = [
-        each
-        for each in mutants()
-        if not words or any(word in f"{each.file} {each.fault}" for word in words)
+        mutant
+        for mutant in mutants()
+        if not words or any(word in f"{mutant.file} {mutant.fault}" for word in words)
     ]
     return score(chosen) < len(chosen)
 

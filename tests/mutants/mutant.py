@@ -83,7 +83,7 @@ class Copy:
             path.write_text(text, encoding="utf-8")
 
     def _failing(self, tests: list[str]) -> str | None:
-        files = [f"tests/{each}" for each in tests]
+        files = [f"tests/{path}" for path in tests]
         command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *files]
         try:
             done = subprocess.run(
@@ -113,17 +113,17 @@ def _files() -> list[str]:
 
 
 def score(chosen: list[Mutant]) -> int:
-    """Print which test finds each of the ``chosen`` faults; return the number of faults found."""
-    found = 0
+    """Print which test finds each of the ``chosen`` faults; return the number of faults caught."""
+    caught = 0
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
         for mutant in chosen:
             began = time.monotonic()
             finder = copy.finder(mutant)
-            found += finder is not None
+            caught += finder is not None
             word, seconds = "MISSED" if finder is None else "found ", time.monotonic() - began
             print(f"{word} {seconds:5.1f} s  {mutant.file}: {mutant.fault}", flush=True)
             if finder is not None:
                 print(f"                by {finder}", flush=True)
-    print(f"{found} of {len(chosen)} faults are found.")
-    return found
+    print(f"{caught} of {len(chosen)} faults are caught.")
+    return caught

@@ -10,7 +10,7 @@ def test_each_fault_changes_one_place_and_has_tests() -> None:
     for mutant in mutants():
         path = ROOT / mutant.file
         count = path.read_text(encoding="utf-8").count(mutant.old) if path.is_file() else 0
-        absent = [each for each in mutant.tests.split() if not (ROOT / "tests" / each).is_file()]
+        absent = [path for path in mutant.tests.split() if not (ROOT / "tests" / path).is_file()]
         if count != 1 or absent or mutant.old == mutant.new:
             wrong.append((mutant.fault, count, absent))
     assert wrong == []

@@ -68,12 +68,14 @@ def link_locked_packages(site: Path) -> None:
         versions.setdefault(name, set()).add(version)
     for name, locked in versions.items():
         try:
-            found = distribution(name)
+            installed = distribution(name)
         except PackageNotFoundError:
             # The package is for another system or version of Python.
             continue
-        assert found.version in locked, f"{name} {found.version} is not the one that is locked"
-        for top in {file.parts[0] for file in found.files or ()} - {"..", "__pycache__"}:
+        assert installed.version in locked, (
+            f"{name} {installed.version} is not the one that is locked"
+        )
+        for top in {file.parts[0] for file in installed.files or ()} - {"..", "__pycache__"}:
             link = site / top
             if not link.exists():
-                link.symlink_to(Path(str(found.locate_file(top))))
+                link.symlink_to(Path(str(installed.locate_file(top))))

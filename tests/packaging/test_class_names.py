@@ -18,10 +18,10 @@ CLASS = re.compile(r"^class ([A-Za-z]\w*)", re.MULTILINE)
 
 def role(node: ast.ClassDef) -> str:
     """Return whether the class is a command, a request or a program step; empty for others."""
-    bases = {ast.unparse(each) for each in node.bases}
+    bases = {ast.unparse(base) for base in node.bases}
     if bases & {"Command", "AxisCommand"}:
         return "command"
-    if any(each.endswith("Request") for each in bases):
+    if any(base.endswith("Request") for base in bases):
         return "request"
     return "step" if bases & {"Step", "_Turn"} else ""
 
@@ -37,21 +37,21 @@ def defined_twice(package: Path) -> set[str]:
     names = [CLASS.findall(text) for text in texts]
     often = {name for name, times in Counter(chain(*names)).items() if times > 1}
     roles: dict[str, list[str]] = {}
-    for text in (text for text, found in zip(texts, names, strict=True) if often & {*found}):
+    for text in (text for text, classes in zip(texts, names, strict=True) if often & {*classes}):
         for node in ast.parse(text).body:
             if isinstance(node, ast.ClassDef) and node.name in often:
                 roles.setdefault(node.name, []).append(role(node))
     return {
         name
-        for name, found in roles.items()
-        if len(found) > 1 and not (all(found) and len(set(found)) == len(found))
+        for name, uses in roles.items()
+        if len(uses) > 1 and not (all(uses) and len(set(uses)) == len(uses))
     }
 
 
 def with_a_reason(glossary: str) -> set[str]:
     """Return the names that the section of ``glossary`` lists with a reason."""
-    _, found, rest = glossary.partition(f"\n{SECTION}\n")
-    assert found, f"{GLOSSARY} has no section {SECTION!r}"
+    _, heading, rest = glossary.partition(f"\n{SECTION}\n")
+    assert heading, f"{GLOSSARY} has no section {SECTION!r}"
     section = re.split(r"^## ", rest, maxsplit=1, flags=re.MULTILINE)[0]
     return set(re.findall(r"^- `(\w+)`: \S", section, flags=re.MULTILINE))
 

@@ -29,7 +29,7 @@ def test_files_that_the_recipes_name_exist() -> None:
         for top in ("app", "docs", "static", "tests")
         for path in (ROOT / top).rglob("*")
     } | {path.name for path in ROOT.glob("*.md")}
-    for name in (each for each in named if "NAME" not in each):
+    for name in (path for path in named if "NAME" not in path):
         assert any(path == name or path.endswith(f"/{name}") for path in known), name
 
 

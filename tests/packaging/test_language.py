@@ -66,16 +66,16 @@ def advice_on(text: str) -> list[str]:
     """Return one line of advice for each word of ``text`` that is on the list."""
     advice = tuple(WORDS.values())
     return [
-        f"{found.group()!r}: {advice[int((found.lastgroup or 'w0')[1:])]}"
-        for found in PATTERN.finditer(" ".join(text.split()))
+        f"{match.group()!r}: {advice[int((match.lastgroup or 'w0')[1:])]}"
+        for match in PATTERN.finditer(" ".join(text.split()))
     ]
 
 
 def test_docstrings_begin_with_a_verb_or_a_noun() -> None:
     wrong = [
-        f"{file.relative_to(ROOT)}: {found[1]}"
+        f"{file.relative_to(ROOT)}: {match[1]}"
         for file in python_files()
-        for found in OPENING.finditer(file.read_text(encoding="utf-8"))
+        for match in OPENING.finditer(file.read_text(encoding="utf-8"))
     ]
     assert not wrong, f"{len(wrong)} docstrings\n" + "\n".join(wrong)
 
@@ -103,22 +103,22 @@ def test_documentation_and_page_avoid_the_words_on_the_list() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "number"),
     [
         ("The person is told at once.", 1),
         ("It goes\non, likewise.", 2),
         ("A client that floods is disconnected.", 0),
     ],
 )
-def test_words_are_found_across_line_ends(text: str, found: int) -> None:
-    assert len(advice_on(text)) == found
+def test_words_are_found_across_line_ends(text: str, number: int) -> None:
+    assert len(advice_on(text)) == number
 
 
 def test_words_are_found_in_texts_of_several_parts(tmp_path: Path) -> None:
     file = tmp_path / "words.py"
     file.write_text('NAME = "Vera"\nTEXT = (\n    "is "\n    f"told\\nwhoever {NAME}"\n)\n')
-    found = [advice for _, text in texts_of(file) for advice in advice_on(text)]
-    assert [each.partition(":")[0] for each in found] == ["'is told'", "'whoever'"]
+    advice_given = [advice for _, text in texts_of(file) for advice in advice_on(text)]
+    assert [advice.partition(":")[0] for advice in advice_given] == ["'is told'", "'whoever'"]
     file.write_text('"""It goes\non."""\n')
     assert len([advice for _, text in texts_of(file) for advice in advice_on(text)]) == 1
 

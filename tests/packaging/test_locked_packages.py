@@ -105,9 +105,9 @@ def test_demo_writes_its_report_without_pictures(python: Path, tmp_path: Path) -
     katana450 = python.parent / "katana450"
     said = run(tmp_path, katana450, "demo", "circle", "--headless", "--report", "out")
     assert said.count("the extra 'pictures'") == 1
-    found = {path.name for path in (tmp_path / "out").iterdir()}
-    assert found >= {"report.html", "report.json", "trace.csv", "path.png", "joints.png"}
-    assert "tracing.png" not in found
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names >= {"report.html", "report.json", "trace.csv", "path.png", "joints.png"}
+    assert "tracing.png" not in names
 
 
 @pytest.mark.long
@@ -118,11 +118,11 @@ def test_shapes_are_read_without_extras(python: Path, tmp_path: Path) -> None:
     (tmp_path / "draco.glb").write_bytes(draco_glb())
     (tmp_path / "l.3mf").write_bytes(threemf())
     (tmp_path / "v.wrl").write_text(VRML, encoding="utf-8")
-    found = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
-    assert found.pop("draco.glb").endswith("dracopy networkx")
-    assert found.pop("l.3mf").endswith("dracopy networkx")
-    assert len(found) == 5
-    assert all(int(faces) >= 2 for faces in found.values()), found
+    modules = dict(line.split(" ", 1) for line in run(tmp_path, python, "-c", READ).splitlines())
+    assert modules.pop("draco.glb").endswith("dracopy networkx")
+    assert modules.pop("l.3mf").endswith("dracopy networkx")
+    assert len(modules) == 5
+    assert all(int(faces) >= 2 for faces in modules.values()), modules
 
 
 def test_robots_of_other_files_are_drawn_without_extras(python: Path, tmp_path: Path) -> None:
@@ -139,7 +139,7 @@ def test_documents_list_the_extras_of_the_project() -> None:
     page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| `(\w+)` \| ([\w, -]+) \|", page, re.MULTILINE)
     names = {
-        extra: " ".join(re.split(r"[^\w-]", each)[0] for each in packages)
+        extra: " ".join(re.split(r"[^\w-]", package)[0] for package in packages)
         for extra, packages in project["optional-dependencies"].items()
     }
     assert {extra: packages.replace(",", "") for extra, packages in listed} == names == PACKAGES

@@ -109,8 +109,8 @@ def test_one_module_makes_calls_that_only_some_systems_have() -> None:
     for path in sorted(APP.rglob("*.py")):
         allowed = ALLOWED.get(path.relative_to(APP).as_posix(), set())
         if allowed is not None:
-            found = set(used_names(path.read_text(encoding="utf-8")))
-            assert found <= allowed, f"{path}: put this into platform_support.py"
+            names = set(used_names(path.read_text(encoding="utf-8")))
+            assert names <= allowed, f"{path}: put this into platform_support.py"
 
 
 @pytest.mark.parametrize(

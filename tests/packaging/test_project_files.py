@@ -63,8 +63,8 @@ def test_every_dependency_has_a_reason() -> None:
         *about["project"]["optional-dependencies"].values(),
         *about["dependency-groups"].values(),
     )
-    words = [each for group in lists for each in group if isinstance(each, str)]
-    names = {re.split(r"[^\w.-]", each)[0].lower() for each in words}
+    words = [word for group in lists for word in group if isinstance(word, str)]
+    names = {re.split(r"[^\w.-]", word)[0].lower() for word in words}
     assert {"numpy", "pyserial", "pytest"} < names
     reasons = (ROOT / "docs" / "dependencies.md").read_text(encoding="utf-8").lower()
     assert not {name for name in names if f"[{name}]" not in reasons}
@@ -85,4 +85,4 @@ def test_changelog_dates_its_releases_and_says_briefly_what_is_unreleased() -> N
     assert unreleased.count("\n") <= MAX_UNRELEASED
     assert releases
     dated = re.compile(r"\[\d+\.\d+\.\d+\] - \d{4}-\d\d-\d\d\n")
-    assert [each for each in releases if dated.match(each) is None] == []
+    assert [release for release in releases if dated.match(release) is None] == []

@@ -29,9 +29,9 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output(
         [*uv, "--constraints", str(ROOT / "requirements.lock"), str(ROOT)], env=folders, seconds=600
     )
-    found = shutil.which("katana450", path=home / "bin")
-    assert found is not None
-    return Path(found)
+    command = shutil.which("katana450", path=home / "bin")
+    assert command is not None
+    return Path(command)
 
 
 @pytest.mark.long
@@ -52,7 +52,7 @@ def test_wheel_from_the_source_distribution_moves_an_arm(wheel: Path, tmp_path: 
         source.extractall(tmp_path / "source", filter="data")
     (folder,) = (tmp_path / "source").iterdir()
     built = build("wheel", folder, tmp_path / "dist")
-    first, second = (set(zipfile.ZipFile(each).namelist()) for each in (wheel, built))
+    first, second = (set(zipfile.ZipFile(wheel_path).namelist()) for wheel_path in (wheel, built))
     assert first == second
     assert list((folder / "docs" / "images").glob("*.webp"))
 

@@ -34,9 +34,9 @@ def swung(arm: MountedArm, stop_after: float) -> tuple[list[FloatArray], FloatAr
         tool = arm.T_base_shoulder @ forward(arm.chain, state.setpoint)
         turn = so3.exp((0.0, 0.0, float(state.setpoint[0])))
         poses.append(se3.from_rotation_translation(turn, tool[:3, 3] - (0.0, 0.0, 0.05)))
-    at = np.array([T[:3, 3] for T in poses])
-    accelerations = np.zeros_like(at)
-    accelerations[1:-1] = (at[2:] - 2.0 * at[1:-1] + at[:-2]) / DT**2
+    places = np.array([T[:3, 3] for T in poses])
+    accelerations = np.zeros_like(places)
+    accelerations[1:-1] = (places[2:] - 2.0 * places[1:-1] + places[:-2]) / DT**2
     return poses, accelerations
 
 

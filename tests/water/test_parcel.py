@@ -67,8 +67,8 @@ def test_water_that_leaves_inside_the_basin_stays_there(environment: WaterEnviro
     x, y, _ = environment.basin.at
     dipped = Parcel(1, (x, y, 0.03), (0.1, 0.0, 0.0), 0.0, 0.01)
     assert landing(dipped, environment, 0.01).ground is Ground.BASIN
-    beside = dipped._replace(start=(x + 0.2, y, 0.03))
-    assert landing(beside, environment, 0.01).ground is Ground.TABLE
+    moved = dipped._replace(start=(x + 0.2, y, 0.03))
+    assert landing(moved, environment, 0.01).ground is Ground.TABLE
 
 
 def test_water_beside_the_table_lands_on_the_floor(environment: WaterEnvironment) -> None:

@@ -99,4 +99,4 @@ def test_no_motion_of_two_vessels_makes_or_loses_water(
             motions = {"cup": VesselMove(T), "glass": VesselMove(placed(0.3, -0.3, 0.0, other))}
             water = FLOW.step(water, motions, 0.02)
             assert water.total == total
-            assert min(each.volume for each in water.vessels) >= 0
+            assert min(vessel.volume for vessel in water.vessels) >= 0

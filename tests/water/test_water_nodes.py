@@ -153,15 +153,15 @@ def test_water_has_one_colour_everywhere(recorded: Recorded) -> None:
 
 def test_hidden_water_can_be_shown_again(recorded: Recorded) -> None:
     root = nodes(recorded.server)["/water"]
-    seen = [root.visible]
+    shown = [root.visible]
     water = FLOW.begin(2e-4, placed(0.3, 0.1, 0.2))
     recorded.nodes.show(water)
-    seen.append(root.visible)
+    shown.append(root.visible)
     recorded.nodes.hide()
-    seen.append(root.visible)
+    shown.append(root.visible)
     recorded.nodes.show(water)
-    seen.append(root.visible)
-    assert seen == [False, True, False, True]
+    shown.append(root.visible)
+    assert shown == [False, True, False, True]
 
 
 def test_shapes_have_few_vertices(recorded: Recorded) -> None:
