@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from katana450.assembly.robot_session import DescribedRobot
 from katana450.errors import InputError
 from katana450.extensions.recording.datasets.lerobot_export import (
     DEFAULT_OUTCOMES,
@@ -61,28 +60,22 @@ def _exported(options: argparse.Namespace, file: RecordingFile, start: float, en
     out: Path = options.out
     match options.format:
         case "csv":
-            return _counted(write_csv(file, out, start, end), "row")
+            count, what = write_csv(file, out, start, end), "row"
         case "rosbag2":
-            return _counted(write_bag(file, out, start, end), "message")
+            count, what = write_bag(file, out, start, end), "message"
         case "html":
-            return _page(options, file, start, end)
-    return _film(options, file, start, end)
+            from katana450.extensions.export.page import FPS
+            from katana450.extensions.recording.datasets.player_files import write_page_of
+
+            times, robot = frame_times(start, end, int(FPS)), session_for(file, options.urdf)
+            count, what = write_page_of(file, out, times, robot), "state"
+        case _:
+            count, what = _film(options, file, start, end), "picture"
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
-
-
-def _page(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
-    from katana450.extensions.export.page import FPS
-    from katana450.extensions.recording.datasets.player_files import write_page_of
-
-    times = frame_times(start, end, int(FPS))
-    count = write_page_of(file, options.out, times, _robot(file, options.urdf))
-    return _counted(count, "state")
-
-
-def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> str:
+def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: float) -> int:
+    """Write a film of the part of ``file``; return the number of its pictures."""
     from katana450.extensions.recording.datasets.player_files import (
         PictureViews,
         write_film_of,
@@ -94,9 +87,8 @@ def _film(options: argparse.Namespace, file: RecordingFile, start: float, end: f
     size = options.size or DEFAULT_SIZES["mp4"]
     fps = DEFAULT_FPS["mp4"] if options.fps is None else options.fps
     pictures = PictureViews(views, size, options.urdf, file.settings.bare)
-    robot = _robot(file, options.urdf)
-    count = write_film_of(file, options.out, (start, end), fps, robot, pictures, size)
-    return _counted(count, "picture")
+    robot = session_for(file, options.urdf)
+    return write_film_of(file, options.out, (start, end), fps, robot, pictures, size)
 
 
 def _lerobot(options: argparse.Namespace) -> Exported:
@@ -119,13 +111,9 @@ def _lerobot(options: argparse.Namespace) -> Exported:
 
     check_filmable(size, request.fps)
     with RecordingFile.open(files_of(options.files)[0]) as first:
-        robot = _robot(first, options.urdf)
+        robot = session_for(first, options.urdf)
         pictures = PictureViews(views, size, options.urdf, first.settings.bare)
     return export_lerobot(options.files, options.out, request, robot.session, pictures.pictures)
-
-
-def _robot(file: RecordingFile, urdf: Path | None) -> DescribedRobot:
-    return session_for(file, urdf)
 
 
 @contextmanager

@@ -260,7 +260,8 @@ def export_lerobot(
             video.finish()
         statistics = [video.counts.statistics for video in videos]
         writer.finish(dict(zip(shape.videos.values(), statistics, strict=True)))
-    return _exported(cuts, count)
+    successes, unjudged = (sum(cut.success is value for cut in cuts) for value in (True, None))
+    return Exported(len(cuts), count, successes, unjudged)
 
 
 def _cuts(paths: Sequence[Path], options: LerobotOptions) -> tuple[list[EpisodeCut], str]:
@@ -324,12 +325,3 @@ def _add(
         columns.update(row)
     cut = episode.cut
     writer.add_episode(episode.state, episode.action, cut.task, cut.success, columns, statistics)
-
-
-def _exported(cuts: Sequence[EpisodeCut], frames: int) -> Exported:
-    return Exported(
-        len(cuts),
-        frames,
-        sum(cut.success is True for cut in cuts),
-        sum(cut.success is None for cut in cuts),
-    )

@@ -81,23 +81,15 @@ class PixelCounts:
             "std": np.sqrt(spread / total),
         }
         for name, fraction in QUANTILES.items():
-            statistics[name] = [_quantile(counts, fraction) for counts in self._counts]
+            statistics[name] = [
+                np.quantile(levels, fraction, weights=counts, method="inverted_cdf")
+                for counts in self._counts
+            ]
         lists: Statistics = {
             name: np.asarray(value, dtype=np.float64).reshape(3, 1, 1).tolist()
             for name, value in statistics.items()
         }
         return {**lists, "count": [self._pictures]}
-
-
-def _quantile(counts: npt.NDArray[np.int64], fraction: float) -> float:
-    """Return the quantile [0..1] of the levels that were counted, as numpy interpolates it."""
-    until = np.cumsum(counts)
-    place = fraction * (int(until[-1]) - 1)
-    low = int(place)
-    ends: FloatArray = np.searchsorted(until, (low, low + 1), side="right").clip(0, LEVELS - 1) / (
-        LEVELS - 1
-    )
-    return float(ends[0] + (place - low) * (ends[1] - ends[0]))
 
 
 VERSION: Final = "v3.0"
@@ -217,42 +209,6 @@ def place(number: int) -> tuple[int, int]:
     return divmod(number, CHUNK_FILES)
 
 
-def episode_row(
-    number: int, task: str, frames: tuple[int, int], success: bool | None, data_file: int
-) -> dict[str, Any]:
-    """Return the row that describes an episode, without its videos and statistics.
-
-    Args:
-        number: index of the episode.
-        task: its task.
-        frames: index of its first frame, and of the first frame after it.
-        success: whether the task was done; None if that is not known.
-        data_file: number of the file that has its rows.
-    """
-    chunk, file = place(data_file)
-    return {
-        "episode_index": number,
-        "tasks": [task],
-        "length": frames[1] - frames[0],
-        "data/chunk_index": chunk,
-        "data/file_index": file,
-        "dataset_from_index": frames[0],
-        "dataset_to_index": frames[1],
-        "success": success,
-        "meta/episodes/chunk_index": 0,
-        "meta/episodes/file_index": 0,
-    }
-
-
-def statistics_columns(statistics: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the columns of the row of an episode for the statistics of its features."""
-    return {
-        f"stats/{feature}/{name}": value
-        for feature, values in statistics.items()
-        for name, value in values.items()
-    }
-
-
 def pandas_metadata(index: str, columns: Sequence[str]) -> bytes:
     """Return the metadata by which pandas reads the text column ``index`` as the index.
 
@@ -369,10 +325,23 @@ class LerobotWriter:
             TASK: np.full(count, self._tasks.setdefault(task, len(self._tasks))),
         }
         self._write_rows(columns)
-        statistics = {**_statistics(columns), **picture_statistics}
-        frames = (self._frames, self._frames + count)
-        row = episode_row(number, task, frames, success, self._data_file)
-        self._rows.append({**row, **videos, **statistics_columns(statistics)})
+        chunk, file = place(self._data_file)
+        row = {
+            "episode_index": number,
+            "tasks": [task],
+            "length": count,
+            "data/chunk_index": chunk,
+            "data/file_index": file,
+            "dataset_from_index": self._frames,
+            "dataset_to_index": self._frames + count,
+            "success": success,
+            "meta/episodes/chunk_index": 0,
+            "meta/episodes/file_index": 0,
+            **videos,
+        }
+        for feature, statistics in {**_statistics(columns), **picture_statistics}.items():
+            row |= {f"stats/{feature}/{name}": value for name, value in statistics.items()}
+        self._rows.append(row)
         self._columns.append(columns)
         self._frames += count
 
