@@ -105,7 +105,7 @@ def _write(
     attachments, runs = scripts_in(files, start, end)
     copy = MessageWriter(target, metadata, attachments)
     needed: set[bytes] = set()
-    for message in _simulated(files, begin, end):
+    for message in _simulated(files, (COMMANDS, CHECKPOINTS), begin, end):
         needed.update(KEY.findall(message.data))
     written: set[bytes] = set()
     for file in files:
@@ -123,7 +123,10 @@ def _write(
         if run.start < start:
             copy.copy(Message(EVENTS, 0, nanoseconds(start), begun_before(run, start)))
     number = 0
-    for message in _merged(files, begin, start, end):
+    topics = COMMANDS, CHECKPOINTS, STATE, *SHOWN
+    for message in _simulated(files, topics, start if begin is None else min(begin, start), end):
+        if message.topic in SHOWN and message.log_time < nanoseconds_of(start):
+            continue
         number = message.number
         if episode is None or message.topic != EPISODES:
             copy.copy(message)
@@ -138,34 +141,18 @@ def _write(
 
 
 def _simulated(
-    files: Sequence[RecordingFile], begin: float | None, end: float
+    files: Sequence[RecordingFile], topics: Sequence[str], begin: float | None, end: float
 ) -> Iterator[Message]:
-    """Yield the checkpoint at ``begin`` [s], later ones and the ticks after it, until ``end``."""
+    """Yield the messages of ``topics`` from ``begin`` to ``end`` [s], in the order of ``files``.
+
+    Ticks before the first complete state are left out, as they cannot be simulated. Without
+    ``begin`` there are none.
+    """
     if begin is None:
         return
-    number = -1
-    for file in files:
-        for message in file.messages(COMMANDS, CHECKPOINTS, start=begin, end=end):
-            if number < 0 and message.topic == CHECKPOINTS:
-                number = message.number
-            if number >= 0:
-                yield message
-
-
-def _merged(
-    files: Sequence[RecordingFile], begin: float | None, start: float, end: float
-) -> Iterator[Message]:
-    """Yield the messages of the part in the order of their files."""
     started = False
-    first = start if begin is None else min(begin, start)
     for file in files:
-        for message in file.messages(COMMANDS, CHECKPOINTS, STATE, *SHOWN, start=first, end=end):
+        for message in file.messages(*topics, start=begin, end=end):
             started |= message.topic == CHECKPOINTS
-            if message.topic == STATE:
-                # The first one is that of the checkpoint, which names all objects.
-                yield message
-            elif message.topic in SHOWN:
-                if message.log_time >= nanoseconds_of(start):
-                    yield message
-            elif started:
+            if started or message.topic != COMMANDS:
                 yield message
