@@ -24,8 +24,7 @@ from katana450.extension import provided
 from katana450.extensions.bodies.robot_world import robot_world
 from katana450.extensions.objects.handles import HandlesLayer
 from katana450.extensions.programs.server.program_runner import ProgramRunner
-from katana450.extensions.recording.playback.drawing import RunDrawing
-from katana450.extensions.recording.playback.folder import CONTEXTS
+from katana450.extensions.recording.playback.drawing import CONTEXTS, RunDrawing
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray

@@ -1,9 +1,10 @@
-"""The drawing in a window that plays back: the recorded arm, its objects and its water."""
+"""The drawing in the windows that play back: the recorded arm, its objects and its water."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import viser
@@ -14,6 +15,8 @@ from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.programs.server.preview import SAME_PLACE, GhostScene
 from katana450.extensions.recording.playback.rows import RecordedMoment, still_flying
+from katana450.server.service.hub import Hub
+from katana450.server.view.panel_folder import FolderContext
 from katana450.server.view.scene import Colour, GhostNodes, Window, node_name
 from katana450.server.viser_bridge.gestures import Gestures
 
@@ -156,3 +159,18 @@ class PlaybackWindows:
             if number is None or number not in clients:
                 return None
             return self._windows.setdefault(number, _Window(clients[number]))
+
+
+CONTEXTS: WeakKeyDictionary[Hub, FolderContext] = WeakKeyDictionary()
+"""The context of the view of each server, which has one once its scene is there."""
+
+
+class PlaybackFolder:
+    """A folder without controls: those of play back are in the page around viser."""
+
+    def __init__(self, context: FolderContext) -> None:
+        """Let the windows of ``context`` play back."""
+        CONTEXTS[context.hub] = context
+
+    def follow(self) -> None:
+        """Do nothing: what is played back follows its window, not the arm."""

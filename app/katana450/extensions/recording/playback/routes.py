@@ -20,8 +20,7 @@ from starlette.routing import BaseRoute, Route
 from katana450.arm.control.actor import CommandChannel
 from katana450.errors import InputError
 from katana450.extensions.recording.messages import StateRow
-from katana450.extensions.recording.playback.drawing import PlaybackWindows
-from katana450.extensions.recording.playback.folder import CONTEXTS
+from katana450.extensions.recording.playback.drawing import CONTEXTS, PlaybackWindows
 from katana450.extensions.recording.playback.rows import RecordedMoment
 from katana450.extensions.recording.playback.run import at_place, length_of, place_of
 from katana450.extensions.recording.playback.store import (
