@@ -6,7 +6,6 @@ import random
 import resource
 import struct
 import tracemalloc
-import zlib
 from pathlib import Path
 
 import pytest
@@ -72,51 +71,14 @@ def test_mutations_raise_only_input_errors(path: Path, tmp_path: Path) -> None:
             refused += 1
         try:
             if recover(target, tmp_path / "out.mcap") is not None:
-                RecordingFile.open(tmp_path / "out.mcap").close()
+                with RecordingFile.open(tmp_path / "out.mcap"):
+                    pass
         except InputError:
             refused += 1
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert refused > 0.5 * MUTATIONS
     assert peak < MAX_MEMORY
-
-
-def repacked(data: bytes, chance: random.Random) -> bytes:
-    """Return a recording whose messages are changed, and whose sums are right again."""
-    out, at = bytearray(data[:8]), 8
-    while at < len(data) - 8:
-        opcode, length = struct.unpack_from("<BQ", data, at)
-        body = bytes(data[at + 9 : at + 9 + length])
-        if opcode == 6:
-            head = bytearray(body[:28])
-            (name,) = struct.unpack_from("<I", body, 28)
-            rest = body[32 + name + 8 :]
-            content = bytearray(zstandard.decompress(rest))
-            for _ in range(chance.randint(1, 3)):
-                place = chance.randrange(len(content) - 60, len(content))
-                if chance.random() < 0.7:
-                    place = chance.randrange(len(content))
-                content[place] = chance.choice(b'0123456789"[]{}.,-eEINaftrun')
-            head[24:28] = struct.pack("<I", zlib.crc32(content))
-            packed = zstandard.compress(bytes(content))
-            body = bytes(head) + body[28 : 32 + name] + struct.pack("<Q", len(packed)) + packed
-        out += struct.pack("<BQ", opcode, len(body)) + body
-        at += 9 + length
-    return bytes(out + data[-8:])
-
-
-def test_changed_messages_raise_only_input_errors(path: Path, tmp_path: Path) -> None:
-    data, chance, target = path.read_bytes(), random.Random(11), tmp_path / "m.mcap"
-    refused = 0
-    for _ in range(MUTATIONS):
-        # Its index does not fit any more, so it is recovered, by which it gets a new one.
-        target.write_bytes(repacked(data, chance)[:-40])
-        try:
-            recover(target, target)
-            used(target)
-        except InputError:
-            refused += 1
-    assert refused > 0.3 * MUTATIONS
 
 
 def packed(*records: object) -> bytes:

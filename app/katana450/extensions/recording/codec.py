@@ -48,6 +48,8 @@ from katana450.extensions.recording.forms import (
     FormError,
     array,
     array_form,
+    json_form,
+    json_text,
     number,
     number_form,
     shown,
@@ -145,26 +147,6 @@ ORDER = "order"
 
 ROUNDING = 1e-9
 """[1] Largest change of a number by a constructor that counts as rounding."""
-
-MAX_TEXT_BYTES = 32_000_000
-"""Maximum length of the text of one value; the longest plan of an hour has a tenth of it."""
-
-
-def json_text(form: Any) -> bytes:
-    """Return ``form`` as JSON."""
-    return msgspec.json.encode(form)
-
-
-def json_form(text: bytes, kind: Any = Any) -> Any:
-    """Return the form in the JSON ``text``, checked to be of ``kind``. Raises FormError."""
-    if len(text) > MAX_TEXT_BYTES:
-        raise FormError(f"it has {len(text)} bytes, more than {MAX_TEXT_BYTES}")
-    try:
-        return msgspec.json.decode(text, type=kind)
-    except msgspec.ValidationError as error:
-        raise FormError(str(error)) from None
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise FormError(f"it is not JSON: {error}") from None
 
 
 class Codec:

@@ -38,6 +38,20 @@ CLAIM = ".claim"
 """Name of the file that a process claims in its folder until it ends, in whatever way."""
 
 
+def claimed(file: BinaryIO) -> bool:
+    """Claim the open ``file``, and return whether no other process has done so.
+
+    Some file systems have no claims. There it counts as claimed.
+    """
+    try:
+        claim_file(file.fileno())
+    except (BlockingIOError, PermissionError):
+        return False
+    except OSError:
+        pass
+    return True
+
+
 def claimed_folder(make: Callable[[], Path]) -> tuple[Path, BinaryIO]:
     """Return a new folder, and its open file that claims it. Raises OSError.
 
@@ -46,16 +60,8 @@ def claimed_folder(make: Callable[[], Path]) -> tuple[Path, BinaryIO]:
     while True:
         folder = make()
         claim = open(folder / CLAIM, "wb")  # noqa: SIM115 - open as long as the folder is used
-        try:
-            claim_file(claim.fileno())
-        except (BlockingIOError, PermissionError):
-            # Another process takes the folder for an abandoned one, before the claim.
-            claim.close()
-            continue
-        except OSError:
-            # Some file systems have no claims.
-            pass
-        if (folder / CLAIM).exists():
+        # Another process may take the folder for an abandoned one, before the claim.
+        if claimed(claim) and (folder / CLAIM).exists():
             return folder, claim
         claim.close()
 

@@ -10,6 +10,7 @@ import math
 import struct
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from katana450.errors import InputError
@@ -47,6 +48,27 @@ def shown(form: object) -> str:
     """Return ``form`` for an error message, shortened."""
     text = repr(form)
     return text if len(text) <= 60 else f"{text[:60]}..."
+
+
+MAX_TEXT_BYTES = 32_000_000
+"""Maximum length of the text of one value; the longest plan of an hour has a tenth of it."""
+
+
+def json_text(form: Any) -> bytes:
+    """Return ``form`` as JSON."""
+    return msgspec.json.encode(form)
+
+
+def json_form(text: bytes | str, kind: Any = Any) -> Any:
+    """Return the form in the JSON ``text``, checked to be of ``kind``. Raises FormError."""
+    if len(text) > MAX_TEXT_BYTES:
+        raise FormError(f"it has {len(text)} bytes, more than {MAX_TEXT_BYTES}")
+    try:
+        return msgspec.json.decode(text, type=kind)
+    except msgspec.ValidationError as error:
+        raise FormError(str(error)) from None
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise FormError(f"it is not JSON: {error}") from None
 
 
 def number_form(value: Any) -> float | int | str:

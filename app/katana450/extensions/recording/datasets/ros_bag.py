@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from heapq import merge
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,17 +22,15 @@ from katana450.extensions.recording.files.recording_file import (
     utc_offset_ns,
 )
 from katana450.extensions.recording.files.script_runs import FOLDER, scripts_in
-from katana450.extensions.recording.files.simulation import content_of
-from katana450.extensions.recording.files.table import LEAST
+from katana450.extensions.recording.files.table import LEAST, rows_from
 from katana450.extensions.recording.folders import new_folder
 from katana450.extensions.recording.messages import (
-    CHECKPOINTS,
     EVENTS,
     NANO,
-    STATE,
     ObjectPose,
     Pose,
     StateRow,
+    nanoseconds,
     pose_of,
 )
 from katana450.extras import library
@@ -133,8 +133,16 @@ class _Bag:
     def add_part(self, start: float, end: float) -> None:
         """Add all messages from ``start`` to ``end`` [s]."""
         started = False
-        for message in self._messages(start, end):
-            t = message.log_time + self._offset
+        begin = max(start, self._file.start)
+        states: Iterator[tuple[int, StateRow | Message]] = (
+            (nanoseconds(row.t), row) for row in rows_from(self._file, begin, end)
+        )
+        events: Iterator[tuple[int, StateRow | Message]] = (
+            (message.log_time, message)
+            for message in self._file.messages(EVENTS, start=begin, end=end)
+        )
+        for log_time, content in merge(states, events, key=itemgetter(0)):
+            t = log_time + self._offset
             if not 0 <= t < MAX_TIME:
                 raise InputError(
                     f"{self._file.path} is damaged: its times are not from 1970 to 2038."
@@ -144,26 +152,12 @@ class _Bag:
                 urdf = attached_urdf(self._file).data.decode(errors="replace")
                 self._add(DESCRIPTION, t, data=urdf)
                 self._add(TF_STATIC, t, transforms=self._transforms(t, self._fixed()))
-            report((message.t - self._file.start) / max(self._file.end - self._file.start, LEAST))
-            if message.topic == EVENTS:
-                self._add(BAG_EVENTS, t, data=message.data.decode(errors="replace"))
+            length = max(self._file.end - self._file.start, LEAST)
+            report((log_time / NANO - self._file.start) / length)
+            if isinstance(content, StateRow):
+                self._add_state(t, content)
             else:
-                self._add_state(t, content_of(message, StateRow))
-
-    def _messages(self, start: float, end: float) -> Iterator[Message]:
-        """Yield states and events of the part; the first state is the one at ``start``."""
-        file = self._file
-        begin = max(start, file.start)
-        first = file.last_before(CHECKPOINTS, begin)
-        for message in file.messages(STATE, end=begin, start=begin if first is None else first.t):
-            content_of(message, StateRow).move_objects(self._objects)
-        before = file.last_before(STATE, begin)
-        if before is not None:
-            yield before._replace(log_time=round(begin * NANO))
-        after = begin if before is None else max(begin, before.t)
-        for message in file.messages(STATE, EVENTS, start=after, end=end):
-            if before is None or message.topic == EVENTS or message.log_time > before.log_time:
-                yield message
+                self._add(BAG_EVENTS, t, data=content.data.decode(errors="replace"))
 
     def _add(self, topic: str, t: int, **fields: Any) -> None:
         kind = TOPICS[topic]

@@ -23,7 +23,6 @@ from msgspec.structs import replace
 
 from katana450.atomic import write_files, writer_of
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes.episode import (
     Episode,
     episode_of,
@@ -44,9 +43,9 @@ from katana450.extensions.recording.files.recording_writer import (
     write_end,
 )
 from katana450.extensions.recording.files.trimming import trim
-from katana450.extensions.recording.folders import SUFFIX
+from katana450.extensions.recording.folders import SUFFIX, claimed
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import EPISODES, nanoseconds
-from katana450.platform_support import claim_file
 
 SAME = 1e-3
 """[s] Largest difference of times that are the same."""
@@ -240,17 +239,12 @@ class EpisodeFolder:
                 f"The folder of episodes {self.folder} cannot be written: "
                 f"{error.strerror or error}. Name another one by `serve --episodes FOLDER`."
             ) from error
-        try:
-            claim_file(lock.fileno())
-        except (BlockingIOError, PermissionError) as error:
+        if not claimed(lock):
             lock.close()
             raise InputError(
                 f"Another server uses the folder of episodes {self.folder}. Name another one by "
                 "`serve --episodes FOLDER`."
-            ) from error
-        except OSError:
-            # Some file systems have no claims.
-            pass
+            )
         self._lock = lock
 
     def release(self) -> None:

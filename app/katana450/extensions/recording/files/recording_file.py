@@ -13,10 +13,8 @@ import zlib
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO, Final, NamedTuple, Self
 
-import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import InvalidMagic, McapError
@@ -27,6 +25,7 @@ from mcap.summary import Summary
 
 from katana450.errors import InputError
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordedSettings
+from katana450.extensions.recording.forms import FormError, json_form
 from katana450.extensions.recording.messages import NANO, nanoseconds
 
 MAX_CHUNK_BYTES = 64_000_000
@@ -227,7 +226,6 @@ class RecordingFile:
     def __init__(self, path: Path, file: BinaryIO) -> None:
         """Read the index of ``file``; use ``open`` instead."""
         self.path = path
-        self._file = file
         self._stream = BoundedStream(file)
         with reading(self.path):
             self._reader = SeekingReader(
@@ -249,32 +247,15 @@ class RecordingFile:
         """Texts about the recording by their names."""
 
     @classmethod
-    def open(cls, path: Path) -> Self:
-        """Open the recording at ``path``. Raises InputError if it cannot be read."""
+    @contextmanager
+    def open(cls, path: Path) -> Iterator[Self]:
+        """Yield the open recording at ``path``. Raises InputError if it cannot be read."""
         try:
             file = path.open("rb")
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-        try:
-            return cls(path, file)
-        except BaseException:
-            file.close()
-            raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        with file:
+            yield cls(path, file)
 
     def _summary(self) -> Summary:
         try:
@@ -296,10 +277,7 @@ class RecordingFile:
         Ticks before the start of a part that was cut out serve its simulation only.
         """
         first = min((chunk.message_start_time for chunk in self._chunks), default=0) / NANO
-        try:
-            return max(first, float(self.metadata.get(PART_START, "-inf")))
-        except ValueError:
-            return first
+        return max(first, part_start_of(self.metadata))
 
     @property
     def end(self) -> float:
@@ -315,8 +293,11 @@ class RecordingFile:
     def settings(self) -> RecordedSettings:
         """Settings of the session. Raises InputError for a recording without them."""
         try:
-            return msgspec.json.decode(self.metadata.get("settings", ""), type=RecordedSettings)
-        except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
+            settings: RecordedSettings = json_form(
+                self.metadata.get("settings", ""), RecordedSettings
+            )
+            return settings
+        except FormError as error:
             raise InputError(f"{self.path} does not state the settings of its session.") from error
 
     @property
@@ -375,6 +356,14 @@ class RecordingFile:
     def _messages(self, index: ChunkIndex, topics: frozenset[str]) -> list[Message]:
         with reading(self.path):
             return messages_at(self._stream, index.chunk_start_offset, self._topics, topics)
+
+
+def part_start_of(metadata: Mapping[str, str]) -> float:
+    """Return the start of a part that was cut out of a recording [s]; -inf for a whole one."""
+    try:
+        return float(metadata.get(PART_START, "-inf"))
+    except ValueError:
+        return -math.inf
 
 
 def utc_offset_of(metadata: Mapping[str, str]) -> float:

@@ -36,7 +36,7 @@ from mcap.summary import Summary
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.version import version
-from katana450.extensions.recording.codec import Codec, json_text
+from katana450.extensions.recording.codec import Codec
 from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import METADATA, Attachment, RecordingHeader
 from katana450.extensions.recording.files.recording_file import Message
@@ -46,7 +46,7 @@ from katana450.extensions.recording.files.script_runs import (
     attached_script,
     sha256,
 )
-from katana450.extensions.recording.forms import FormError
+from katana450.extensions.recording.forms import FormError, json_text
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,

@@ -15,7 +15,6 @@ from mcap.records import Chunk, Footer, Metadata
 
 from katana450.atomic import write_files
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files.header import METADATA, Attachment
 from katana450.extensions.recording.files.recording_file import (
     FAULTS,
@@ -32,6 +31,8 @@ from katana450.extensions.recording.files.recording_file import (
 )
 from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.trimming import KEY
+from katana450.extensions.recording.folders import claimed
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,
@@ -39,7 +40,6 @@ from katana450.extensions.recording.messages import (
     SOLIDS,
     TickMessage,
 )
-from katana450.platform_support import claim_file
 
 
 @dataclass
@@ -98,7 +98,10 @@ def recover(path: Path, out: Path) -> Recovered | None:
     if is_whole(path):
         return None
     with reading(path), path.open("rb") as file:
-        _check_unclaimed(path, file)
+        if not claimed(file):
+            raise InputError(
+                f"{path} is being written by a running program: end its recording first."
+            )
         metadata, attachments, why = _header(file)
         if metadata is None:
             raise InputError(
@@ -113,19 +116,6 @@ def recover(path: Path, out: Path) -> Recovered | None:
             }
         )
     return recovered
-
-
-def _check_unclaimed(path: Path, file: BinaryIO) -> None:
-    """Raise InputError if another process has claimed ``file``, whose end is still to come."""
-    try:
-        claim_file(file.fileno())
-    except (BlockingIOError, PermissionError) as error:
-        raise InputError(
-            f"{path} is being written by a running program: end its recording first."
-        ) from error
-    except OSError:
-        # Some file systems have no claims.
-        return
 
 
 def _header(file: BinaryIO) -> tuple[dict[str, str] | None, list[Attachment], str]:

@@ -22,10 +22,10 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import Codec, SharedText, json_form
+from katana450.extensions.recording.codec import Codec, SharedText
 from katana450.extensions.recording.files.header import PORTABLE, ROUNDING
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
-from katana450.extensions.recording.forms import FormError
+from katana450.extensions.recording.forms import FormError, json_form
 from katana450.extensions.recording.messages import (
     CHECKPOINTS,
     COMMANDS,

@@ -24,7 +24,7 @@ import msgspec
 from msgspec import structs
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
@@ -231,11 +231,11 @@ class RecordingRoutes:
         job.start()
         while len(self._jobs) > MAX_KEPT:
             await self._jobs.popitem(last=False)[1].close()
-        return _json({"job": name})
+        return JSONResponse({"job": name})
 
     async def _state(self, request: Request) -> Response:
         """Return status, progress and result of a job."""
-        return _json(self._job(request).state())
+        return JSONResponse(self._job(request).state())
 
     async def _file(self, request: Request) -> Response:
         """Return the file that a job has made."""
@@ -303,7 +303,3 @@ def _seconds(query: Mapping[str, str], name: str) -> float:
     if not value > 0.0:
         raise HTTPException(HTTPStatus.BAD_REQUEST, f"`{name}` is a number of seconds above 0.")
     return value
-
-
-def _json(content: Any) -> Response:
-    return Response(msgspec.json.encode(content), media_type="application/json")

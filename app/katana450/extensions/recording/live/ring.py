@@ -21,10 +21,10 @@ from katana450.extensions.recording.episodes.episode import EpisodeMessage
 from katana450.extensions.recording.files.header import RecordingHeader
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.recovery import recover
-from katana450.extensions.recording.folders import SUFFIX, recordings_in
+from katana450.extensions.recording.folders import SUFFIX, claimed, recordings_in
 from katana450.extensions.recording.live.run_events import RunEvents
 from katana450.extensions.recording.live.running_scripts import RunningScripts
-from katana450.platform_support import claim_file, create_file
+from katana450.platform_support import create_file
 
 MAX_FILE_TICKS = 6000
 """Ticks in a file: a minute of motion. An arm at rest has no ticks to record."""
@@ -283,9 +283,8 @@ class Ring:
             self._synced_bytes = 0
             self._path = self._folder / f"{time.time_ns() // 1000}{SUFFIX}"
             self._file = open(create_file(self._path, 0o600), "wb")  # noqa: SIM115 - for a minute
-            with suppress(OSError):
-                # So that nobody repairs it before its end. Some file systems have no claims.
-                claim_file(self._file.fileno())
+            # So that nobody repairs it before its end.
+            claimed(self._file)
             self._writer = RecordingWriter(self._file, self._header)
         except OSError as error:
             self._fail(error)

@@ -5,7 +5,6 @@ Only the heads of records are read, so that the end of a growing file is found i
 
 from __future__ import annotations
 
-import math
 import struct
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple
@@ -15,12 +14,12 @@ from mcap.records import Metadata
 from katana450.extensions.recording.files.header import METADATA
 from katana450.extensions.recording.files.recording_file import (
     HEAD,
-    PART_START,
     BoundedStream,
     Message,
     channels_in,
     content_at,
     messages_at,
+    part_start_of,
     reading,
     records_at,
     utc_offset_of,
@@ -73,10 +72,7 @@ class ChunkIndex:
     @property
     def part_start(self) -> float:
         """Time at which a part begins that was cut out [s]; what is before serves simulation."""
-        try:
-            return float(self.metadata.get(PART_START, "-inf"))
-        except ValueError:
-            return -math.inf
+        return part_start_of(self.metadata)
 
     def update(self) -> None:
         """Find the chunks that were added since the last call. Raises InputError."""

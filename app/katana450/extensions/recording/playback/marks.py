@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
-from katana450.extensions.recording.codec import json_form
 from katana450.extensions.recording.files.recording_file import Message
-from katana450.extensions.recording.forms import FormError
+from katana450.extensions.recording.forms import FormError, json_form
 from katana450.extensions.recording.live import run_events
 from katana450.extensions.recording.messages import EPISODES
 
