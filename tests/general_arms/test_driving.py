@@ -19,7 +19,8 @@ from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.state import Reason, State, Status, Verdict
 from katana450.errors import InputError
 from katana450.extensions.general_arms.driven_tool import DrivenTool
-from katana450.extensions.recording.codec import Codec, json_form, json_text
+from katana450.extensions.recording.codec import Codec
+from katana450.extensions.recording.forms import json_form, json_text
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, joint_frames

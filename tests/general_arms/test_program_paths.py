@@ -12,7 +12,8 @@ from katana450.errors import InputError
 from katana450.extensions.programs.language.source import ScriptError
 from katana450.extensions.programs.language.step_target import Angles
 from katana450.extensions.programs.planning.curve_path import PosePath
-from katana450.extensions.recording.codec import Codec, json_form, json_text
+from katana450.extensions.recording.codec import Codec
+from katana450.extensions.recording.forms import json_form, json_text
 from katana450.maths.geometry import se3
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import re
-import signal
-import sys
-import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -20,10 +15,8 @@ from rosbags.rosbag2 import Reader
 import katana450
 from katana450.arm.runtime.tick import TickRecord
 from katana450.cli.main import main
-from katana450.client import Client, RefusedError
 from katana450.errors import InputError
 from katana450.extensions.programs.script.script_files import script_text
-from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import MessageWriter
 from katana450.extensions.recording.files.recovery import recover
@@ -40,7 +33,7 @@ from katana450.extensions.recording.live.running_scripts import (
 from katana450.extensions.recording.playback.run import PlaybackRun
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.recording.recorded import header, run, swinging
-from tests.recording.test_recorder import RECORDER, _other_child, waited_for
+from tests.recording.test_recorder import waited_for
 
 TURN = "name: {name}\nsteps:\n  - joints: [{angle}, -60, 80, 20, 0]\n"
 NOD = "name: Nod\nsteps:\n  - wait: 0.2\n  - joints: [5, -55, 80, 20, 0]\n"
@@ -164,44 +157,6 @@ def test_info_repair_and_export_keep_scripts(
     assert scripts == found
     with Reader(bag) as reader:
         assert reader.message_count > 100
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_script_that_runs_is_attached_again_after_a_crash(server: AppServer, folder: Path) -> None:
-    """Both files have it: the one that is repaired, and that of the next process."""
-    turns = (f"  - joints: [{10 - 20 * (each % 2)}, -60, 80, 20, 0]\n" for each in range(40))
-    text = f"name: Long\nsteps:\n{''.join(turns)}"
-    with katana450.connect(server.url, name="Ada") as client:
-        thread = threading.Thread(target=lambda: suppressed(client, text), daemon=True)
-        thread.start()
-        waited_for(lambda: _attached(folder / "ring", text), "the script on the disk")
-        recorder, before = server.child(RECORDER), recordings_in(folder / "ring")
-        os.kill(recorder, signal.SIGKILL)
-        waited_for(partial(_other_child, server, recorder), "another recorder")
-
-        def in_new_file() -> bool:
-            return recordings_in(folder / "ring") != before and _attached(folder / "ring", text)
-
-        waited_for(in_new_file, "the script in the next file")
-        client.stop()
-        thread.join(20.0)
-        client.clear_stop()
-    assert text in scripts_of(before[-1]).values()
-    (last,) = (each for each in katana450.open(kept(folder)).programs if each.name == "Long")
-    assert last.end is not None
-
-
-def suppressed(client: Client, text: str) -> None:
-    with suppress(RefusedError):
-        client.run(text)
-
-
-def _attached(folder: Path, text: str) -> bool:
-    """Return whether the newest file of ``folder``, which is being written, has ``text``."""
-    files = recordings_in(folder)
-    path = whole_copy(files[-1], folder.parent / "copy.mcap") if files else None
-    return path is not None and text in scripts_of(path).values()
 
 
 def recorded_ring(folder: Path, times: tuple[tuple[float, float | None], ...]) -> RunningScripts:

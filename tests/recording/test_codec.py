@@ -40,16 +40,9 @@ from katana450.extensions.programs.planning.curves import (
     ToolTurn,
     TurnedCurve,
 )
-from katana450.extensions.recording.codec import (
-    Codec,
-    form_of,
-    json_form,
-    json_text,
-    key_of,
-    recorded_classes,
-)
+from katana450.extensions.recording.codec import Codec, form_of, key_of, recorded_classes
 from katana450.extensions.recording.former_forms import target_content
-from katana450.extensions.recording.forms import FormError
+from katana450.extensions.recording.forms import FormError, json_form, json_text
 from katana450.extensions.recording.ticks import Digester
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.branch import branch_of

@@ -18,6 +18,8 @@ from katana450.extensions.recording.datasets.lerobot_export import LerobotOption
 from katana450.extensions.recording.datasets.ros_bag import write_bag
 from katana450.extensions.recording.datasets.sampling import RecordedStates
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.files.simulation import verify_recording
+from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS, EPISODES, EVENTS, STATE
 from tests.conftest import LONG
 from tests.recording.dataset_files import episode, write_copy
@@ -68,6 +70,8 @@ def changing(chance: random.Random) -> Callable[[Message], Message]:
     def change(message: Message) -> Message:
         if message.topic not in CHANGED or chance.random() > 0.1:
             return message
+        if chance.random() < 0.05:
+            return message._replace(data=message.data[:-1])
         form = changed(json.loads(message.data), chance)
         return message._replace(data=json.dumps(form).encode())
 
@@ -75,10 +79,12 @@ def changing(chance: random.Random) -> Callable[[Message], Message]:
 
 
 def exports(path: Path, out: Path) -> None:
-    """Export ``path`` in several forms; only errors for people are expected."""
+    """Verify, cut and export ``path``; only errors for people are expected."""
     with RecordingFile.open(path) as file:
         times = np.linspace(file.start, min(file.end, file.start + 1.0), 5)
         for work in (
+            lambda: verify_recording(file, described().session),
+            lambda: trim([path], out / "part", file.start + 0.03, file.start + 0.09),
             lambda: write_bag(file, out / "bag"),
             lambda: list(RecordedStates(file, described().session).at(times)),
             lambda: export_lerobot([path], out / "set", LerobotOptions(30, "x")),
@@ -92,7 +98,7 @@ def test_changed_recording_is_refused_or_exported(run: Path, tmp_path: Path, num
     path = write_copy(run, tmp_path / "changed.mcap", change=changing(random.Random(number)))
     exports(path, tmp_path)
     assert {each.name for each in tmp_path.iterdir()} <= {
-        "changed.mcap", "bag", "set",
+        "changed.mcap", "part", "bag", "set",
     }  # fmt: skip
 
 

@@ -168,16 +168,6 @@ def begun(files: list[Path], out: Path, *words: str) -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.long
-def test_interrupted_export_leaves_nothing(run: Path, tmp_path: Path) -> None:
-    out = tmp_path / "set"
-    process = begun([run] * 100, out)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.cases(1)
 @pytest.mark.parametrize(
     "number", [1, *(pytest.param(n, marks=pytest.mark.long) for n in range(2, 12))]

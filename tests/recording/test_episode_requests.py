@@ -17,7 +17,6 @@ from katana450.client.files import EpisodeClient, LostError, Site
 from katana450.errors import InputError
 from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import Episode, EpisodeOutcome, episodes_of
-from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from katana450.extensions.recording.episodes.keeper import EpisodeKeeper
 from katana450.extensions.recording.episodes.routes import EpisodeRoutes
 from katana450.extensions.recording.files.recording_file import RecordingFile
@@ -189,13 +188,3 @@ def test_answer_that_is_not_understood_is_an_error_of_this_project(content: byte
         for act in (client.start, client.list):
             with pytest.raises(LostError, match="is not understood"):
                 act()
-
-
-def test_folder_of_markers_of_earlier_versions_is_read(tmp_path: Path, bench: Bench) -> None:
-    bench.ask(do="start", task="pour")
-    (path,) = bench.folder.folder.glob("*.running.json")
-    found = json.loads(path.read_bytes())
-    del found["replaces"]
-    (tmp_path / path.name).write_text(json.dumps(found))
-    (marker,) = EpisodeFolder(tmp_path).markers()
-    assert marker.replaces == ()

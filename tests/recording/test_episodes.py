@@ -17,7 +17,6 @@ from msgspec import structs
 import katana450
 from katana450.cli.main import main
 from katana450.errors import InputError
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes import running_episode
 from katana450.extensions.recording.episodes.episode import (
     Episode,
@@ -27,7 +26,6 @@ from katana450.extensions.recording.episodes.episode import (
     message_of,
 )
 from katana450.extensions.recording.episodes.episode_folder import (
-    EpisodeFolder,
     episode_files,
     only_episode,
     with_episode,
@@ -37,6 +35,7 @@ from katana450.extensions.recording.episodes.keeper import UNDO_SECONDS
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import session_for, verify_recording
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live import ring as ring_module
 from katana450.extensions.recording.messages import EPISODES, STATE
 from katana450.server.api.episode_requests import episode_request
@@ -383,15 +382,6 @@ def test_folder_is_listed_and_recovered_by_the_command(
     assert main(["record", "list", folder]) == 0
     assert "episode 2, unfinished: stir" in capsys.readouterr().out
     bench.keeper = bench.made()
-
-
-def test_only_one_server_uses_a_folder(bench: Bench) -> None:
-    other = EpisodeFolder(bench.folder.folder)
-    with pytest.raises(InputError, match="Another server uses"):
-        other.claim()
-    bench.folder.release()
-    other.claim()
-    other.release()
 
 
 def test_folder_lists_files_only(bench: Bench, recorded: Path) -> None:

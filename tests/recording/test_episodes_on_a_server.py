@@ -20,11 +20,8 @@ from katana450.client.files import EpisodeClient, Site
 from katana450.extensions.recording.episodes.episode import EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
-from tests.conftest import LONG
 from tests.gateway.client import ask, enter
-from tests.recording.test_recorder import MAX_LOSS, POSTURES, RECORDER, waited_for
-
-KILLS = 8 if LONG else 1
+from tests.recording.test_recorder import POSTURES, RECORDER, waited_for
 
 
 @pytest.fixture
@@ -115,33 +112,6 @@ def test_client_records_episodes(
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_killed_recorder_keeps_the_running_episode_as_unfinished(
-    server: AppServer, folder: Path
-) -> None:
-    client = started(server, "first")
-    move(server, *POSTURES)
-    client.stop("success")
-    for kill in range(KILLS):
-        number = client.start("killed")
-        moved = move(server, *POSTURES)
-        time.sleep(0.2 * (kill % 5))
-        recorder = server.child(RECORDER)
-        os.kill(recorder, signal.SIGKILL)
-        waited_for(partial(_has, folder, number), "the interrupted episode")
-        found = EpisodeFolder(folder).find(number)
-        assert found.episode.outcome is EpisodeOutcome.UNFINISHED
-        assert moved - (found.episode.end or 0.0) <= MAX_LOSS
-        # In a process that rounds as those of the server.
-        verified = katana450.open(found.path).verify()
-        assert verified.identical, str(verified)
-        waited_for(partial(_answers, client, number), "the next process")
-    kept = EpisodeFolder(folder).kept()
-    assert [each.episode.number for each in kept] == list(range(1, KILLS + 2))
-    assert kept[0].episode.outcome is EpisodeOutcome.SUCCESS
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 def test_killed_server_leaves_an_episode_that_is_recovered(
     command: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -171,16 +141,6 @@ def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) 
     (kept,) = EpisodeFolder(folder).kept()
     assert kept.episode.outcome is EpisodeOutcome.UNFINISHED
     assert kept.episode.length > 1.0
-
-
-def _has(folder: Path, number: int) -> bool:
-    return EpisodeFolder(folder).path(number).exists()
-
-
-def _answers(client: EpisodeClient, number: int) -> bool:
-    with suppress(RefusedError):
-        return client.judge("failure", number) == number
-    return False
 
 
 def _recovered(folder: Path) -> bool:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files.recording_file import Message
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import EVENTS
 from katana450.extensions.recording.playback.marks import Mark, add_marks
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +19,16 @@ from katana450.arm.runtime.loop import ControlLoop
 from katana450.arm.runtime.mailbox import Mailbox
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.cli.main import main
-from katana450.client import connect
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.files.header import header_of
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
-from katana450.server.api import answers, requests
 from katana450.settings import Settings
-from tests.browser.server import RECORDING_APP, AppServer
 from tests.general_arms.links_of_arms import ur5e
 from tests.recording.lerobot_check import check_dataset, rows_of
 from tests.recording.recorded import ADA, PERIOD, TestClock
-from tests.recording.test_datasets_pictures import decoded
-from tests.recording.test_recorder import waited_for
 
 TOLERANCE = 1.5e-4
 """[rad] Distance of a run from the recorded setpoints, as in ``test_run_again``."""
@@ -86,14 +80,6 @@ def test_states_have_all_axes_and_the_tool(path: Path, described: DescribedRobot
     assert float(np.ptp(run.position[:, 1])) > 0.09
 
 
-def test_verification_needs_its_urdf(
-    path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert katana450.open(path).verify(urdf).identical
-    assert main(["record", "verify", str(path)]) == 1
-    assert "Name the same URDF" in capsys.readouterr().err
-
-
 def test_score_has_the_measures_of_the_tool(
     path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -142,47 +128,3 @@ def test_tables_bags_and_datasets_have_six_axes(path: Path, tmp_path: Path) -> N
     assert last.name[:2] == ["shoulder_pan_joint", "shoulder_lift_joint"]
     check_dataset(tmp_path / "lerobot")
     assert np.array(rows_of(tmp_path / "lerobot")["action"]).shape[1] == 7
-
-
-@pytest.mark.long
-def test_pages_and_films_show_it(path: Path, urdf: Path, tmp_path: Path) -> None:
-    export = ["record", "export", str(path), "--urdf", str(urdf), "--to", "1", "--format"]
-    page, film = tmp_path / "run.html", tmp_path / "run.mp4"
-    assert main([*export, "html", "--out", str(page)]) == 0
-    assert "ur5e: run" in page.read_text(encoding="utf-8")
-    assert main([*export, "mp4", "--out", str(film), "--size", "160x120", "--fps", "5"]) == 0
-    pictures = decoded(film, (160, 120))
-    assert len(pictures) == 6
-    assert np.abs(pictures[0].astype(int) - pictures[-1].astype(int)).max() > 50
-
-
-@pytest.mark.long
-def test_server_records_it_and_runs_it_again(
-    urdf: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folders = ("--record", str(tmp_path / "ring"), "--episodes", str(tmp_path / "episodes"))
-    kept = tmp_path / "kept.mcap"
-    with AppServer((*RECORDING_APP, "--urdf", str(urdf), *folders)) as server:
-        with connect(server.url, "Ada") as client:
-            client.ask(requests.Home(wait=30))
-            T = np.array(client.query(answers.State).T)
-            target = T[:3, 3] + (0.0, 0.05, -0.05)
-            client.ask(requests.Position(p=target, wait=30))
-            end = client.query(answers.State).q
-
-            def recorded() -> bool:
-                try:
-                    kept.write_bytes(client.recording())
-                except katana450.KatanaError:
-                    return False
-                return bool(np.abs(katana450.open(kept).setpoint[-1] - end).max() < 1e-9)
-
-            waited_for(recorded, "the motion in the recording", 60.0)
-        assert katana450.open(kept).verify(urdf).identical
-        command = ["record", "again", str(kept), "--urdf", str(urdf), "--url", server.url]
-        assert main(command) == 0
-        found = re.search(r"recorded setpoints: (\S+) rad", capsys.readouterr().out)
-        assert found is not None
-        assert 0.0 < float(found[1]) < 1e-3
-        with connect(server.url, "Ada") as client:
-            np.testing.assert_allclose(client.query(answers.State).q, end, atol=1e-6)

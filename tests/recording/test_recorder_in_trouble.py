@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
-import random
 import resource
-import signal
 import subprocess
 import sys
 import threading
@@ -25,15 +22,12 @@ from katana450.client import RefusedError, connect
 from katana450.extensions.recording.files.keeping import whole_copy
 from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.folders import recordings_in
-from katana450.extensions.recording.live import record_end, ring
+from katana450.extensions.recording.live import ring
 from katana450.extensions.recording.messages import COMMANDS
 from katana450.server.api import answers, requests
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
-from tests.conftest import LONG
 from tests.recording.recorded import PERIOD
-from tests.recording.test_recorder import MAX_LOSS, POSTURES, RECORDER, tick_times, waited_for
-
-KILLS = 50 if LONG else 1
+from tests.recording.test_recorder import POSTURES, RECORDER, tick_times, waited_for
 
 SMALL_DISK = 'mount -t tmpfs -o size=1m none {folder} && exec "$@"'
 """Command of a shell that begins with a disk of 1 MB at a folder."""
@@ -87,29 +81,6 @@ def whole_times(path: Path, copy: Path) -> list[float]:
     return []
 
 
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
-def test_recorder_killed_in_motion_loses_a_second(folder: Path, tmp_path: Path) -> None:
-    """The next tick that is recorded follows the last one by 1.1 s at most."""
-    chance, gaps = random.Random(1), []
-    with AppServer(command(folder)) as server, swinging(server):
-        waited_for(lambda: recordings_in(folder), "the first file", 60.0)
-        for _ in range(KILLS):
-            time.sleep(chance.uniform(0.7, 2.5))
-            before, killed = recordings_in(folder)[-1], recorder(server)
-            assert killed is not None
-            os.kill(killed, signal.SIGKILL)
-            waited_for(lambda old=before: recordings_in(folder)[-1] != old, "a new file", 60.0)  # type: ignore[misc]
-            copy = tmp_path / "copy.mcap"
-            waited_for(partial(whole_times, recordings_in(folder)[-1], copy), "ticks", 60.0)
-            broken, after = recordings_in(folder)[-2:]
-            assert broken == before
-            gaps.append(whole_times(after, copy)[0] - tick_times(broken)[-1])
-    assert max(gaps) <= MAX_LOSS, gaps
-    # Something was lost each time, so the kills were in the motion.
-    assert min(gaps) > 0.0
-
-
 def gaps_of(path: Path) -> list[tuple[float, int, str]]:
     """Return length [s], number of ticks and reason of each gap in ``path``."""
     before, gaps = 0.0, []
@@ -120,32 +91,6 @@ def gaps_of(path: Path) -> list[tuple[float, int, str]]:
                 gaps.append((found["t"] - before, found["ticks"], found["missing"]))
             before = found["t"]
     return gaps
-
-
-@pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGSTOP")
-def test_recorder_that_hangs_delays_no_tick(folder: Path, tmp_path: Path) -> None:
-    kept = tmp_path / "kept.mcap"
-    with AppServer(command(folder)) as server, swinging(server):
-        waited_for(lambda: recordings_in(folder), "the first file", 60.0)
-        process = recorder(server)
-        assert process is not None
-        with server.frozen(process), connect(server.url, "Look") as look:
-            # What the arm's process and the pipe hold, and 5 s more.
-            time.sleep(PERIOD * record_end.MAX_WAITING + 8.0)
-            timing = look.query(answers.Loop)
-        # A tick that waited for its reader would be late by seconds.
-        assert timing.late_p50 < PERIOD
-        waited_for(lambda: "were not recorded" in server.output, "the report", 60.0)
-        time.sleep(2.0)
-    assert "could not keep up" in server.output
-    assert main(["record", "keep", str(folder), "--out", str(kept)]) == 0
-    ((length, ticks, why),) = gaps_of(kept)
-    assert "could not keep up" in why
-    assert 0.5 * length < ticks * PERIOD < length + 0.5
-    result = katana450.open(kept).verify()
-    assert result.identical
-    assert result.unknown == ticks
 
 
 def mounted(folder: Path, line: tuple[str, ...]) -> tuple[str, ...] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from argparse import Namespace
@@ -22,7 +21,6 @@ from katana450.cli.main import main
 from katana450.errors import InputError
 from katana450.extension import ServerFacts
 from katana450.extensions.export.playback import load_motion
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.files import recording_writer
 from katana450.extensions.recording.files.header import (
     MAX_SCENE_BYTES,
@@ -38,6 +36,7 @@ from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.table import columns, state_at
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.folders import recordings_in
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.live import recorder
 from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.extensions.recording.messages import (
@@ -184,22 +183,6 @@ def test_states_are_the_changed_ones_to_the_bit(
         assert json.loads(found.data)["setpoint"] == tick.state.setpoint.tolist()
 
 
-def test_objects_and_water_follow_the_states(
-    file: RecordingFile, records: list[TickRecord]
-) -> None:
-    objects: dict[str, list[float]] = {}
-    for message in file.messages(STATE):
-        each = json.loads(message.data)
-        objects.update({one["name"]: one["position"] for one in each.get("objects", ())})
-        for name in each.get("removed", ()):
-            del objects[name]
-    last = records[-1].state
-    assert set(objects) == {each.name for each in last.objects}
-    for each in last.objects:
-        pose = described().session.environment.pose(each, last.x)
-        np.testing.assert_allclose(objects[each.name], pose[:3, 3], atol=2e-6)
-
-
 def test_state_at_any_moment_has_all_objects(
     file: RecordingFile, records: list[TickRecord], path: Path, tmp_path: Path
 ) -> None:
@@ -297,33 +280,6 @@ def test_csv_is_a_motion_that_export_plays(
     for axis, name in enumerate(chain.names):
         assert motion.values[name].tobytes() == table["setpoint"][:, axis].tobytes()
     assert records[0].t + 0.4 < table["t"][0]
-
-
-def test_full_disk_is_reported_and_what_was_synced_is_whole(
-    records: list[TickRecord], tmp_path: Path
-) -> None:
-    class FullDisk(io.BytesIO):
-        def write(self, data: object) -> int:
-            if self.tell() > 60_000:
-                raise OSError(28, "No space left on device")
-            return super().write(data)  # type: ignore[arg-type]
-
-    file = FullDisk()
-
-    def write() -> None:
-        writer = RecordingWriter(file, header())
-        for number, each in enumerate(records * 3):
-            writer.put(each)
-            if number % 50 == 49:
-                writer.flush()
-
-    with pytest.raises(OSError, match="No space"):
-        write()
-    broken = tmp_path / "broken.mcap"
-    broken.write_bytes(file.getvalue())
-    assert main(["record", "recover", str(broken)]) == 0
-    with RecordingFile.open(broken) as whole:
-        assert whole.counts()[COMMANDS] >= 50
 
 
 def test_file_that_is_being_written_is_not_replaced(

@@ -26,8 +26,6 @@ from katana450.extensions.recording.files.recording_file import Message, Recordi
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
 from katana450.extensions.recording.files.simulation import (
     recorded_states,
-    session_for,
-    verify_recording,
 )
 from katana450.extensions.recording.messages import COMMANDS, STATE
 from katana450.extensions.recording.run_again.again_command import script_of_part
@@ -228,13 +226,6 @@ def test_damaged_message_is_refused_in_words(
     assert not (tmp_path / "again.yaml").exists()
 
 
-def test_other_robot_is_refused(dragged: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["record", "again", str(dragged), "--urdf", str(GANTRY)]) == 1
-    assert "not of" in capsys.readouterr().err
-    with RecordingFile.open(dragged) as file, pytest.raises(InputError, match="not of"):
-        session_for(file, GANTRY)
-
-
 @pytest.mark.parametrize(
     ("start", "end", "why"),
     [(100.0, 110.0, "has nothing of it"), (3.1, 3.2, "Nothing moves"), (2.0, 1.0, "nothing of it")],
@@ -244,20 +235,6 @@ def test_parts_without_motion_are_refused(
 ) -> None:
     with RecordingFile.open(dragged) as file, pytest.raises(InputError, match=why):
         read_part(file, start, end)
-
-
-@pytest.mark.long
-def test_recording_of_a_run_is_verified_and_runs_again(dragged: Path, tmp_path: Path) -> None:
-    """Trajectories are plans that recordings can hold."""
-    _, text = read(dragged, 0.0, 1.5)
-    path = record_session(tmp_path / "second.mcap", 500, program(text))
-    with RecordingFile.open(path) as file:
-        result = verify_recording(file, described().session)
-        assert json.loads(file.metadata["settings"])["bare"] is False
-    assert result.identical, str(result)
-    part, again = read(path)
-    trace = run_by_clock(planned(again)).trace
-    assert distance(part, trace.q) < TOLERANCE
 
 
 def moved(*pieces: FloatArray) -> RecordedPart:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import re
-import threading
-import time
 from argparse import Namespace
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,9 +15,8 @@ from starlette.requests import Request
 
 import katana450
 from katana450.arm.control.lease import Role
-from katana450.arm.control.state.scene_objects import Shape
 from katana450.cli.main import main
-from katana450.client import Client, RefusedError
+from katana450.client import RefusedError
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.recording.live.jobs import RecordingRoutes
 from katana450.extensions.recording.playback.store import RecordingStore
@@ -86,33 +82,6 @@ def test_script_of_the_last_seconds_is_served(server: AppServer, recorded: Path)
     assert len(katana450.open(recorded).t) > 100
 
 
-@pytest.mark.long
-def test_stop_in_the_middle_ends_it_and_it_can_run_again(
-    server: AppServer, recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It is a program for everything that controls programs."""
-    status: list[int] = []
-    command = ["record", "again", str(recorded), "--url", server.url]
-    thread = threading.Thread(target=lambda: status.append(main(command)))
-    with katana450.connect(server.url, "Ada") as client:
-        thread.start()
-        waited_for(lambda: _task(client) == "trajectory", "the trajectory")
-        time.sleep(0.5)
-        client.stop()
-        thread.join(20.0)
-        assert status == [1]
-        assert "Ada pressed STOP" in capsys.readouterr().err
-        client.clear_stop()
-        script = tmp_path / "again.yaml"
-        assert main([*command, "--out", str(script)]) == 0
-        found = katana450.open(recorded)
-        moved = np.flatnonzero(np.abs(found.setpoint - found.setpoint[0]).max(axis=1) > 1e-3)[0]
-        end = float(found.t[moved] - found.start) + 1.0
-        posture = client.run(found.script(end=end)).q
-        number = int(np.searchsorted(found.t - found.start, end, side="right")) - 1
-        np.testing.assert_allclose(posture, found.setpoint[number], atol=1e-6)
-
-
 def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_path: Path) -> None:
     """A page may open a recording of another robot than that of ``serve --urdf``."""
     other = tmp_path / "other.urdf"
@@ -142,32 +111,3 @@ def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -
 
         with pytest.raises(katana450.InputError, match="joint limits or tool frames differ"):
             check_same_arm(OtherArm(), described().session.require_arm(), recorded)  # type: ignore[arg-type]
-
-
-def _task(client: Client) -> str:
-    program = client.query(answers.State).program
-    return "" if program is None or program.status != "running" else program.task
-
-
-@pytest.mark.long
-def test_present_obstacle_is_refused(
-    server: AppServer, recorded: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with katana450.connect(server.url, "Ada") as client:
-        passed = katana450.open(recorded).position
-        place = np.eye(4)
-        place[:3, 3] = passed[len(passed) // 3] - (0.0, 0.0, 0.03)
-        client.go(requests.Home())
-        client.ask(
-            requests.Place(
-                name="stone",
-                T=place,
-                shape=Shape.BOX,
-                size=[0.06, 0.06, 0.06],
-            )
-        )
-        assert main(["record", "again", str(recorded), "--url", server.url]) == 1
-        assert re.search(
-            r"At [\d.]+ s of the trajectory, with the tool at .* stone would",
-            capsys.readouterr().err,
-        )

@@ -22,7 +22,6 @@ from katana450.extensions.media.measures import measurements
 from katana450.extensions.programs.run.simulation import plan_script, run_by_clock
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import library_file, script_text
-from katana450.extensions.recording.codec import json_text
 from katana450.extensions.recording.episodes.episode import (
     Episode,
     EpisodeGiver,
@@ -36,6 +35,7 @@ from katana450.extensions.recording.episodes.episode_folder import (
     write_episode,
 )
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
+from katana450.extensions.recording.forms import json_text
 from katana450.extensions.recording.messages import EPISODES, nanoseconds
 from katana450.extensions.recording.scoring.score_command import Leaderboard, score_file, shown
 from katana450.extensions.recording.scoring.scored import (

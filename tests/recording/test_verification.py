@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from queue import SimpleQueue
 
 import numpy as np
 import pytest
@@ -17,10 +15,6 @@ import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.state import Reason
 from katana450.arm.drivers.driver import DriverAnswer
-from katana450.arm.drivers.simulated import SimulatedDriver
-from katana450.arm.runtime.clock import MonotonicClock
-from katana450.arm.runtime.loop import ControlLoop
-from katana450.arm.runtime.mailbox import Mailbox
 from katana450.arm.runtime.tick import Submission, TickRecord, stepped
 from katana450.assembly.robot_session import find_robot
 from katana450.cli.main import main
@@ -30,7 +24,7 @@ from katana450.extensions.recording.files.header import fingerprint, header_of
 from katana450.extensions.recording.files.record_command import same_setpoints
 from katana450.extensions.recording.files.recording_file import Message, RecordingFile
 from katana450.extensions.recording.files.recording_writer import RecordingWriter
-from katana450.extensions.recording.files.simulation import TickReader, verify_recording
+from katana450.extensions.recording.files.simulation import verify_recording
 from katana450.extensions.recording.files.trimming import trim
 from katana450.extensions.recording.messages import CHECKPOINTS, COMMANDS
 from katana450.extensions.recording.ticks import Difference, Digester, Verification
@@ -84,21 +78,6 @@ def test_every_part_is_identical_from_its_first_complete_state(
         assert result.identical, result
         assert result.ticks > 50
         assert result.unknown == 0
-
-
-def test_tick_inputs_are_those_of_the_loop(path: Path, records: list[TickRecord]) -> None:
-    reader = TickReader()
-    with RecordingFile.open(path) as file:
-        for message in file.messages("/plans", "/solids"):
-            reader.add_shared(message)
-        ticks = [reader.tick(message) for message in file.messages(COMMANDS)]
-    assert len(ticks) == len(records)
-    for tick, made in zip(ticks, records, strict=True):
-        assert tick.t == made.t
-        given = [type(each.command) for each in tick.submissions]  # type: ignore[union-attr]
-        assert given == [type(each.command) for each in made.submissions]
-        names = [each.actor.name for each in tick.submissions if each.actor]  # type: ignore[union-attr]
-        assert names == [each.actor.name for each in made.submissions if each.actor]
 
 
 def test_identities_of_people_are_not_in_the_file(path: Path, records: list[TickRecord]) -> None:
@@ -170,26 +149,6 @@ def test_value_without_a_form_is_a_gap(records: list[TickRecord], tmp_path: Path
     assert b"not Unicode" in text
     assert result.identical
     assert result.unknown == 1
-
-
-def test_loop_on_the_clock_of_the_machine_is_identical(tmp_path: Path) -> None:
-    found, records = described(), SimpleQueue[TickRecord]()
-    mailbox = Mailbox(found.session.check)
-    driver = SimulatedDriver(found.robot.require_arm(), found.session.ready, 0.0)
-    loop = ControlLoop(found.session, driver, mailbox, MonotonicClock(), 100.0)
-    loop.record = records.put
-    loop.start()
-    for goal in (0.2, -0.2, 0.0):
-        mailbox.put(cmd.Joints(found.session.ready + goal), ADA)
-        time.sleep(0.15)
-    loop.stop()
-    taken = [records.get() for _ in range(records.qsize())]
-    with RecordingFile.open(write(tmp_path / "real.mcap", taken)) as file:
-        # A session of its own, which has not seen these states.
-        result = verify_recording(file, fresh().session)
-    assert str(result) == f"identical to the bit over {len(taken) - 1} ticks"
-    assert len(taken) > 30
-    assert sum(len(each.submissions) for each in taken) == 3
 
 
 def test_mechanism_without_an_arm_is_recorded(
