@@ -21,6 +21,7 @@ from katana450.extensions.recording.messages import (
     STATE,
     ObjectPose,
     StateRow,
+    nanoseconds,
 )
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 
@@ -76,7 +77,8 @@ def rows_from(file: RecordingFile, start: float, end: float) -> Iterator[StateRo
     if before is not None:
         yield structs.replace(before, t=start)
     for row in rows(file, start, end):
-        if before is None or row.t > start:
+        # The times of messages are whole nanoseconds, those of states are not.
+        if before is None or nanoseconds(row.t) > nanoseconds(start):
             yield row
 
 
