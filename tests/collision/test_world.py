@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from katana450.maths.collision.linkage import Linkage, RigidGroup
 from katana450.maths.collision.shape import box, half_space
@@ -136,3 +137,21 @@ def test_turn_of_a_part_on_the_table_is_decided_in_few_postures() -> None:
     assert nearest is not None
     assert abs(nearest.contact.distance) < 1e-6
     assert asked <= MAX_POSTURES
+
+
+def standing_box(gap: float) -> CollisionWorld:
+    """A box on a joint, with its bottom ``gap`` [m] above the table."""
+    turning = RigidGroup(0, np.eye(4), np.array([0.0, 0.0, 1.0]), 0)
+    middle = se3.from_rotation_translation(np.eye(3), np.array([0.0, 0.0, 0.1 + gap]))
+    part = Part("box", 1, (middle,), (box((0.1, 0.1, 0.2)),))
+    table = obstacle("table", np.eye(4), half_space())
+    return CollisionWorld(Linkage([turning]), [part], []).with_obstacles([table])
+
+
+def test_bodies_that_touch_may_overlap_by_the_rounding_of_depths() -> None:
+    """Whether bodies that touch are 1e-17 m apart or overlap depends on the processor."""
+    for gap in (-1e-9, 0.0, 1e-16, 5e-8):
+        room = SweptClearance.about(standing_box(gap), 0.006, np.zeros(2))
+        assert room.minimum.min() == pytest.approx(-1e-5, abs=1e-6), gap
+    apart = SweptClearance.about(standing_box(1e-3), 0.006, np.zeros(2))
+    assert apart.minimum.min() == pytest.approx(1e-3, abs=1e-6)

@@ -35,6 +35,15 @@ STEP_ATTEMPTS = 6
 """Number of fractions of a step that are tried before the arm waits."""
 
 
+def rounding_of(distance: float) -> float:
+    """Return the bound [m] on the rounding of ``distance`` [m].
+
+    Bodies that touch overlap on one processor and are 1e-17 m apart on another: their rounding is
+    that of depths.
+    """
+    return DISTANCE_ROUNDING if distance > DISTANCE_ROUNDING else DEPTH_ROUNDING
+
+
 MAX_GLANCE_ANGLE = 0.6
 """Sum of joint turns [rad] above which `is_surely_clear` gives no answer."""
 
@@ -162,8 +171,7 @@ class _ActivePair:
     def fit(self, after: float) -> float:
         """Return the allowed fraction of a step that ends with the distance ``after`` [m]."""
         used = self.before - after
-        rounding = DISTANCE_ROUNDING if self.before > 0.0 else DEPTH_ROUNDING
-        return self.spare / used if used > self.spare + rounding else 1.0
+        return self.spare / used if used > self.spare + rounding_of(self.before) else 1.0
 
 
 class _Path:

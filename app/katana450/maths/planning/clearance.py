@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from katana450.maths.collision.clearance import DEPTH_ROUNDING, DISTANCE_ROUNDING, MIN_CLEARANCE
+from katana450.maths.collision.clearance import MIN_CLEARANCE, rounding_of
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
@@ -80,8 +80,8 @@ class SweptClearance:
             placed = world.at(x)
             for pair in placed.nearer_than(margin)[0].tolist():
                 distance = placed.distance(pair)
-                rounding = DISTANCE_ROUNDING if distance > 0.0 else DEPTH_ROUNDING
-                minimum[pair] = min(minimum[pair], max(distance - rounding, lowest))
+                nearer = distance - rounding_of(distance)
+                minimum[pair] = min(minimum[pair], max(nearer, lowest))
         return SweptClearance(world, minimum)
 
     def blocked(
