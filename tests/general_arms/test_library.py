@@ -178,7 +178,7 @@ WRONG: dict[str, tuple[Callable[[katana450.Arm], Any], str]] = {
     "priority": (lambda arm: arm.nearest(np.eye(4), priority="pitch"), "for five-axis arms"),
     "branch": (lambda arm: arm.nearest(np.eye(4), branch="front-up"), "for five-axis arms"),
     "goal out of reach": (lambda arm: arm.plan(np.diag([1.0, 1, 1, 1]) + FAR), "cannot take this"),
-    "roll in words": (lambda arm: arm.circle((0.3, 0, 0), 0.1, roll=np.nan), "roll is nan"),
+    "roll in words": (lambda arm: arm.circle((0.3, 0, 0), 0.1, roll=np.nan), "roll has nan"),
     "branch of a circle": (lambda arm: arm.circle((0.3, 0, 0), 0.1, branch="left"), "no branch"),
     "line to nowhere": (lambda arm: arm.line(by=(0.0, 0.0, 0.0)), "moves nothing"),
     "long line": (lambda arm: arm.line(by=(3.0, 0.0, 0.0)), "leaves the reach"),
