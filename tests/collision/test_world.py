@@ -149,7 +149,7 @@ def standing_box(gap: float) -> CollisionWorld:
 
 
 def test_bodies_that_touch_may_overlap_by_the_rounding_of_depths() -> None:
-    """Whether bodies that touch are 1e-17 m apart or overlap depends on the processor."""
+    """The processor decides whether they overlap or are 1e-17 m apart."""
     for gap in (-1e-9, 0.0, 1e-16, 5e-8):
         room = SweptClearance.about(standing_box(gap), 0.006, np.zeros(2))
         assert room.minimum.min() == pytest.approx(-1e-5, abs=1e-6), gap

@@ -204,7 +204,7 @@ EXTENSIONS = (
         folder=f"{HERE}.objects.objects_panel:ObjectsFolder",
     ),
     Extension("undo", handler=f"{HERE}.undo:UndoRequests"),
-    Extension("conduit", view_layer=f"{HERE}.conduit:ConduitLayer"),
+    Extension("conduit", view_layer=f"{HERE}.conduit.rings:ConduitLayer"),
     Extension("water", view_layer=f"{HERE}.water:WaterLayer"),
     Extension("general_arms", find_arm=f"{HERE}.general_arms.driven_tool:driven_arm"),
 )

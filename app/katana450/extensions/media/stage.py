@@ -16,7 +16,9 @@ from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh, shapes_of
 from katana450.arm.robot.visual import Visual
-from katana450.extensions.conduit import ConduitStretch, ring, rings_along, stretches_of
+from katana450.caching import cached_property
+from katana450.extensions.conduit.rings import PITCH, poses, ring
+from katana450.extensions.conduit.stretches import ConduitStretch, stretches_of
 from katana450.extensions.media.picture import Translucent
 from katana450.extensions.media.scene import Item
 from katana450.extensions.water import WaterPart, parts_of
@@ -51,7 +53,7 @@ class RenderStage:
         self._links = {link.name: link.shapes for link in robot.links}
         self._table = _in_file(props.table.mesh)
         self._props = props
-        self._stretches = stretches_of(robot)
+        self._stretches = [_BendableStretch(stretch) for stretch in stretches_of(robot)]
 
     def items(self, state: State) -> list[Item]:
         """Return all opaque items."""
@@ -68,15 +70,14 @@ class RenderStage:
 
     def conduit(self, state: State) -> list[Item]:
         """Return the items of the conduit."""
-        values = self._robot.joint_values(state.q, state.gripper)
-        frames = self._robot.frames(values)
+        frames, angles = self._frames(state), self._angles(state)
         return [
             Item(
                 CONDUIT,
-                _hose(stretch, stretch.curve(self._robot, values, frames)),
-                frames[stretch.start],
+                bendable.bent(angles[bendable.stretch.hinge.joint]),
+                frames[bendable.stretch.start.link],
             )
-            for stretch in self._stretches
+            for bendable in self._stretches
         ]
 
     def surrounding_items(self, state: State) -> list[Item]:
@@ -103,29 +104,45 @@ class RenderStage:
         water_environment = pouring.water_environment(state.objects)
         return [_translucent(part) for part in parts_of(state.poured.water, water_environment)]
 
+    def _angles(self, state: State) -> Mapping[str, float]:
+        return self._robot.joint_values(state.q, state.gripper)
+
     def _frames(self, state: State) -> Mapping[str, FloatArray]:
         """Return the pose (4, 4) of each link in the base frame."""
-        return self._robot.frames(self._robot.joint_values(state.q, state.gripper))
+        return self._robot.frames(self._angles(state))
+
+
+class _BendableStretch:
+    """The rings of a stretch of conduit, as on the page."""
+
+    def __init__(self, stretch: ConduitStretch) -> None:
+        self.stretch = stretch
+        self._vertices, self._faces = ring(stretch.radius)
+        self._normals = smooth_normals(self._vertices, self._faces)
+
+    @cached_property
+    def _poses(self) -> FloatArray:
+        """The poses (A, count, 7) of the rings: quaternion wxyz and position [m]."""
+        return np.asarray(poses(self.stretch, round(self.stretch.length / PITCH)), dtype=float)
+
+    def bent(self, angle: float) -> VisualMesh:
+        """Return its mesh for the joint at ``angle`` [rad], in the frame of its first link."""
+        low, fraction = self.stretch.between(angle)
+        rings = self._poses[low] + fraction * (self._poses[low + 1] - self._poses[low])
+        R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
+        vertices = np.einsum("rij,vj->rvi", R, self._vertices) + rings[:, None, 4:]
+        normals = np.einsum("rij,vj->rvi", R, self._normals)
+        faces = self._faces + len(self._vertices) * np.arange(len(rings))[:, None, None]
+        return VisualMesh(
+            HOSE,
+            frozen(vertices.reshape(-1, 3)),
+            frozen(normals.reshape(-1, 3)),
+            faces.reshape(-1, 3).astype(np.int64),
+        )
 
 
 HOSE = Material("rubber", (0.035, 0.035, 0.04))
 """Material of the conduit."""
-
-
-def _hose(stretch: ConduitStretch, curve: FloatArray) -> VisualMesh:
-    """Return the rings along ``curve`` (n, 3) [m], as on the page, in the frame of its points."""
-    rings = rings_along(curve, stretch.count)
-    rib, faces = ring(stretch.radius)
-    R = np.array([so3.from_quaternion(pose) for pose in rings[:, :4]])
-    vertices = np.einsum("rij,vj->rvi", R, rib) + rings[:, None, 4:]
-    normals = np.einsum("rij,vj->rvi", R, smooth_normals(rib, faces))
-    every = faces + len(rib) * np.arange(len(rings))[:, None, None]
-    return VisualMesh(
-        HOSE,
-        frozen(vertices.reshape(-1, 3)),
-        frozen(normals.reshape(-1, 3)),
-        every.reshape(-1, 3).astype(np.int64),
-    )
 
 
 @lru_cache
