@@ -17,6 +17,9 @@ from katana450.extensions.touch.touch_model import TouchModel
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.control.test_grip import AT, BEFORE, OPEN, before_cup, run
+from tests.view.conftest import server
+
+__all__ = ["server"]
 
 
 @pytest.fixture(scope="session")

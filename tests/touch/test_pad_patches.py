@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,14 +24,6 @@ from katana450.extensions.touch.pad_patches import (
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.resources import STATIC
-from tests.browser.server import free_port
-
-
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(port=free_port(), verbose=False)
-    yield server
-    server.stop()
 
 
 def test_patches_show_what_is_pressed_and_vanish(

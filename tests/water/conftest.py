@@ -7,6 +7,9 @@ import pytest
 from katana450.arm.robot.props import load_props, water_environment
 from katana450.maths.water.environment import WaterEnvironment
 from katana450.maths.water.flow import WaterFlow
+from tests.view.conftest import server
+
+__all__ = ["server"]
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -52,12 +51,8 @@ class Recorded:
 
 
 @pytest.fixture
-def recorded(monkeypatch: pytest.MonkeyPatch) -> Iterator[Recorded]:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        yield Recorded(server, monkeypatch)
-    finally:
-        server.stop()
+def recorded(server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> Recorded:
+    return Recorded(server, monkeypatch)
 
 
 def test_water_at_rest_is_sent_once(recorded: Recorded) -> None:
