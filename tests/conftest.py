@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import tempfile
+from typing import Any
 
 import hypothesis
 import numpy as np
@@ -18,7 +19,7 @@ from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.settings import Settings
-from tests.schedule import Distribution
+from tests.schedule import Completeness, LowestPriority, Schedule
 
 LONG = "KATANA450_LONG" in os.environ
 MANY_DRAGS = int(os.environ.get("KATANA450_DRAGS", "500"))
@@ -29,16 +30,10 @@ hypothesis.settings.register_profile("katana450", deadline=None)
 hypothesis.settings.load_profile("katana450")
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option by which `make test` runs the tests in several processes."""
-    parser.addoption("--processes", type=int, default=1, help="processes that run the tests")
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Prepare each process that runs or distributes tests."""
-    number = config.getoption("processes")
-    if number > 1:
-        config.pluginmanager.register(Distribution(number))
+    in_worker = hasattr(config, "workerinput")
+    config.pluginmanager.register(LowestPriority() if in_worker else Completeness())
     # A shell has what it runs in the background ignore Ctrl-C, and so would all it starts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     # Servers that the tests start open no browser.
@@ -79,6 +74,12 @@ def _long(items: list[pytest.Item]) -> set[pytest.Item]:
         chosen = {cases[len(cases) * place // number] for place in range(number)}
         left_out.update(set(cases) - chosen)
     return left_out
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Schedule:
+    """Return the schedule by which `make test` runs the tests in several processes."""
+    return Schedule(config, log)
 
 
 @pytest.fixture(scope="session")

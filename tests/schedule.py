@@ -3,27 +3,20 @@
 Tests that drive a browser would starve each other of time, so they run in one process. Those that
 run servers mostly wait, and run in two. The others only compute. They run file by file, at the
 lowest priority, in the time that is left.
-
-The processes are forks of the one that collected the tests, so that modules are loaded once.
 """
 
 from __future__ import annotations
 
-import gc
 import os
-import signal
 import sys
-import tempfile
-import traceback
-from collections.abc import Iterator
+from collections import OrderedDict
 from contextlib import suppress
 from functools import cache
-from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path, PurePath
-from typing import NoReturn
+from typing import Any
 
 import pytest
-from _pytest.capture import FDCapture
+from xdist.scheduler.loadscope import LoadScopeScheduling
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -61,7 +54,9 @@ KINDS = {
     "tests/robot/test_other_arms.py": SERVERS[1],
     "tests/api/test_descriptions.py": SERVERS[1],
     "tests/rosbridge": SERVERS[1],
+    # The most tests come first, so a file of many takes the single test of the types along.
     "tests/control/test_transitions.py": EARLY,
+    "tests/packaging/test_types.py": EARLY,
 }
 """Kinds of the tests that need their time at once, or early, by their folders and files."""
 
@@ -91,167 +86,51 @@ def starts_servers(path: PurePath) -> bool:
     return any(word in text for word in ("AppServer", "Site", "aconnect"))
 
 
-def queue_of(items: list[pytest.Item]) -> list[list[int]]:
-    """Return the indices of ``items`` by kind: first those that mostly wait, then many tests."""
-    kinds: dict[str, list[int]] = {}
-    for index, item in enumerate(items):
-        kinds.setdefault(kind_of(item.nodeid), []).append(index)
-    first = [kinds.pop(kind) for kind in (*SERVERS, BROWSER, EARLY) if kind in kinds]
-    return first + sorted(kinds.values(), key=len, reverse=True)
+class Queue(OrderedDict[str, Any]):
+    """Kinds of tests that wait for a process: those that mostly wait come first."""
+
+    def popitem(self, last: bool = True) -> tuple[str, Any]:
+        """Remove the kind that is given out next, and return it with its tests."""
+        for kind in (*SERVERS, BROWSER, EARLY):
+            if kind in self:
+                return kind, self.pop(kind)
+        return super().popitem(last)
 
 
-class Distribution:
-    """Plugin that runs the tests of one kind in one process, in several processes at once.
+class Schedule(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
+    """The tests of one kind run in one process; after browser and servers those with the most."""
 
-    Args:
-        number: of the processes. On Windows, which has no forks, there is one.
-    """
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.workqueue: OrderedDict[str, Any] = Queue()
 
-    def __init__(self, number: int) -> None:
-        self._number = number
-        self._unfinished = 0
+    def _split_scope(self, nodeid: str) -> str:
+        return kind_of(nodeid)
 
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
-        """Run the tests; return None where pytest itself has to do it."""
-        if sys.platform == "win32" or session.testsfailed or session.config.option.collectonly:
-            return None
-        self._unfinished = len(session.items)
-        # The processes share the folder of temporary files, with other folders in it.
-        session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
-        # What is collected is garbage in none of them.
-        gc.freeze()
-        processes: dict[Connection, int] = {}
-        try:
-            for place in range(min(self._number, len(session.items))):
-                ours, theirs = Pipe()
-                process = os.fork()
-                if process == 0:
-                    for connection in (*processes, ours):
-                        connection.close()
-                    run_and_exit(session, theirs, place)
-                theirs.close()
-                processes[ours] = process
-            self._serve(session, processes)
-        finally:
-            for process in processes.values():
-                os.kill(process, signal.SIGINT)
-            for process in processes.values():
-                os.waitpid(process, 0)
-        return True
 
-    def _serve(self, session: pytest.Session, processes: dict[Connection, int]) -> None:
-        """Give ``processes`` their tests and report the results, until all of them have ended."""
-        hook = session.config.hook
-        kinds = queue_of(session.items)
-        running: dict[Connection, str] = {}
-        while processes:
-            for connection in wait(list(processes)):
-                assert isinstance(connection, Connection)
-                try:
-                    word, value = connection.recv()
-                except EOFError:
-                    _, status = os.waitpid(processes.pop(connection), 0)
-                    if status:
-                        print(f"\nA process ended with {status} in {running.get(connection)}.")
-                    continue
-                if word == "next":
-                    stopped = session.shouldfail or session.shouldstop
-                    connection.send([] if stopped or not kinds else kinds.pop(0))
-                elif word == "start":
-                    running[connection] = session.items[value].nodeid
-                elif word == "report":
-                    report = hook.pytest_report_from_serializable(config=session.config, data=value)
-                    hook.pytest_runtest_logreport(report=report)
-                else:
-                    self._unfinished -= 1
-        if session.shouldfail:
-            raise session.Failed(session.shouldfail)
+class Completeness:
+    """Plugin of the process that distributes the tests: it reports tests that were never run."""
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Fail with another status than that of failed tests, which are tried again.
 
-        A process that crashes leaves tests that were never run.
+        xdist ends early with the status of failed tests if its processes crash repeatedly.
         """
-        if self._unfinished and session.exitstatus != pytest.ExitCode.INTERRUPTED:
-            print(f"\n{self._unfinished} tests were not run.")
-            session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
-
-
-class Reporter:
-    """Plugin of a process that runs tests for others: it reports to the one that shows results."""
-
-    def __init__(self, config: pytest.Config, connection: Connection) -> None:
-        self._config = config
-        self._connection = connection
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send the report of a part of a test."""
-        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
-        self._connection.send(("report", data))
-
-
-def run_and_exit(session: pytest.Session, connection: Connection, place: int) -> NoReturn:
-    """Run the tests that ``connection`` names in this process, and end it."""
-    config = session.config
-    status = 1
-    try:
-        os.environ["XDG_STATE_HOME"] += f"/{place}"
-        separate_captures(config)
-        config.pluginmanager.unregister(name="terminalreporter")
-        config.pluginmanager.register(Reporter(config, connection))
-        config.pluginmanager.register(LowestPriority())
-        indices = _indices(connection)
-        index = next(indices, None)
-        while index is not None:
-            connection.send(("start", index))
-            # Fixtures of the session stay for the next test, so it is asked for before this one.
-            following = next(indices, None)
-            config.hook.pytest_runtest_protocol(
-                item=session.items[index],
-                nextitem=None if following is None else session.items[following],
-            )
-            connection.send(("finish", index))
-            index = following
-        status = 0
-    except Exception:
-        traceback.print_exc()
-    finally:
-        # Without what other processes have to do at their exit.
-        with suppress(BaseException):
-            session._setupstate.teardown_exact(None)
-        os._exit(status)
-
-
-def separate_captures(config: pytest.Config) -> None:
-    """Give this process files of its own for what tests print; a fork shares those of its parent.
-
-    The objects stay: modules that were loaded before may hold them as their streams.
-    """
-    captures = config.pluginmanager.getplugin("capturemanager")._global_capturing
-    for capture in (captures.out, captures.err):
-        # With `-s` there is none, and with `--capture=sys` one in memory.
-        if isinstance(capture, FDCapture):
-            with tempfile.TemporaryFile() as file:
-                os.dup2(file.fileno(), capture.tmpfile.fileno(), inheritable=False)
-
-
-def _indices(connection: Connection) -> Iterator[int]:
-    """Yield the indices of the tests for this process, kind by kind."""
-    while True:
-        connection.send(("next", None))
-        indices = connection.recv()
-        if not indices:
+        distribution = session.config.pluginmanager.getplugin("dsession")
+        if distribution is None:
             return
-        yield from indices
+        schedule = distribution.sched
+        if schedule is None or schedule.collection is None or schedule.has_pending:
+            print("\nSome tests were not run.")
+            session.exitstatus = pytest.ExitCode.INTERNAL_ERROR
 
 
 class LowestPriority:
     """Plugin of a process that runs tests for others: it gives way before it computes.
 
-    A process can't raise its priority again. Browsers and servers keep theirs, as these kinds are
-    given out first.
+    A process can't raise its priority again. Browsers and servers keep theirs, as these kinds have
+    the most tests and so are given out first.
     """
 
     def __init__(self) -> None:
