@@ -66,6 +66,7 @@ def test_run_that_is_stopped_during_planning_ends_with_the_reason(
     running.start()
     with katana450.connect(server.url, name="Onlooker") as onlooker:
         for state in onlooker.states(50.0):
+            assert running.is_alive(), refused
             if state.program is not None and state.program.status == "planning":
                 break
         time.sleep(0.1)
@@ -109,6 +110,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
     running.start()
     with katana450.connect(server.url, name="Onlooker") as onlooker:
         for state in onlooker.states(50.0):
+            assert running.is_alive(), refused
             if abs(state.q[0] - plan.start[0]) < 3.5 if to_start else state.q[0] > -1.5:
                 break
         # On the connection that also carries the run.
