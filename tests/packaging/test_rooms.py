@@ -53,8 +53,23 @@ def test_every_file_is_in_one_room() -> None:
     assert not wrong, "These files are in no room, or in several:\n" + "\n".join(wrong)
 
 
-def test_folders_of_programs_are_small() -> None:
-    folders = [path for path in (PACKAGE / "extensions" / "programs").rglob("*") if path.is_dir()]
-    sizes = {path.name: len(list(path.glob("[!_]*"))) for path in folders}
-    assert len(sizes) > 6
+PLACES = (
+    "extensions/programs",
+    "arm/control",
+    "arm/runtime",
+    "extensions/importers",
+    "extensions/export",
+)
+"""Folders of the rooms of programs, control and files."""
+
+
+def test_folders_of_programs_control_and_files_are_small() -> None:
+    folders = [
+        path
+        for place in PLACES
+        for path in (PACKAGE / place, *(PACKAGE / place).rglob("*"))
+        if path.is_dir() and path.name != "__pycache__"
+    ]
+    sizes = {str(path.relative_to(PACKAGE)): len(list(path.glob("[!_]*"))) for path in folders}
+    assert len(sizes) > 20
     assert {name: size for name, size in sizes.items() if size > 14} == {}
