@@ -68,6 +68,10 @@ class LeaseError(KatanaError):
     """The caller does not hold the lease of the arm, or may not take it."""
 
 
+class LateError(LeaseError):
+    """A sample of a motion came too late to be executed; another one can be sent soon."""
+
+
 def digits_beyond(value: float, lower: float, upper: float) -> str:
     """Return ``value`` with four or more digits, enough to show that it is outside the bounds."""
     for digits in range(4, 17):

@@ -17,7 +17,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.silence import PAUSE_TIMEOUT, SilenceProfile
 from katana450.arm.control.state.state import Reason
-from katana450.errors import LeaseError
+from katana450.errors import LateError, LeaseError
 from katana450.server.api import requests
 from katana450.server.service.budget import Budgets
 from katana450.server.service.dispatcher import Dispatcher
@@ -132,7 +132,7 @@ def test_late_samples_are_refused_and_their_end_is_not(table: Table) -> None:
         client.delay = 0.03 + LIMIT - 0.01
         client.say(kind, **fields)
         client.delay += 0.02
-        with pytest.raises(LeaseError, match=r"arrived 0.2 s late.*Let go"):
+        with pytest.raises(LateError, match=r"arrived 0.2 s late.*Let go"):
             client.say(kind, **fields)
         assert len(delivered) == number + 1
     client.delay = 2.0

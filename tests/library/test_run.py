@@ -7,12 +7,15 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
 import katana450
 from katana450.client import RefusedError
+from katana450.library import motion_plan
 from katana450.server.api import answers, requests
 from tests.browser.server import AppServer
 
@@ -88,6 +91,32 @@ def test_plan_is_followed_at_a_fraction_of_its_speed(
     np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
     with pytest.raises(katana450.InputError, match=r"speed is 0\.0; it must be above 0"):
         plan.run(client, speed=0.0)
+
+
+def test_plan_waits_while_its_samples_are_late(
+    shoulder_arm: katana450.Arm, client: katana450.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan = shoulder_arm.plan([0.4, -1.0, 1.4, 0.3, 0.0], [0.0, -1.0, 1.4, 0.3, 0.0])
+    samples, number = [], 3
+    replace = msgspec.structs.replace
+
+    def delayed(request: Any, **fields: Any) -> Any:
+        if isinstance(request, requests.Servo) and "made" in fields:
+            samples.append(request)
+            fields["made"] -= 0.5 * (20 < len(samples) <= 20 + number)
+        return replace(request, **fields)
+
+    monkeypatch.setattr(msgspec.structs, "replace", delayed)
+    state = plan.run(client)
+    np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
+    assert len(samples) == len(plan.sample(0.02).t) + number
+    # A connection that stays slow ends the run.
+    monkeypatch.setattr(motion_plan, "MAX_WAIT", 0.3)
+    samples.clear()
+    number = 10_000
+    with pytest.raises(RefusedError, match=r"arrived 0.5 s late") as raised:
+        plan.run(client)
+    assert raised.value.retry == 0.1
 
 
 @pytest.mark.parametrize(

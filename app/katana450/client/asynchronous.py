@@ -353,7 +353,7 @@ class AsyncClient(
         future = self._waiting.get(answer.id)
         if future is not None and not future.done():
             if isinstance(answer, answers.Refused):
-                future.set_exception(RefusedError(answer.why))
+                future.set_exception(RefusedError(answer.why, answer.retry))
             else:
                 future.set_result(answer)
         elif isinstance(answer, answers.State):

@@ -29,7 +29,15 @@ Answer = TypeVar("Answer")
 
 
 class RefusedError(KatanaError):
-    """The server refused the request; the message says why, and what to do."""
+    """The server refused the request; the message says why, and what to do.
+
+    Attributes:
+        retry: time after which the same request can be accepted [s]; None if only another one can.
+    """
+
+    def __init__(self, why: str, retry: float | None = None) -> None:
+        super().__init__(why)
+        self.retry = retry
 
 
 class LostError(KatanaError):

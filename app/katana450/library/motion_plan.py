@@ -16,9 +16,13 @@ from katana450.maths.planning.plan import Plan
 if TYPE_CHECKING:
     from katana450.client import Client
     from katana450.server.api.answers import State
+    from katana450.server.api.requests import Request
 
 DRAWN_SAMPLES: Final = 400
 """Number of intervals of a plan in its figure."""
+
+MAX_WAIT: Final = 2.0
+"""[s] Time for which a run waits until a slow machine or connection takes a sample in time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,8 @@ class MotionPlan:
 
         The arm first goes to the start, then follows the joint angles as a stream. A stop or a
         change of driver ends the run, even if the stop is cleared at once: the server refuses the
-        rest of the plan.
+        rest of the plan. While this machine or the connection is too slow, the arm rests and the
+        plan waits, for MAX_WAIT at most.
 
         Args:
             client: a connection, from `katana450.connect`.
@@ -124,5 +129,26 @@ class MotionPlan:
         for t, q, qd in zip(samples.t / speed, samples.q, samples.qd * speed, strict=True):
             time.sleep(max(started + t - time.monotonic(), 0.0))
             # Each command is answered before the next is sent, so that a refusal ends the stream.
-            client.ask(requests.Servo(q=q, qd=qd, revocations=revocations))
+            if _has_waited(client, requests.Servo(q=q, qd=qd, revocations=revocations)):
+                started = time.monotonic() - t
         return client.go(requests.Joints(q=samples.q[-1], revocations=revocations))
+
+
+def _has_waited(client: Client, sample: Request) -> bool:
+    """Send ``sample`` until the server takes it; return whether it had to be sent again.
+
+    Raises RefusedError for a refusal that is final, and after MAX_WAIT.
+    """
+    from katana450.client import RefusedError
+
+    deadline, has_waited = time.monotonic() + MAX_WAIT, False
+    while True:
+        try:
+            client.ask(sample)
+        except RefusedError as refusal:
+            if refusal.retry is None or time.monotonic() > deadline:
+                raise
+            has_waited = True
+            time.sleep(refusal.retry)
+        else:
+            return has_waited

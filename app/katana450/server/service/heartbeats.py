@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable
 
 from katana450.arm.runtime.readiness import SocketChannel, ack_age, data_age, readable
-from katana450.errors import LeaseError
+from katana450.errors import LateError
 
 KEEPALIVE = {"TCP_KEEPIDLE": 1, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 2}
 """Keepalive of TCP [s, s, probes]. A host that disappears is detected within 3 s."""
@@ -146,10 +146,14 @@ class LeastDelay:
         self._candidate, self._since, self._messages = math.inf, t, 0
 
 
+LATE_RETRY = 0.1
+"""[s] Time after which a program can send another sample in place of a late one."""
+
+
 def check_in_time(delay: float, limit: float) -> None:
-    """Raise LeaseError for a sample with a ``delay`` above ``limit`` [s]."""
+    """Raise LateError for a sample with a ``delay`` above ``limit`` [s]."""
     if delay > limit:
-        raise LeaseError(
+        raise LateError(
             f"Not executed, because it arrived {delay:.1f} s late: the arm would still move after "
             "you let go. Let go, and drive again once the connection is as fast as before, or "
             f"after {WINDOW:g} s at its present speed."

@@ -17,11 +17,11 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from katana450.arm.control.commands.act import Id
-from katana450.errors import InputError, LeaseError
+from katana450.errors import InputError, LateError, LeaseError
 from katana450.server.api import answers, requests
 from katana450.server.service.budget import Budget, BusyError
 from katana450.server.service.dispatcher import Dispatcher
-from katana450.server.service.heartbeats import ARRIVAL, PING, LastHeartbeat
+from katana450.server.service.heartbeats import ARRIVAL, LATE_RETRY, PING, LastHeartbeat
 from katana450.server.service.hub import Hub
 from katana450.server.service.identity import Identity
 from katana450.server.service.participants import Participant
@@ -227,6 +227,8 @@ class Channel(ABC):
                     await self._disconnect(LIMIT_CLOSE_CODE, str(error))
                     return
                 self.refuse(str(error), request.id, retry=error.retry)
+            except LateError as error:
+                self.refuse(str(error), request.id, retry=LATE_RETRY)
             except (LeaseError, InputError) as error:
                 self.refuse(str(error), request.id)
 
