@@ -22,7 +22,8 @@ SIZES = {"phone": (390, 844), "tablet": (820, 1180), "desk": (1440, 900)}
 def page(own_page: ViserPage, truth: Truth) -> ViserPage:
     """Return our page alone with open instruments and the arm at rest."""
     show(own_page, True)
-    truth.wait(20.0, mood="ok")
+    own_page.page.locator("#speed input").fill("100")
+    truth.wait(20.0, mood="ok", speed=1.0)
     return own_page
 
 
@@ -40,10 +41,10 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     # Slowly, so that the plots get many points on a machine that draws seldom, too.
     page.page.locator("#speed input").fill("30")
     truth.wait(speed=0.3)
+    early = table(page, "joint-angles")
     turn(page, "axis-1", 50.0)
     # The last command of a turn follows those before it at the rate of the page.
     page.wait_until(lambda: abs(goal(page, "axis-1") - start - 50.0) < 2.0, "the goal")
-    early = table(page, "joint-angles")
     there = goal(page, "axis-1")
     end = math.radians(there)
     page.wait_until(lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn")
@@ -60,8 +61,6 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     speeds = table(page, "joint-speeds")
     distance = np.trapezoid(speeds["Axis 1 [deg/s]"], speeds["t [s]"])
     assert distance == pytest.approx(there - start, rel=0.1)
-    page.page.locator("#speed input").fill("100")
-    truth.wait(speed=1.0)
 
 
 def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -> None:
