@@ -57,7 +57,7 @@ is received from that program for 1 s (`--owner-silence`). A request with `wait`
 On a connection that has become slow, samples would still move the arm after a person has let go. So
 each request may have `made`, the time of its making [s] on the client's own clock. The server compares
 both clocks by the least delay of the connection. A `jog`, `step_tool`, `nudge`, `servo` or other target
-that took 0.15 s more than that is refused with the reason, and a heartbeat counts as
+that took 0.15 s more than that is refused with the reason and with `retry`, and a heartbeat counts as
 that much older. The end of a motion is never late: a `jog` with zero rates, `end_drag`, `hold`, `stop`. A
 longer delay counts as usual after 10 s without a late command. The page sends `made` with everything,
 and the Python client with heartbeats and with samples sent by `send`. A request without `made` counts
