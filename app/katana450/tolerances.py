@@ -51,9 +51,6 @@ NEAR_AXIS_1: Final = 1e-3
 # [rad] Step of theta1 at which the search for the nearest point beside axis 1 has converged.
 ALIGNED: Final = 1e-13
 
-# [1] Sine of the angle between two axes below which they count as parallel.
-PARALLEL: Final = 1e-9
-
 # [rad] Excess over a limit up to which an angle counts as on the limit. Near a singularity rounding
 # grows to its square root, and an encoder step is 5e-4 rad or more.
 LIMIT_SLACK: Final = 1e-9

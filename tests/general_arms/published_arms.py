@@ -64,6 +64,23 @@ UR5E = craig(
     degrees(*[360.0] * 6),
 )
 
+WRITTEN = 1.570796327
+"""A right angle as Universal Robots writes it."""
+
+# The same with the digits of ur_description, default_kinematics of the UR5e.
+UR5E_FILE = craig(
+    [
+        (0.0, 0.0, 0.1625, 0.0),
+        (WRITTEN, 0.0, 0.0, 0.0),
+        (0.0, -0.425, 0.0, 0.0),
+        (0.0, -0.3922, 0.1333, 0.0),
+        (WRITTEN, 0.0, 0.0997, 0.0),
+        (-QUARTER, 0.0, 0.0996, 0.0),
+    ],
+    degrees(*[-360.0] * 6),
+    degrees(*[360.0] * 6),
+)
+
 # Armstrong, Khatib & Burdick (1986).
 PUMA_560 = craig(
     [
@@ -223,3 +240,32 @@ SIX = {
 }
 SEVEN = {"Panda": PANDA, "iiwa": IIWA_7}
 SKEWED = {"skewed 6": SKEWED_6, "skewed 7": SKEWED_7}
+
+# UFACTORY, xArm6 and xArm7: joints of their descriptions. Axes 1, 4 and 6, or every second axis,
+# turn twice.
+_BENT = math.atan2(0.2845, 0.053)
+XARM_6 = craig(
+    [
+        (0.0, 0.0, 0.267, 0.0),
+        (-QUARTER, 0.0, 0.0, -_BENT),
+        (0.0, math.hypot(0.2845, 0.053), 0.0, _BENT),
+        (-QUARTER, 0.0775, 0.3425, 0.0),
+        (QUARTER, 0.0, 0.0, 0.0),
+        (-QUARTER, 0.076, 0.097, 0.0),
+    ],
+    [-math.tau, -2.059, -3.927, -math.tau, -1.69297, -math.tau],
+    [math.tau, 2.0944, 0.19198, math.tau, math.pi, math.tau],
+)
+XARM_7 = craig(
+    [
+        (0.0, 0.0, 0.267, 0.0),
+        (-QUARTER, 0.0, 0.0, 0.0),
+        (QUARTER, 0.0, 0.293, 0.0),
+        (QUARTER, 0.0525, 0.0, 0.0),
+        (QUARTER, 0.0775, 0.3425, 0.0),
+        (QUARTER, 0.0, 0.0, 0.0),
+        (-QUARTER, 0.076, 0.097, 0.0),
+    ],
+    [-math.tau, -2.059, -math.tau, -0.19198, -math.tau, -1.69297, -math.tau],
+    [math.tau, 2.0944, math.tau, 3.927, math.tau, math.pi, math.tau],
+)

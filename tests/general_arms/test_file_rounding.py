@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from katana450.assembly.robot_session import find_robot
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import exact_chain, links_of
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.extensions.reachability.reachability import PoseSolver
 from katana450.maths.kinematics.batch import errors_of, forward_batch
@@ -23,9 +25,40 @@ from katana450.settings import Settings
 from tests.general_arms import singular_postures as singular
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.driven import begun, pose, session_of, settled
-from tests.general_arms.published_arms import IIWA_7, KR_6, PANDA, PINCHERX_100, PUMA_560, UR5E
+from tests.general_arms.published_arms import (
+    IIWA_7,
+    KR_6,
+    PANDA,
+    PINCHERX_100,
+    PUMA_560,
+    QUARTER,
+    UR5E,
+    UR5E_FILE,
+    WRITTEN,
+    craig,
+)
 
-ARMS = {"UR5e": UR5E, "KR 6": KR_6, "Puma 560": PUMA_560, "Panda": PANDA, "iiwa": IIWA_7}
+# Axes 3 and 4 are as far off parallel as some calibrations are.
+ALMOST = craig(
+    [
+        (0.0, 0.0, 0.1625, 0.0),
+        (QUARTER, 0.0, 0.0, 0.0),
+        (0.0, -0.425, 0.0, 0.0),
+        (3e-8, -0.3922, 0.1333, 0.0),
+        (QUARTER, 0.0, 0.0997, 0.0),
+        (-QUARTER, 4e-8, 0.0996, 0.0),
+    ],
+    UR5E.lower.tolist(),
+    UR5E.upper.tolist(),
+)
+ARMS = {
+    "almost parallel": ALMOST,
+    "UR5e": UR5E,
+    "KR 6": KR_6,
+    "Puma 560": PUMA_560,
+    "Panda": PANDA,
+    "iiwa": IIWA_7,
+}
 ALL = ARMS | {"PincherX-100": PINCHERX_100}
 DECIMALS = 8
 """Number of decimals of a file with 1.57079633 for a right angle."""
@@ -60,7 +93,9 @@ def test_kinematics_are_those_of_the_file(tmp_path: Path, name: str) -> None:
     robot = robot_of(tmp_path, ALL[name])
     arm = robot.require_arm()
     chain = arm.chain_to(arm.default_tool)
-    assert max(links_of(chain).rounding) > 1e-10
+    links = links_of(chain)
+    assert max(*links.rounding, *(abs(math.remainder(t, QUARTER)) for t in links.t)) > 1e-10
+    assert (links.rounding[0] > 1e-8) == (name == "almost parallel")
     for q in postures(chain, 10):
         place = robot.frames(robot.joint_values(q, 0.0))["tool0"]
         np.testing.assert_allclose(arm.T_base_shoulder @ forward(chain, q), place, atol=EXACT)
@@ -87,8 +122,26 @@ def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: st
     assert count >= 100
 
 
+def test_right_angles_are_solved_as_the_maker_writes_them() -> None:
+    links = links_of(UR5E_FILE)
+    assert links.rounding == (0.0, 0.0)
+    assert links.t[0] == pytest.approx(WRITTEN, abs=1e-15)
+    kinematics, search = kinematics_of(UR5E_FILE), search_of(UR5E_FILE)
+    q = postures(UR5E_FILE, 30)
+    T = forward_batch(UR5E_FILE, q)
+    worst = []
+    for target, angles, batch in zip(T, q, kinematics.inverse_batch(T), strict=True):
+        exact = [solution for solution in kinematics.inverse(target) if solution.exact]
+        assert len(exact) >= 2
+        worst += [max(solution.position_error, solution.rotation_error) for solution in exact]
+        worst.append(float(errors_of(UR5E_FILE, batch[None], target[None])[0].min()))
+        tip = search.links.T_S_1[:3] @ [*search.motion(angles.tolist())[0][9:], 1.0]
+        worst.append(float(np.abs(tip - target[:3, 3]).max()))
+    assert max(worst) <= 2e-14
+
+
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("name", ["UR5e", "KR 6", "Puma 560"])
+@pytest.mark.parametrize("name", ["almost parallel", "UR5e", "KR 6", "Puma 560"])
 def test_postures_near_singularities_are_taken_too(tmp_path: Path, name: str) -> None:
     chain = chain_in(tmp_path, ARMS[name])
     solver = kinematics_of(chain)

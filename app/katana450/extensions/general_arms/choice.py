@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from katana450 import tolerances
 from katana450.errors import RobotDescriptionError
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.file_rounding import FileRounding
-from katana450.extensions.general_arms.links import exact_chain, links_of
+from katana450.extensions.general_arms.links import FINE, exact_chain, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
-
-FINE: Final = 1e-7
-"""[rad], [m] Rounding of a file up to which its arm is solved as it is written. A file with fewer
-decimals does not describe an arm to the accuracy that it is asked for."""
 
 
 class ExactArm(NamedTuple):

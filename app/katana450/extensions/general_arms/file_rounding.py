@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.links import DHLinks
+from katana450.extensions.general_arms.links import DOUBLE, DHLinks
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
@@ -30,9 +30,6 @@ STEPS: Final = 8
 
 EXACT: Final = 1e-11
 """[m], [1] Difference from a pose that needs no further step."""
-
-DOUBLE: Final = 1e-13
-"""[rad], [m] Rounding that is only that of double precision."""
 
 BESIDE: Final = 10.0
 """[1] Ratio of a miss to the bound `FileRounding.offset`, above which the pose is out of reach."""

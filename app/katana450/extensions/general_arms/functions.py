@@ -25,6 +25,9 @@ displaces the tool by less than rounding and the length of an arm."""
 DISTINCT: Final = 0.01
 """[1] Sine of the angle between two axes above which each of their turns is known to 1e-14 rad."""
 
+BENT: Final = 0.1
+"""[1] Sine of an angle above which its cosine gives it to 1e-15 rad."""
+
 
 class Operations(NamedTuple):
     """The functions of `math` or of numpy that the formulas use.
@@ -158,10 +161,28 @@ def three_turns(
         return _square_turns(f, s, s2, frees_last=frees_last)
     atan2, hypot, root, select, cos, sin = f.atan2, f.hypot, f.root, f.select, f.cos, f.sin
     total, rest, sign = 0.5 * (t + t2), 0.5 * (t - t2), math.copysign(1.0, s * s2)
+    is_scalar, cosines, sines = f.is_scalar, c * c2, s * s2
+    bound = abs(sines) * math.sqrt(1.0 - BENT * BENT)
+
+    def distinct(q13: float, q23: float, q31: float, q32: float, q33: float) -> tuple[Turns, Turns]:
+        """Return both turns where the last column and the last row of Q determine them."""
+        cb = (cosines - q33) / sines
+        sb = root(1.0 - cb * cb)
+        b, y, z = atan2(sb, cb), -c * s2 * cb - s * c2, c2 * s * cb + s2 * c
+        x, w = s2 * sb, s * sb
+        scale = 1.0 / (x * x + y * y)
+        xc, xs, yc, ys = x * q13 * scale, x * q23 * scale, y * q13 * scale, y * q23 * scale
+        wc, ws, zc, zs = w * q31, w * q32, z * q31, z * q32
+        return (
+            (atan2(xs - yc, xc + ys), b, atan2(zc - ws, wc + zs), xc + ys, xs - yc),
+            (atan2(-xs - yc, ys - xc), -b, atan2(zc + ws, zs - wc), ys - xc, -xs - yc),
+        )
 
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
-        (q11, _, q13), (q21, _, q23), (q31, _, q33) = first, second, third
+        (q11, _, q13), (q21, _, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
+        if is_scalar and radius > DISTINCT and abs(q33 - cosines) < bound:
+            return *distinct(q13, q23, q31, q32, q33), radius
         half = 0.5 * atan2(radius, q33)
         sine = root(sign * sin(total + half) * sin(total - half))
         cosine = root(sign * sin(half + rest) * sin(half - rest))

@@ -37,6 +37,13 @@ Numbers = tuple[float, ...]
 ALMOST_PARALLEL: Final = 0.1
 """[1] Sine of the angle between two axes below which their common normal is not used."""
 
+DOUBLE: Final = 1e-13
+"""[rad], [m] Rounding that is only that of double precision."""
+
+FINE: Final = 1e-7
+"""[rad], [m] Rounding of a file up to which its arm is solved as it is written. A file with fewer
+decimals does not describe an arm to the accuracy that it is asked for."""
+
 
 @dataclass(frozen=True, eq=False)
 class DHLinks:
@@ -124,11 +131,13 @@ def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
     """Return the dimensions of `chain`.
 
     With ``exact``, rounding in its file is removed: twists within FAMILY_ANGLE of a quarter turn
-    and lengths within FAMILY_LENGTH of 0 are exactly that. The tool's home pose stays.
+    and lengths within FAMILY_LENGTH of 0 are exactly that. The tool's home pose stays. A right
+    angle that is rounded by at most FINE stays too, because every closed form takes any twist of
+    axes that are not parallel.
     """
     angle, gap, almost = tolerances.FAMILY_ANGLE, tolerances.FAMILY_LENGTH, 0.0
     if not exact:
-        angle, gap, almost = tolerances.PARALLEL, tolerances.ROUNDING, ALMOST_PARALLEL
+        angle, gap, almost = DOUBLE, tolerances.ROUNDING, ALMOST_PARALLEL
     n = chain.n
     z = [chain.S[:3, i] for i in range(n)]
     points = [screws.point_on(chain.S[:, i]) for i in range(n)]
@@ -266,8 +275,11 @@ def _normal(
 
 
 def _snapped(twist: float, within: float) -> float:
-    quarter = 0.5 * math.pi * round(twist / (0.5 * math.pi))
-    return quarter if abs(twist - quarter) <= within else twist
+    """Return the quarter turn ``within`` [rad] of the twist; see `links_of` for right angles."""
+    quarters = round(twist / (0.5 * math.pi))
+    off = abs(twist - 0.5 * math.pi * quarters)
+    is_kept = off > within or (quarters % 2 == 1 and DOUBLE < off <= FINE)
+    return twist if is_kept else 0.5 * math.pi * quarters
 
 
 def _zeroed(length: float, within: float) -> float:
