@@ -229,8 +229,8 @@ class ClosedForm(GeneralKinematics):
             return self._solutions(pose, angles, self._joints)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
         angles = self.solve(pose, None if hint is None else hint.tolist())
-        if hint is not None and (self.chain.upper - self.chain.lower > math.tau).any():
-            angles = [tuple(nearest_turn(self.chain, np.array(q), hint).tolist()) for q in angles]
+        if hint is not None:
+            angles = list(map(tuple, nearest_turn(self.chain, np.array(angles), hint).tolist()))
         return self._solutions(pose, angles)
 
     def _solutions(

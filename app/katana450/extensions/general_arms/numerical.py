@@ -31,7 +31,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.solution import Solutions
-from katana450.maths.kinematics.turns import in_limits_turns
+from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
 Motion = tuple[tuple[float, ...], list[tuple[float, float, float, float, float, float]]]
 """Pose and axes as `tool_and_jacobian` returns them."""
@@ -206,7 +206,8 @@ class Numerical(GeneralKinematics):
         """
         pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.clamp(q_hint)
-        return Solutions(self.chain, pose, [self.solve(pose, hint)], self.branches)
+        q = nearest_turn(self.chain, np.array(self.solve(pose, hint)), hint)
+        return Solutions(self.chain, pose, [tuple(q.tolist())], self.branches)
 
     def solve(
         self, T: FloatArray, hint: FloatArray | None = None, seeds: int = SEEDS

@@ -44,7 +44,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.solution import Solutions
-from katana450.maths.kinematics.turns import in_limits_turns
+from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
 SWIVELS: Final = 64
 """Number of swivels of the first round."""
@@ -188,22 +188,29 @@ class SevenAxes(GeneralKinematics):
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
         """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""
         low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
-        low, high = max(low, -math.pi), min(high, math.pi)
+        if is_wide := high - low >= math.tau:
+            low, high = -math.pi, math.pi
+
+        def bounded(angles: npt.ArrayLike) -> FloatArray:
+            swivels = np.asarray(angles, dtype=np.float64)
+            turns = np.round(swivels / math.tau) if is_wide else 0.0
+            return np.clip(swivels - math.tau * turns, low, high)
+
         step = (high - low) / SWIVELS
         swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
             neighbour = search_of(self.chain).solve(T, hint, seeds=0)
             ends = [hint[self.swivel], neighbour[self.swivel]]
-            swivels = np.append(swivels, np.clip(ends, low, high))
-        q = self.at_swivels(T, swivels)
+            swivels = np.append(swivels, bounded(ends))
+        q = nearest_turn(self.chain, self.at_swivels(T, swivels), hint)
         cost = self._cost(q, T, hint)
         first = q[cost.argmin(axis=0), np.arange(8)]
         least = cost.min(axis=0)
         offsets = np.linspace(-step, step, FINER)
-        finer = np.clip(first[:, self.swivel, None] + offsets, low, high).ravel()
+        finer = bounded(first[:, self.swivel, None] + offsets).ravel()
         q = self.at_swivels(T, finer).reshape(8, FINER, 8, 7)
-        q = q[np.arange(8), :, np.arange(8)].swapaxes(0, 1)
+        q = nearest_turn(self.chain, q[np.arange(8), :, np.arange(8)].swapaxes(0, 1), hint)
         cost = self._cost(q, T, hint)
         second = q[cost.argmin(axis=0), np.arange(8)]
         better = cost.min(axis=0) < least
@@ -213,7 +220,8 @@ class SevenAxes(GeneralKinematics):
             branches = np.arange(8)
             return self.at_swivels(aimed, chosen[:, self.swivel])[branches, branches]
 
-        return self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
+        q = self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
+        return nearest_turn(self.chain, q, hint)
 
     def _cost(self, q: FloatArray, T: FloatArray, hint: FloatArray | None) -> FloatArray:
         """Return a number (N, 8) for each of `q` (N, 8, 7), least for the best.

@@ -232,8 +232,5 @@ def inverse(chain: Chain, T: npt.ArrayLike, *, q_hint: npt.ArrayLike | None = No
     if q_hint is None:
         return Solutions(chain, rows, solver.solve(rows), BRANCHES, solver.slack)
     hint = chain.check_q(q_hint)
-    angles = [
-        tuple(nearest_turn(chain, np.array(q), hint).tolist())
-        for q in solver.solve(rows, float(hint[0]))
-    ]
-    return Solutions(chain, rows, angles, BRANCHES, solver.slack)
+    angles = nearest_turn(chain, np.array(solver.solve(rows, float(hint[0]))), hint)
+    return Solutions(chain, rows, list(map(tuple, angles.tolist())), BRANCHES, solver.slack)

@@ -45,14 +45,18 @@ def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatArray:
-    """Return `q` (n,), each angle in the turn nearest to `hint` (n,) inside its limits.
+    """Return `q` (..., n), each angle in the turn nearest to `hint` (n,) inside its limits.
 
-    Only limits wider than a turn leave this choice.
+    Only limits of a turn and wider leave this choice. An angle without such a turn stays.
     """
-    if hint is None or not (chain.upper - chain.lower > math.tau).any():
+    slack = tolerances.LIMIT_SLACK
+    wide = chain.upper - chain.lower >= math.tau - slack
+    if hint is None or not wide.any():
         return q
-    other = q + math.tau * np.round((hint - q) / math.tau)
-    return np.where((other >= chain.lower) & (other <= chain.upper), other, q)
+    first = np.ceil((chain.lower - slack - q) / math.tau)
+    last = np.floor((chain.upper + slack - q) / math.tau)
+    turns = np.minimum(np.maximum(np.round((hint - q) / math.tau), first), last)
+    return np.where(wide & (first <= last), q + math.tau * turns, q)
 
 
 def another_turn_helps(lower: float, upper: float) -> bool:
