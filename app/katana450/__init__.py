@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from katana450.library.trajectory import Trajectory as Trajectory
     from katana450.library.viewer import Viewer as Viewer
     from katana450.maths.kinematics.branch import Branch as Branch
+    from katana450.maths.kinematics.pose import SE3 as SE3
     from katana450.maths.kinematics.solution import Solution as Solution
 
 _MODULES = {
@@ -55,6 +56,7 @@ _MODULES = {
     "ReachabilityMap": "extensions.reachability.reachability",
     "Recording": "library.recording",
     "RobotDescriptionError": "errors",
+    "SE3": "maths.kinematics.pose",
     "ScriptWriter": "library.script_writer",
     "Solution": "maths.kinematics.solution",
     "Trajectory": "library.trajectory",

@@ -13,7 +13,10 @@ import pytest
 import katana450
 from katana450 import library
 
-MODULES = [f"katana450.library.{each.name}" for each in pkgutil.iter_modules(library.__path__)]
+MODULES = [
+    *(f"katana450.library.{each.name}" for each in pkgutil.iter_modules(library.__path__)),
+    "katana450.maths.kinematics.pose",
+]
 
 METHODS = ("fk", "ik", "nearest", "jacobian", "plan", "line", "circle", "reachability", "show")
 
@@ -21,6 +24,7 @@ MUST_HAVE = {f"katana450.library.arm.Arm.{name}" for name in METHODS} | {
     f"katana450.library.{name}"
     for name in ("loading.load", "motion_plan.MotionPlan.sample", "motion_plan.MotionPlan.plot")
 }
+MUST_HAVE.add("katana450.maths.kinematics.pose.SE3")
 
 FINDER = doctest.DocTestFinder(exclude_empty=True)
 

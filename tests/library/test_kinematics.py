@@ -154,6 +154,7 @@ REFUSED: dict[str, tuple[Refused, str]] = {
     "pose with NaN": (lambda arm: arm.ik(np.full((4, 4), np.nan)), "nan"),
     "no rotation": (lambda arm: arm.ik(np.diag([2.0, 1.0, 1.0, 1.0])), "rotation"),
     "one of many": (lambda arm: arm.ik(np.array([np.eye(4), 2.0 * np.eye(4)])), "ose 1"),
+    "long quaternion": (lambda arm: arm.ik(([0.3, 0.0, 0.0], [1.0] * 4)), "length 2"),
     "nearest to nothing": (lambda arm: arm.nearest(np.zeros((4, 4))), "last row"),
     "unknown priority": (lambda arm: arm.nearest(np.eye(4), priority="yaw"), "'yaw'"),  # type: ignore[arg-type]
     "unknown branch": (lambda arm: arm.nearest(np.eye(4), branch="left"), "front-up"),
@@ -218,5 +219,43 @@ def test_pose_in_millimetres_is_asked_about(arm: katana450.Arm) -> None:
 
 
 def test_angle_in_degrees_is_asked_about(arm: katana450.Arm) -> None:
-    with pytest.raises(katana450.InputError, match=r"Did you mean radians\? 30 deg are 0.5236 rad"):
-        arm.line(pitch=30.0)
+    for ask in (lambda: arm.line(pitch=30.0), lambda: arm.ik(([0.3, 0.0, 0.1], [0.0, 30.0, 0.0]))):
+        with pytest.raises(katana450.InputError, match=r"mean radians\? 30 deg are 0.5236 rad"):
+            ask()
+
+
+def test_pose_is_given_in_several_forms(arm: katana450.Arm) -> None:
+    T = arm.fk(Q)
+    pose = katana450.SE3(T)
+    assert not pose.matrix.flags.writeable
+    forms: dict[str, Any] = {
+        "rows": T.tolist(),
+        "SE3": pose,
+        "quaternion": (pose.position, pose.wxyz),
+        "roll, pitch, yaw": [pose.position, pose.rpy],
+    }
+    expected = arm.ik(T).q
+    wrong = []
+    for name, form in forms.items():
+        if np.abs(arm.ik(form).q - expected).max() > 1e-12 or not arm.ik(form).feasible:
+            wrong.append(name)
+        if arm.nearest(form).position_error > 1e-12:
+            wrong.append(f"nearest, {name}")
+    assert not wrong
+    np.testing.assert_array_equal(arm.ik([pose, pose]).q, arm.ik(np.stack((T, T))).q)
+    assert arm.plan((pose.position, pose.wxyz)).end == pytest.approx(Q, abs=1e-9)
+
+
+def test_poses_compose() -> None:
+    a = katana450.SE3.from_rpy([0.3, 0.1, 0.2], [0.4, -0.5, 2.0])
+    b = katana450.SE3.from_quaternion([0.0, 0.1, 0.0], [0.5, 0.5, -0.5, 0.5])
+    for product in (a @ b, a @ b.matrix, a.matrix @ b):
+        assert isinstance(product, katana450.SE3)
+        np.testing.assert_allclose(product.matrix, a.matrix @ b.matrix, atol=1e-15)
+    np.testing.assert_allclose((a @ a.inverse()).matrix, np.eye(4), atol=1e-15)
+    np.testing.assert_allclose(a @ b.position, (a @ b).position, atol=1e-15)
+    np.testing.assert_allclose(a @ np.stack([b.position] * 2), [(a @ b).position] * 2, atol=1e-15)
+    np.testing.assert_allclose(a.rpy, [0.4, -0.5, 2.0], atol=1e-15)
+    for wrong, words in ((np.zeros(5), "points"), (2.0 * np.eye(4), "last row")):
+        with pytest.raises(katana450.InputError, match=words):
+            _ = a @ wrong

@@ -39,6 +39,7 @@ from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_body, jacobian_space
 from katana450.maths.kinematics.kinematics import Kinematics
+from katana450.maths.kinematics.pose import pose_matrix
 from katana450.maths.kinematics.pose_units import check_radians
 
 if TYPE_CHECKING:
@@ -189,12 +190,14 @@ class Arm:
         because five axes cannot take every pose. `nearest` returns the best that the arm can do.
 
         Args:
-            T: pose or poses of the tool [m].
+            T: pose or poses of the tool [m]: an array, an `SE3`, or a pair of position (3,) and
+                quaternion (w, x, y, z), or of position and roll, pitch, yaw (3,) [rad].
             q_hint: (n,) angles [rad], for a single pose. Joints with a range of more than a turn,
                 and joints that the pose leaves free, are put nearest to it.
 
         Raises:
-            InputError: another shape, NaN, a matrix that is no pose, or a pose in millimetres.
+            InputError: another shape, NaN, a matrix that is no pose, or a pose in millimetres or
+                degrees.
 
         Source, for five axes: the paper's eq. (12) to (29).
 
@@ -204,6 +207,9 @@ class Arm:
         front-up [0.3, -1.0, 1.4, 0.3, 0.2]
         >>> arm.ik(np.stack([T, T, T])).q.shape
         (3, 4, 5)
+        >>> pose = katana450.SE3(T)
+        >>> len(arm.ik((pose.position, pose.wxyz)).feasible)
+        1
         """
         return IKSolutions(self._kinematics, self.pose_frame.to_shoulder(T), q_hint)
 
@@ -219,7 +225,7 @@ class Arm:
         """Return the feasible pose nearest to ``T`` (4, 4), with the reason for its errors.
 
         Args:
-            T: pose of the tool [m].
+            T: pose of the tool [m], in any form of `ik`.
             priority: which part of the pose is kept when five axes cannot satisfy all of it.
                 "pose": position, then the whole orientation. "pitch": pitch, then position, then
                 roll. "position": position, then pitch, then roll. In the last two the arm
@@ -275,7 +281,7 @@ class Arm:
         The joints follow a straight line if that is clear, else a path around the obstacles.
 
         Args:
-            goal: (n,) joint angles [rad], or a pose (4, 4) of the tool.
+            goal: (n,) joint angles [rad], or a pose of the tool in any form of `ik`.
             start: (n,) joint angles where the arm rests [rad]; None for `ready`.
             seed: seed of the random search for a path; the same seed gives the same plan.
 
@@ -292,7 +298,7 @@ class Arm:
             ...
         katana450.errors.InputError: ...
         """
-        plan = self._plan_from(start, seed)
+        plan, goal = self._plan_from(start, seed), pose_matrix(goal)
         if dimensions(goal) == 2:
             plan = self._to_pose(plan, goal)
         else:

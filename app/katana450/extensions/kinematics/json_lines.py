@@ -24,6 +24,7 @@ from katana450.maths.kinematics.arm import family_arm
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.pose import quaternion_misfit
 from katana450.maths.kinematics.pose_units import check_metres, check_radians
 from katana450.maths.kinematics.projection import project
 from katana450.maths.kinematics.tool import ToolTarget
@@ -65,9 +66,6 @@ def shown(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
-
-MAX_QUATERNION_MISFIT = 1e-3
-"""Maximum deviation of the length of a quaternion from 1: that of one printed with 3 decimals."""
 
 QUATERNIONS = {"wxyz": (0, 1, 2, 3), "xyzw": (3, 0, 1, 2)}
 """Keys of quaternions, and the places of w, x, y and z in them."""
@@ -142,14 +140,7 @@ def _rotation(request: Mapping[str, Any], key: str) -> tuple[FloatArray, float]:
         check_radians((roll, pitch, yaw), key)
         return so3.from_rpy(roll, pitch, yaw), 0.0
     q = finite_array(numbers(request, key, 1), (4,), key)
-    length = math.hypot(*q.tolist())
-    misfit = abs(length - 1.0)
-    if misfit > MAX_QUATERNION_MISFIT:
-        raise InputError(
-            f"{key} has the length {length:.4g}, but a rotation has the length 1 "
-            f"(allowed: {MAX_QUATERNION_MISFIT:g} off)."
-        )
-    return so3.from_quaternion(q[list(QUATERNIONS[key])]), misfit
+    return so3.from_quaternion(q[list(QUATERNIONS[key])]), quaternion_misfit(q, key)
 
 
 Answer = Callable[[Mapping[str, Any]], dict[str, Any]]
