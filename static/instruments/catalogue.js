@@ -17,7 +17,6 @@ import { signed } from "./shape.js";
 /** @typedef {import("./channels.js").Fingers} Fingers */
 /** @typedef {{ history: import("./history.js").History, groups: Record<string, number[]>, view: import("./plot.js").Span }} Plotted */
 const MS = 1000;
-const AXES = ["base turn", "shoulder", "elbow", "wrist bend", "wrist roll"];
 const ONE = ["small", "large"];
 const ROW = ["wide", "large", "broad"];
 const BIG = ["broad", "large", "wide"];
@@ -49,7 +48,7 @@ function knobs(arm, gripper, say) {
   const joints = arm.joints.map((_, i) =>
     made(
       `axis-${i + 1}`,
-      `${i + 1} ${arm.joints_only ? arm.joints[i] : (AXES[i] ?? "")}`.trim(),
+      arm.links[i].label,
       {
         low: arm.lower[i] * read[i].of,
         high: arm.upper[i] * read[i].of,

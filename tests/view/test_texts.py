@@ -16,6 +16,7 @@ from katana450.arm.control.state.messages import (
     PRIORITY_HINTS,
     REASONS,
     STATUS,
+    axis_label,
     axis_names,
     degrees,
     excluded,
@@ -65,6 +66,13 @@ def test_joints_have_names_for_people() -> None:
         "joint 8",
         "j2",
     ]
+    assert list(axis_names(["left_arm_pan", "left_arm_lift_joint"])) == ["pan", "lift"]
+    assert list(axis_names(["joint_1", "joint_2"])) == ["joint 1", "joint 2"]
+    panda = [f"panda_joint{number}" for number in range(1, 8)]
+    assert [axis_label(number, name) for number, name in enumerate(axis_names(panda), 1)] == [
+        f"joint {number}" for number in range(1, 8)
+    ]
+    assert axis_label(4, "wrist 1") == "4 wrist 1"
 
 
 @pytest.mark.parametrize(

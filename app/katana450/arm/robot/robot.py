@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from katana450.arm.control.joints import JointSet
-from katana450.arm.control.state.messages import axis_names
+from katana450.arm.control.state.messages import axis_label, axis_names
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN, Joint, Link
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.visual import Visual
@@ -243,7 +243,7 @@ class Robot:
         Joints of an arm that the file only numbers have the names of a five-axis arm.
         """
         names = self.joint_group.names if self.arm is None else axis_names(self.arm.chain.names)
-        return tuple(f"{number} {name}" for number, name in enumerate(names, start=1))
+        return tuple(axis_label(number, name) for number, name in enumerate(names, start=1))
 
     @property
     def joint_notes(self) -> tuple[str, ...]:

@@ -38,12 +38,24 @@ def axis(number: int | None) -> str:
 def axis_names(names: Sequence[str]) -> Sequence[str]:
     """Return the names of the joints of an arm for people; ``names`` are those of its description.
 
-    Joints that the description only numbers have the names of a five-axis arm.
+    Joints that the description only numbers have the names of a five-axis arm. A beginning that
+    all names share, as that of the robot, is left out.
     """
     numbered = all(re.fullmatch(r"(axis_?)?\d+", name) for name in names)
     if numbered and len(names) == len(AXIS_NAMES):
         return AXIS_NAMES
-    return [name.removesuffix("_joint").replace("_", " ") for name in names]
+    shared = ""
+    for underscore in re.finditer("_", names[0]):
+        prefix = names[0][: underscore.end()]
+        if all(re.match(rf"{re.escape(prefix)}[^\W\d]", name) for name in names):
+            shared = prefix
+    words = [name.removeprefix(shared).removesuffix("_joint").replace("_", " ") for name in names]
+    return [re.sub(r"^(joint|axis)(\d+)$", r"\1 \2", name) for name in words]
+
+
+def axis_label(number: int, name: str) -> str:
+    """Return the label of the joint ``number``, from 1, with this name for people."""
+    return name if name.endswith(f" {number}") else f"{number} {name}"
 
 
 PARTS = {
@@ -267,7 +279,7 @@ def limit_text(number: int, name: str, angle: float) -> str:
 
     ``number`` counts from 0.
     """
-    return f"{number + 1} {name}: {degrees(angle)} left"
+    return f"{axis_label(number + 1, name)}: {degrees(angle)} left"
 
 
 MAX_CONDITION = 1e6
