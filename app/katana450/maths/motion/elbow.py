@@ -1,0 +1,87 @@
+"""The motion of the elbow of seven axes while the tool rests: one tick of it, exactly.
+
+One number moves, the length of the path of the joints. It has the limits of the joint that needs
+them first, and the joints are solved for the pose of the tool at every tick. So the tool rests to
+rounding, and all joints keep their proportion.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.chain import Chain
+from katana450.maths.motion.arm_angle import at_pose, elbow_path, self_motion
+from katana450.maths.motion.limiter import STILL, JointMotion, Limiter, Limits
+
+SPEED_PART, RATE_PART, BEND_PART = 0.9, 0.7, 0.1
+"""[1] Parts of a joint's limits: of its speed, and of the acceleration that may change the rate of
+the elbow and bend its path. The path may bend more at the next place."""
+
+ROOM_PART: Final = 0.85
+"""[1] Part of the path to a limit in which the elbow can stop: its length is an estimate."""
+
+LEAST_ROOM: Final = 1e-4
+"""[rad] Length of the path to a limit that counts as none."""
+
+MAX_PATH: Final = 100.0
+"""[rad] Bound on the length of a path, which leads through all turns of all joints."""
+
+
+def elbow_moved(
+    chain: Chain,
+    limits: Limits,
+    now: JointMotion,
+    T: FloatArray,
+    rate: float,
+    angle: float,
+    dt: float,
+) -> JointMotion | None:
+    """Return the motion of the joints ``dt`` [s] after ``now``, with the tool at rest at `T`.
+
+    Args:
+        chain: the arm, with seven axes.
+        limits: those of its joints.
+        now: the present motion, in which the tool rests.
+        T: (4, 4) pose of the tool in {S}.
+        rate: wanted rate of the arm angle [rad/s]; 0 to come to rest.
+        angle: turn [rad] of the arm angle after which the elbow comes to rest, not negative.
+        dt: duration of the tick [s].
+
+    Returns:
+        The motion, or None if the limits of the joints do not allow it. The elbow also comes to
+        rest before a limit of a joint, and where it turns no farther.
+    """
+    path = elbow_path(chain, now.q, rate)
+    room = min(ROOM_PART * min(float(path.rooms.min()), path.end), MAX_PATH)
+    room = room if room > LEAST_ROOM else 0.0
+    with np.errstate(divide="ignore"):
+        speed, acceleration, jerk = (
+            float(np.min(limit / np.abs(path.v)))
+            for limit in (limits.speed, limits.acceleration, limits.jerk)
+        )
+        bend = math.sqrt(BEND_PART * float(np.min(limits.acceleration / np.abs(path.bend))))
+    wanted = min(SPEED_PART * speed, bend)
+    if path.turn > 0.0:
+        wanted, room = min(wanted, abs(rate) / path.turn), min(room, angle / path.turn)
+    moves = wanted > STILL and room > 0.0
+    bounds = (-MAX_PATH, MAX_PATH, max(wanted, STILL), RATE_PART * acceleration, RATE_PART * jerk)
+    along = Limiter(Limits(*(np.array((bound,)) for bound in bounds)))
+    present = (0.0, float(now.qd @ path.v), float(now.qdd @ path.v))
+    line = JointMotion(*(np.array((number,)) for number in present))
+    line = along.towards(line, np.array((room,)), dt) if moves else along.stop(line, dt)
+    length, speed, change = (float(values[0]) for values in (line.q, line.qd, line.qdd))
+    q = at_pose(chain, now.q + length * path.v + 0.5 * length * length * path.bend, T)
+    if not chain.within_limits(q):
+        return None
+    if line.at_rest:
+        return JointMotion.rest(chain.clamp(q))
+    v = self_motion(chain, q).v
+    v = math.copysign(1.0, float(v @ path.v)) * v
+    qd, qdd = speed * v, change * v + speed * speed * path.bend
+    if (np.abs(qd) > limits.speed).any() or (np.abs(qdd) > limits.acceleration).any():
+        return None
+    return JointMotion(frozen(chain.clamp(q)), frozen(qd), frozen(qdd))
