@@ -145,8 +145,8 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         # Refused at a simulated arm.
         requests.OperateArm,
     }  # fmt: skip
-    # A five-axis arm refuses a rotation; tests/general_arms has it.
-    other_arms = {requests.Orient}
+    # A five-axis arm refuses a rotation, and has no arm angle; tests/general_arms has both.
+    other_arms = {requests.Orient, requests.TurnElbow}
     commands = {*EVERY_REQUEST} - {Breakpoints}
     assert {*samples} | no_commands | other_arms <= commands
     plain = commands - {*samples} - no_commands - other_arms

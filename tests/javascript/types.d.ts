@@ -4,8 +4,8 @@ declare namespace Api {
   type Act = Acquire | Ask | Attach | Branch | Breakpoints | ChooseRobot | ClearStop | Decline | EndDrag | Fill | Get |
     Give | Go | GoToZero | Gripper | Heartbeat | Hello | Hold | Home | Jog | Joint | Joints | Kick | ListPeople | Load |
     Nudge | OperateArm | Orient | Pause | Place | Pose | Position | Program | Query | Redo | ReleaseLease | Remove |
-    Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | Undo | Watch |
-    Withdraw;
+    Rename | Resume | Servo | Set | SetPriority | Speed | Steer | StepTool | Stop | Take | Tool | Turn | TurnElbow |
+    Undo | Watch | Withdraw;
   type Answer = Arm | Branches | Done | Echo | Links | Loop | Mesh | Objects | People | Refused | Scene | State | Values
     | Welcome | World;
   interface Arm { is: "arm"; id?: number | string | null; name: string; joints: string[]; lower: number[];
@@ -166,6 +166,8 @@ declare namespace Api {
   interface Tool { do: "tool"; name: string; id?: number | string | null; revocations?: number | null;
     made?: number | null; }
   interface Turn { do: "turn"; pitch: number; roll: number; id?: number | string | null; revocations?: number | null;
+    made?: number | null; wait?: number | null; }
+  interface TurnElbow { do: "turn_elbow"; by: number; id?: number | string | null; revocations?: number | null;
     made?: number | null; wait?: number | null; }
   interface Undo { do: "undo"; id?: number | string | null; revocations?: number | null; made?: number | null;
     wait?: number | null; }

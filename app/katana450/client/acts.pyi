@@ -211,9 +211,19 @@ class Acts(Generic[AtRest, Answered, Sent]):
         Args:
             rates: (5,) Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll
                 [rad/s]. (6,) for arms outside the five-axis family: the rates of the rotations about x,
-                y and z follow.
+                y and z follow. (7,) for arms with an arm angle: its rate follows. It moves the elbow.
             frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six rates it
                 also turns about them.
+        """
+
+    def turn_elbow(self, by: float) -> AtRest:
+        """Turn the arm angle: the elbow moves about the line from shoulder to wrist, the tool rests.
+
+        Turns in a row add up. A turn ends early at a limit of a joint, and before a contact. Only arms
+        with seven turning axes have an arm angle.
+
+        Args:
+            by: Change of the arm angle [rad], counted from where the elbow is.
         """
 
     def end_drag(self) -> AtRest:

@@ -27,6 +27,7 @@ from katana450.maths.kinematics.tool import ToolTarget, pitched_frame
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.turns import in_limits_turns
 from katana450.maths.kinematics.velocity import JogFrame
+from katana450.maths.motion.arm_angle import has_arm_angle
 from katana450.maths.motion.limiter import Limits
 
 
@@ -113,6 +114,11 @@ class ToolKinematics(ABC):
     @abstractmethod
     def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
         """Return the twist (6,) of the tool in {S} [rad/s, m/s] for a jog at `q` (n,) [rad]."""
+
+    @property
+    def turns_elbow(self) -> bool:
+        """True if the arm has an arm angle: its elbow can move while the tool rests."""
+        return has_arm_angle(self.chain)
 
     @abstractmethod
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:

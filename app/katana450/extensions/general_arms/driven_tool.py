@@ -314,17 +314,20 @@ class DrivenTool(ToolKinematics):
         return tuple(losses_of(self.chain, best, priority, at_edge=at_edge, gap=gap))
 
     def jog_twist(self, q: FloatArray, rates: FloatArray, frame: JogFrame) -> FloatArray:
-        """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``."""
-        R = self.axes(q, frame)
-        return np.concatenate((R @ rates[3:], R @ rates[:3]))
+        """Return the twist (6,) of rates (6,): a velocity and three rotations along ``frame``.
 
-    def equations(self, q: FloatArray) -> PoseEquations:
+        The seventh rate, that of the arm angle, moves no tool.
+        """
+        R = self.axes(q, frame)
+        return np.concatenate((R @ rates[3:6], R @ rates[:3]))
+
+    def equations(self, q: FloatArray, joint: int | None = None) -> PoseEquations:
         """Return the equations of a path of the tool that begins at `q` (n,) [rad].
 
-        Of more than six axes the swivel is locked, or the joints without which the others move the
-        tool best.
+        Of more than six axes ``joint`` is locked, or the swivel, or the joints without
+        which the others move the tool best.
         """
-        swivel = self.solver.swivel
+        swivel = self.solver.swivel if joint is None else joint
         equations = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
         while len(equations.free) > 6:
             rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]

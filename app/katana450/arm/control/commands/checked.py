@@ -28,6 +28,9 @@ JointVector = Annotated[FloatArray, _rows(1, MAX_JOINTS)]
 ToolNumbers = Annotated[FloatArray, _rows(5, 6)]
 """(5,) x, y, z, pitch and roll of the tool; (6,) x, y, z and a rotation about each axis."""
 
+ToolRates = Annotated[FloatArray, _rows(5, 7)]
+"""(5,) or (6,) as `ToolNumbers`; (7,) the arm angle follows."""
+
 Point = Annotated[FloatArray, _rows(3, 3)]
 """(3,) [m]."""
 

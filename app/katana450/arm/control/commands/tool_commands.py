@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from msgspec import Meta
 from msgspec.structs import force_setattr
 
 from katana450.arm.control.commands.act import Command, MotionRequest, Name, Request, Traits
@@ -12,6 +14,7 @@ from katana450.arm.control.commands.checked import (
     Point,
     Rotation,
     ToolNumbers,
+    ToolRates,
     Transform,
     check_finite,
     vector,
@@ -33,6 +36,9 @@ MAX_LINEAR_STEP = 0.1
 
 MAX_ANGULAR_STEP = 1.0
 """Maximum step of pitch or roll [rad]."""
+
+MAX_ELBOW_TURN = math.tau
+"""Maximum turn of the arm angle by one command [rad]."""
 
 
 class Frame(Enum):
@@ -177,25 +183,48 @@ class Jog(Command, Request, frozen=True, eq=False):
     Attributes:
         rates: (5,) Velocity of the tool point (x, y, z) [m/s], then rates of pitch and roll
             [rad/s]. (6,) for arms outside the five-axis family: the rates of the rotations about x,
-            y and z follow.
+            y and z follow. (7,) for arms with an arm angle: its rate follows. It moves the elbow.
         frame: Frame along whose axes the tool point moves, `"base"` or `"tool"`; with six rates it
             also turns about them.
     """
 
     traits: ClassVar[Traits] = Traits(while_paused=False, at_once=True, goal="jog", gesture=True)
 
-    rates: ToolNumbers
+    rates: ToolRates
     frame: JogFrame = JogFrame.BASE
 
     def __post_init__(self) -> None:
-        rates = _tool_numbers("jog", self.rates, MAX_LINEAR_RATE, MAX_ANGULAR_RATE)
+        rates = _tool_numbers("jog", self.rates, MAX_LINEAR_RATE, MAX_ANGULAR_RATE, (5, 6, 7))
         force_setattr(self, "rates", rates)
+        if rates[6:].any() and rates[:6].any():
+            raise InputError("A jog moves the tool, or the elbow while the tool rests: not both.")
         _check_frame("jog", self.frame)
 
     @property
     def sample(self) -> bool:
         """True if it is refused when it arrives late; the end of a jog, without rates, is not."""
         return bool(self.rates.any())
+
+
+class TurnElbow(Command, MotionRequest, frozen=True):
+    """Turn the arm angle: the elbow moves about the line from shoulder to wrist, the tool rests.
+
+    Turns in a row add up. A turn ends early at a limit of a joint, and before a contact. Only arms
+    with seven turning axes have an arm angle.
+
+    Attributes:
+        by: Change of the arm angle [rad], counted from where the elbow is.
+    """
+
+    traits: ClassVar[Traits] = Traits(relative=True, goal="elbow", gesture=True)
+
+    by: Annotated[float, Meta(ge=-MAX_ELBOW_TURN, le=MAX_ELBOW_TURN)]
+
+    def __post_init__(self) -> None:
+        check_finite("The turn of the elbow", self.by)
+        if abs(self.by) > MAX_ELBOW_TURN:
+            limit = math.degrees(MAX_ELBOW_TURN)
+            raise InputError(f"The elbow turns by at most {limit:g} deg at a time.")
 
 
 class EndDrag(Command, MotionRequest, frozen=True):
@@ -248,11 +277,14 @@ class SetPriority(Command, Request, frozen=True):
             raise InputError(f"A priority must be one of {known}, not {self.priority!r}.")
 
 
-def _tool_numbers(what: str, value: object, linear: float, angular: float) -> FloatArray:
+def _tool_numbers(
+    what: str, value: object, linear: float, angular: float, sizes: tuple[int, ...] = (5, 6)
+) -> FloatArray:
     """Return the numbers of a step or jog. Raises InputError for those beyond both limits."""
     numbers = vector(f"The {what}", value, None)
-    if numbers.size not in (5, 6):
-        raise InputError(f"The {what} must be 5 or 6 numbers, not {numbers.size}.")
+    if numbers.size not in sizes:
+        known = " or ".join(map(str, sizes))
+        raise InputError(f"The {what} must be {known} numbers, not {numbers.size}.")
     for place, number in enumerate(numbers.tolist()):
         limit = linear if place < 3 else angular
         if abs(number) > limit:

@@ -21,6 +21,14 @@ NUMBERS = {
 }
 """Refusals of a jog or a step with the wrong number of numbers, by the freedoms of the tool."""
 
+ELBOW_RATES = 7
+"""Number of rates of a jog that also moves the elbow."""
+
+NO_ARM_ANGLE = (
+    "The elbow of this arm cannot move while its tool rests: that takes seven turning axes. Choose "
+    "another posture by its branch."
+)
+
 TURNS = {
     5: "A five-axis arm turns its tool by a pitch and a roll, not by a rotation.",
     6: "Only a five-axis arm has a pitch and a roll: give this tool a pose or a rotation.",
@@ -86,8 +94,11 @@ def _check_tool(arm: ArmModel, command: cmd.Command) -> None:
         case cmd.Pose(T=T):
             _check_size("The position of the pose", T[:3, 3])
         case cmd.Jog(rates=numbers) | cmd.StepTool(by=numbers):
-            if numbers.size != kinematics.freedoms:
+            elbow = numbers.size == ELBOW_RATES and kinematics.turns_elbow
+            if numbers.size != kinematics.freedoms and not elbow:
                 raise InputError(f"{NUMBERS[kinematics.freedoms]} The command has {numbers.size}.")
+        case cmd.TurnElbow() if not kinematics.turns_elbow:
+            raise InputError(NO_ARM_ANGLE)
         case cmd.Turn() | cmd.Orient() if not isinstance(command, kinematics.turn):
             raise InputError(TURNS[kinematics.freedoms])
         case cmd.SetPriority(priority=priority) if priority not in kinematics.priorities:

@@ -30,8 +30,10 @@ from katana450.maths.collision.clearance import (
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import MAX_PATH_LENGTH, CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import JogFrame, coasted, jog
+from katana450.maths.motion.elbow import elbow_moved
 from katana450.maths.motion.limiter import (
     LIMIT_TOLERANCE,
     STILL,
@@ -124,7 +126,6 @@ samples the tool may be faster."""
 COARSE_SAMPLING, FINE_SAMPLING = 0.02, 0.005
 """[s] Minimum time between samples of a brake. The coarse value is for steps, of which there are
 many; the fine one is for the one decision to leave a plan."""
-
 
 Travel = Callable[[FloatArray, FloatArray], float]
 """The distance [m] that the links travel between two joint vectors (n,)."""
@@ -317,9 +318,10 @@ class MotionStepper:
         if tool is None:
             return self._towards(limiter, state, dt, state.speed)
         fraction = min(state.speed, self._fraction(tool, state))
-        rates = None
-        if state.jogging is not None:
-            chain, jogging = tool.chain, state.jogging
+        rates, jogging = None, state.jogging
+        turns_elbow = jogging is not None and jogging.kept is not None
+        if jogging is not None and not turns_elbow:
+            chain = tool.chain
             q = chain.clamp(motion.q + dt * motion.qd)
             V = tool.jog_twist(q, jogging.rates, jogging.frame) * (not state.paused)
             low, high = self._any.stoppable(q)
@@ -328,7 +330,9 @@ class MotionStepper:
             # Joints that their limits slow move one by one.
             free = (rates > low) & (rates < high) | (np.abs(steady) < STILL)
         for _ in range(MAX_SLOWDOWNS):
-            if rates is not None:
+            if turns_elbow:
+                next_motion = self._with_elbow(tool.chain, state, fraction, dt)
+            elif rates is not None:
                 wanted = fraction * rates
                 straight = free.all() and in_proportion(self._any, motion, steady, wanted, dt)
                 next_motion = straight or self._any.at_rate(motion, wanted, dt)
@@ -340,6 +344,16 @@ class MotionStepper:
                 return next_motion
             fraction *= 0.9 * min(1.0, self._tool_speed / speed)
         return self._slow_or_braking(tool, motion, next_motion, dt)
+
+    def _with_elbow(self, chain: Chain, state: State, fraction: float, dt: float) -> JointMotion:
+        """Return the next motion of an arm that moves its elbow while its tool rests."""
+        jogging, motion = state.jogging, state.motion
+        assert jogging is not None
+        assert jogging.kept is not None
+        rate = 0.0 if state.paused else fraction * jogging.elbow_rate
+        angle = math.inf if jogging.turn is None else abs(jogging.turn)
+        moved = elbow_moved(chain, self._any.limits, motion, jogging.kept, rate, angle, dt)
+        return self._any.stop(motion, dt) if moved is None else moved
 
     @staticmethod
     def _towards(limiter: Limiter, state: State, dt: float, fraction: float) -> JointMotion:

@@ -201,6 +201,7 @@ class Session:
         if state.servo is not None and t - state.servo.t >= cmd.JOG_TIME:
             state = end_stream(state, self._stepper(state).stopping_point(state)[0], self._limits)
         dt = min(t - state.t, MAX_STEP_TIME)
+        start = state.setpoint
         state = self._stepper(state).step(replace(state, t=max(t, state.t)), dt)
         if state.mode is IDLE and state.motion.at_rest and state.goal is not state.setpoint:
             # A brake can end one rounding beside its predicted end.
@@ -212,7 +213,7 @@ class Session:
         if not isinstance(state.intent, Jogging):
             return state
         rest = self._stepper(state).stopping_point(state)[0]
-        return tool_targets.jogged(self.require_arm(), state, state.intent, rest)
+        return tool_targets.jogged(self.require_arm(), state, state.intent, start, rest)
 
     @staticmethod
     def observe(state: State, q: FloatArray, gripper: float) -> State:
@@ -317,7 +318,9 @@ class Session:
             case cmd.GoToZero():
                 return self._aim(state, frozen(np.zeros(len(self.ready))))
             case cmd.Jog(rates=rates, frame=frame):
-                return with_mode(state, Jogging(rates, frame, state.t + cmd.JOG_TIME))
+                return tool_targets.with_jog(state, Jogging(rates, frame, state.t + cmd.JOG_TIME))
+            case cmd.TurnElbow(by=by):
+                return tool_targets.with_elbow_turn(state, by)
             case cmd.EndDrag():
                 return end_drag(state)
             case _:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.commands.tool_commands import StepTool, TurnCommand
 from katana450.arm.control.session.goals import go_on_detour, with_goal, with_mode
-from katana450.arm.control.state.findings import of_jog
+from katana450.arm.control.state.findings import of_elbow, of_jog
 from katana450.arm.control.state.messages import excluded
 from katana450.arm.control.state.modes import (
     IDLE,
@@ -26,13 +26,15 @@ from katana450.errors import InputError
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
-from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import forward, jacobian_body
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.solution import Solution
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.maths.kinematics.velocity import singular_values
+from katana450.maths.kinematics.velocity import JogFrame, singular_values
+from katana450.maths.motion.arm_angle import elbow_turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +94,19 @@ class BranchOption:
     metrics: BranchMetrics
     contact: Contact | None
     refusal: str = ""
+
+
+ELBOW_RATE = 1.0
+"""[rad/s] Maximum rate at which the arm angle turns by an angle."""
+
+ELBOW_EXACT = 1e-6
+"""[rad] Rest of a turn of the elbow that counts as none."""
+
+TOOL_EXACT = 1e-6
+"""[m], [1] Change of the pose of the tool up to which the elbow keeps it."""
+
+SLOW = 1e-6
+"""[rad/s], [m/s] Twist of the tool below which it rests, so that its pose can be kept."""
 
 
 def branch_named(arm: ArmModel, name: str) -> AnyBranch:
@@ -250,19 +265,61 @@ def with_branch(arm: ArmModel, state: State, branch: AnyBranch) -> State:
     return with_goal(replace(state, branch=best.branch), best.q, findings, Positioning(target))
 
 
-def jogged(arm: ArmModel, state: State, jogging: Jogging, rest: FloatArray) -> State:
+def with_jog(state: State, jogging: Jogging) -> State:
+    """Return ``state`` that moves as ``jogging`` says, or continues a jog so."""
+    return with_mode(state, jogging if state.jogging is None else state.jogging.continued(jogging))
+
+
+def with_elbow_turn(state: State, by: float) -> State:
+    """Return ``state`` whose elbow turns by ``by`` [rad] more than it has yet to."""
+    left = 0.0 if state.jogging is None else state.jogging.turn or 0.0
+    rates = frozen((0.0,) * 6 + (ELBOW_RATE,))
+    return with_jog(state, Jogging(rates, JogFrame.BASE, state.t, turn=left + by))
+
+
+def jogged(
+    arm: ArmModel, state: State, jogging: Jogging, start: FloatArray, rest: FloatArray
+) -> State:
     """Return ``state`` after a tick of a jog, with ``rest`` (n,) as the goal.
 
-    rest: the posture at which a brake begun now ends. So the arm comes to rest there if the jog
-    is not renewed.
+    Args:
+        arm: the arm.
+        state: the state after the tick.
+        jogging: its mode.
+        start: the setpoint before the tick.
+        rest: the posture at which a brake begun now ends. So the arm comes to rest there if the jog
+            is not renewed.
     """
     kinematics, q = arm.kinematics_to(state.tool), state.setpoint
+    chain = kinematics.chain
     other_findings = tuple(f for f in state.findings if f.reason in KEPT_REASONS)
     V = kinematics.jog_twist(q, jogging.rates, jogging.frame)
-    held = of_jog(kinematics.chain, q, V)
+    held = of_jog(chain, q, V)
+    # At a limit or a contact the elbow comes to rest before its angle.
+    ends = jogging.kept is not None and state.motion.at_rest and not state.paused
+    jogging = _with_progress(chain, state, jogging, start)
+    if jogging.elbow_rate:
+        held += of_elbow(chain, q, jogging.elbow_rate)
     branch = kinematics.branch_of(rest)
     aimed = replace(state, goal=rest, branch=branch, findings=other_findings + held)
-    if state.t < jogging.until:
-        return aimed
+    if state.t < jogging.until or (jogging.turn and not ends):
+        return with_mode(aimed, jogging)
     # The end of a jog brakes all joints in proportion, so the tool stays on its path.
     return with_mode(aimed, IDLE if state.motion.at_rest else jogging.ending())
+
+
+def _with_progress(chain: Chain, state: State, jogging: Jogging, start: FloatArray) -> Jogging:
+    """Return ``jogging`` after a tick from the setpoint ``start`` (n,) to that of ``state``."""
+    q = state.setpoint
+    if jogging.turn is not None:
+        left = jogging.turn - elbow_turn(chain, start, q)
+        jogging = replace(jogging, turn=0.0 if abs(left) < ELBOW_EXACT else left)
+    T = forward(chain, q)
+    if jogging.kept is not None:
+        # A brake of every joint by itself, before a contact, has moved the tool.
+        moved = np.abs(T - jogging.kept).max() > TOOL_EXACT
+        return replace(jogging, kept=None) if moved else jogging
+    # The tool of an arm that was moving comes to rest first.
+    if not jogging.keeps_tool or np.abs(jacobian_body(chain, q) @ state.motion.qd).max() > SLOW:
+        return jogging
+    return replace(jogging, kept=frozen(T))

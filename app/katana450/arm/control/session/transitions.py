@@ -71,6 +71,7 @@ TABLE: Mapping[type[cmd.Command], Row] = {
     cmd.StepTool: _row(Tracking,       S,   S,   C,   S,   S,   S),
     cmd.EndDrag: _row(Positioning,     A,   S,   C,   R,   R,   R),
     cmd.Jog: _row(Jogging,             S,   S,   S,   C,   S,   S),
+    cmd.TurnElbow: _row(Jogging,       S,   S,   S,   C,   S,   S),
     cmd.Servo: _row(Servoing,          S,   S,   S,   S,   C,   S),
     cmd.Follow: _row(Following,        S,   S,   S,   S,   S,   S),
     cmd.GoAlong: _row(None,            R,   R,   R,   R,   R,   C),

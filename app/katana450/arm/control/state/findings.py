@@ -20,6 +20,7 @@ from katana450.maths.kinematics.projection import (
 )
 from katana450.maths.kinematics.tracker import Tracked
 from katana450.maths.kinematics.velocity import limit_distances, limited_jog
+from katana450.maths.motion.arm_angle import elbow_path
 from katana450.maths.motion.limiter import Limits
 
 MIN_JOG_FRACTION = 0.05
@@ -27,6 +28,9 @@ MIN_JOG_FRACTION = 0.05
 
 FULL_JOG_FRACTION = 0.9
 """Fraction of a jog above which no loss is reported."""
+
+LEAST_PART = 1e-3
+"""Rate of a joint [1] in a unit motion of the elbow from which on its limit counts."""
 
 LIMIT_DISTANCE = math.radians(0.5)
 """[rad] Distance to a limit within which a joint holds up a jog."""
@@ -109,6 +113,19 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
         Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
         for axis in np.flatnonzero(near).tolist()
     )
+
+
+def of_elbow(chain: Chain, q: FloatArray, rate: float) -> tuple[Finding, ...]:
+    """Return the findings on what stops the elbow at ``q`` (7,) [rad] while the tool rests.
+
+    rate: a rate of the arm angle [rad/s], of which the sign counts.
+    """
+    path = elbow_path(chain, q, rate)
+    near = np.flatnonzero((path.rooms <= LIMIT_DISTANCE) & (np.abs(path.v) >= LEAST_PART))
+    if near.size:
+        ends = np.where(path.v > 0.0, chain.upper, chain.lower)
+        return tuple(Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis) for axis in near.tolist())
+    return (Finding(Reason.ELBOW_END),) if path.end <= LIMIT_DISTANCE else ()
 
 
 def of_tracked(chain: Chain, tracked: Tracked, priority: Priority) -> tuple[Finding, ...]:

@@ -117,6 +117,9 @@ REASONS: dict[Reason, Callable[[Finding], str]] = {
     Reason.SINGULAR: lambda _: (
         "no joint moves the tool in that direction from here: move in another direction first"
     ),
+    Reason.ELBOW_END: lambda _: (
+        "the elbow turns no farther while the tool rests: move the tool first"
+    ),
     Reason.AXIS_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {degrees(f.amount, 2)}",
     Reason.SLIDE_LIMIT: lambda f: f"{axis(f.axis)} at its limit of {millimetres(f.amount)}",
     Reason.GRIPPER_LIMIT: lambda f: f"the gripper at its limit of {degrees(f.amount)}",

@@ -6,6 +6,7 @@ mode outlasts it. The effect of each command in each mode is in ``transitions``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,22 +79,41 @@ class Tracking:
 
 @dataclass(frozen=True, eq=False)
 class Jogging:
-    """Motion at given rates for a limited time.
+    """Motion at given rates, for a limited time or until the elbow has turned by an angle.
 
     Attributes:
         rates: (5,) or (6,) velocity of the tool point [m/s], then pitch and roll or the three
-            rotations [rad/s].
+            rotations [rad/s]; (7,) then the arm angle [rad/s].
         frame: the frame of the velocity.
         until: time [s] at which the jog ends unless it is renewed.
+        turn: the angle [rad] by which the elbow has yet to turn; None without an angle.
+        kept: (4, 4) pose of the tool in {S} while the elbow alone moves; None at first.
     """
 
     rates: FloatArray
     frame: JogFrame
     until: float
+    turn: float | None = None
+    kept: FloatArray | None = None
+
+    @property
+    def elbow_rate(self) -> float:
+        """Rate of the arm angle [rad/s], towards the end of a turn by an angle."""
+        rate = float(self.rates[6]) if self.rates.size > 6 else 0.0
+        return rate if self.turn is None else math.copysign(rate, self.turn)
+
+    @property
+    def keeps_tool(self) -> bool:
+        """True if the elbow moves and the tool rests."""
+        return self.elbow_rate != 0.0 and not self.rates[:6].any()
+
+    def continued(self, jog: Jogging) -> Jogging:
+        """Return ``jog``, given during this one, with the pose of the tool that both keep."""
+        return jog if jog.rates[:6].any() else replace(jog, kept=self.kept)
 
     def ending(self) -> Jogging:
         """Return the jog with zero rates, with which it ends."""
-        return replace(self, rates=frozen(np.zeros(self.rates.size)))
+        return replace(self, rates=frozen(np.zeros(self.rates.size)), turn=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,7 @@ class Reason(Enum):
     AXIS_1 = "axis 1 in the way"
     LINKS = "links reach no farther"
     SINGULAR = "singular"
+    ELBOW_END = "elbow at its end"
     AXIS_LIMIT = "axis limit"
     SLIDE_LIMIT = "slide limit"
     GRIPPER_LIMIT = "gripper limit"
