@@ -52,6 +52,13 @@ class StepMethods:
             by: deg, or a text such as 0.5 rad.
         """
 
+    def turn_elbow(self, by: float | str) -> None:
+        """Turn the elbow of seven axes about the line from shoulder to wrist; the tool rests.
+
+        Args:
+            by: deg, or a text such as 0.5 rad.
+        """
+
     def home(self) -> None:
         """Move to the ready posture."""
 
