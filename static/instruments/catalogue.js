@@ -24,8 +24,7 @@ const BIG = ["broad", "large", "wide"];
 // Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say }} page @returns {Instrument[]} */
 export function instruments(arm, gripper, { say, history, groups, view }) {
-  const touch = gripper && !arm.joints_only ? [pads()] : [];
-  return [...knobs(arm, gripper, say), ...touch, ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
+  return [...knobs(arm, gripper, say), ...(arm.touch ? [pads()] : []), ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
 }
 
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Page.Say} say */
@@ -208,7 +207,7 @@ function plots(arm, gripper, history, groups, view) {
     plot("joint-loads", "Weight on the joints [N m]", "loads", 1, 2, true),
     ...joints.slice(2),
     ...(gripper ? [plot("gripper-opening", "Gripper [%]", "gripper", 2, 1, false)] : []),
-    ...(gripper ? [plot("grip-forces", "Grip force [N]", "forces", 1, 2, false)] : []),
+    ...(arm.touch ? [plot("grip-forces", "Grip force [N]", "forces", 1, 2, false)] : []),
     plot("clearances", "Clearance [mm]", "clearance", 2, 1, false),
     plot("tool-speeds", "Tool speed [mm/s]", "speed", 2, 1, false),
   ];

@@ -39,6 +39,8 @@ export function channelsOf(arm, gripper) {
       { label: "Now", unit: "%", of: ({ gripper: angle }) => gripper.percent(angle) },
       { label: "Goal", unit: "%", of: ({ gripper_goal: angle }) => gripper.percent(angle) },
     );
+  }
+  if (arm.touch) {
     const pads = ["Right", "Left"]; // in the order of the state
     group("forces", ...pads.map((label, i) => /** @type {Channel} */ ({ label, unit: "N", of: ({ touch }) => touch?.pads[i].force })));
   }

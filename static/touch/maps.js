@@ -23,7 +23,6 @@ export class PressureMaps {
   #pads = [];
   /** @type {string | null} */
   #shown = null; // forces and squeeze that are drawn
-  #note = html("p", { class: "note" });
 
   constructor() {
     const maps = html("div", { class: "maps" });
@@ -38,13 +37,12 @@ export class PressureMaps {
     const scale = html("i");
     scale.style.background = `linear-gradient(to right, ${COLOURS.map((rgb) => `rgb(${rgb})`)})`;
     const legend = html("p", { class: "scale" }, "0", scale, `${FULL / 1000} kPa`, html("span", {}, "palm → tip"));
-    this.element = html("div", { class: "pressure" }, maps, legend, this.#note);
+    this.element = html("div", { class: "pressure" }, maps, legend);
   }
 
-  /** Show the value `touch` of a state; null for a gripper whose pads are not known. @param {Page.Touch | null} touch */
+  /** Show the value `touch` of a state. @param {Page.Touch | null} touch */
   show(touch) {
-    set(this.element, "data-known", touch !== null);
-    if (!touch) return write(this.#note, "The pads of this gripper are not known.");
+    if (!touch) return;
     const shown = [touch.squeeze, ...touch.pads.map(({ force }) => force)].join();
     if (shown === this.#shown) return;
     this.#shown = shown;

@@ -10,6 +10,7 @@ import pytest
 
 from katana450.maths.geometry import so3
 from tests.browser.conftest import OpenPage
+from tests.browser.instruments import show
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
 from tests.general_arms.links_of_arms import ur5e
@@ -52,6 +53,23 @@ def test_a_held_key_turns_the_tool_about_the_vertical(six: ViserPage) -> None:
     np.testing.assert_allclose(turn[:2], 0.0, atol=0.02)
     assert turn[2] > TURN_WORTH_SEEING
     np.testing.assert_allclose(end[:3, 3], start[:3, 3], atol=0.003)
+    assert not six.errors
+
+
+def test_instruments_are_those_of_the_arm(six: ViserPage) -> None:
+    show(six, True)
+    titles = [
+        card.get_attribute("aria-label") for card in six.page.locator("#instruments .card").all()
+    ]
+    assert titles[:6] == [
+        "1 shoulder pan",
+        "2 shoulder lift",
+        "3 elbow",
+        "4 wrist 1",
+        "5 wrist 2",
+        "6 wrist 3",
+    ]
+    assert not six.page.locator("#instruments .card[data-id=pads]").count()
     assert not six.errors
 
 

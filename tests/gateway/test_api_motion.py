@@ -47,6 +47,8 @@ def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: 
     assert there.holder == program.welcome.name
     assert program.welcome.name.startswith("Test")
     described = program.query(answers.Arm)
+    assert described.touch
+    assert there.touch is not None
     assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
     np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)

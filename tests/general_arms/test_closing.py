@@ -218,7 +218,7 @@ def test_answer_and_description_name_the_closed_end_first(tmp_path: Path) -> Non
     path = tmp_path / "arm.urdf"
     path.write_text(hand_urdf("UR5e", ROBOTIQ_2F_85), encoding="utf-8")
     robot, session, _ = find_robot(Settings(), path, None)
-    assert serialize.arm(robot, session.ready.tolist()).gripper == (0.8, 0.0, 2.0)
+    assert serialize.arm(robot, session.ready.tolist(), None).gripper == (0.8, 0.0, 2.0)
 
 
 def test_hand_that_is_not_understood_closes_at_the_lower_end(tmp_path: Path) -> None:

@@ -312,6 +312,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         links: (n,) The link that each joint moves.
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
         freedoms: Number of numbers in ``jog`` and ``step_tool``, 5 or 6; 0 without tools.
+        touch: Whether states have ``touch``, the forces in the hand.
     """
 
     name: str
@@ -331,6 +332,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     links: list[JointLink]
     joints_only: str
     freedoms: int = 0
+    touch: bool = False
 
 
 class BranchOption(msgspec.Struct, frozen=True, kw_only=True):

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 import msgspec
 
 from katana450.arm.control.commands.act import tag_of
+from katana450.arm.control.objects.environment import Hand
 from katana450.arm.control.objects.grip import touching
 from katana450.arm.control.objects.pouring import Pouring
 from katana450.arm.control.session.outcome import reason
@@ -216,7 +217,7 @@ def water(pouring: Pouring | None, now: control.State) -> answers.Water | None:
     )
 
 
-def arm(robot: Robot, ready: list[float]) -> answers.Arm:
+def arm(robot: Robot, ready: list[float], hand: Hand | None) -> answers.Arm:
     """Return the description of ``robot``. ``ready``: posture to which Home moves."""
     mounted = robot.arm
     model = robot.joint_group if mounted is None else mounted
@@ -240,6 +241,7 @@ def arm(robot: Robot, ready: list[float]) -> answers.Arm:
         links=_joint_links(robot, names),
         joints_only=robot.why,
         freedoms=0 if mounted is None else mounted.kinematics.freedoms,
+        touch=hand is not None and hand.grip_model is not None,
     )
 
 
