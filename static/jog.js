@@ -1,4 +1,4 @@
-// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates, or six with a yaw. An input that is released,
+// Hold to move: keys, pads, gamepad and SpaceMouse, added up to five rates, six with a yaw, or seven with the elbow. An input that is released,
 // unplugged or in a hidden tab counts as zero, and without new messages the arm comes to rest.
 import { element, first, write } from "./dom.js";
 import { messageOf } from "./server.js";
@@ -11,19 +11,19 @@ const DEAD = 0.12; // fraction of a stick's travel that counts as zero
 const MOUSE_FULL = 350; // value of a SpaceMouse at full deflection
 const MOUSE_FRESH = 150; // ms for which a report is valid; it reports all the time while held
 const MOUSE_RESTS = 1000; // ms without a report after which it is at rest
-/** x, y, z, pitch, roll, yaw @type {import("./jog/steps.js").Moves} */
+/** x, y, z, pitch, roll, yaw, elbow @type {import("./jog/steps.js").Moves} */
 const KEYS = {
   KeyW: [0, 1], KeyS: [0, -1], KeyA: [1, 1], KeyD: [1, -1], KeyR: [2, 1], KeyF: [2, -1],
   KeyI: [3, 1], KeyK: [3, -1], KeyJ: [4, -1], KeyL: [4, 1],
-  KeyQ: [5, 1], KeyE: [5, -1],
+  KeyQ: [5, 1], KeyE: [5, -1], KeyG: [6, -1], KeyH: [6, 1],
 };
 /** @type {import("./jog/steps.js").Moves} */
 const HOLDS = {
   "pitch+": [3, 1], "pitch-": [3, -1], "roll-": [4, -1], "roll+": [4, 1],
-  "yaw+": [5, 1], "yaw-": [5, -1],
+  "yaw+": [5, 1], "yaw-": [5, -1], "elbow-": [6, -1], "elbow+": [6, 1],
 };
 
-const none = () => [0, 0, 0, 0, 0, 0];
+const none = () => [0, 0, 0, 0, 0, 0, 0];
 /** @param {string} id */
 const byId = (id) => element(id, HTMLElement);
 /** @returns {NodeListOf<HTMLButtonElement>} */
@@ -143,7 +143,7 @@ function gamepad() {
   if (!counts) return none();
   const [x = 0, y = 0, u = 0, v = 0] = device.axes;
   return [-bent(y), -bent(x), -bent(v), Number(pressed(12)) - Number(pressed(13)), bent(u),
-    Number(pressed(14)) - Number(pressed(15))];
+    Number(pressed(14)) - Number(pressed(15)), Number(pressed(7)) - Number(pressed(6))];
 }
 
 /** @param {HidReport} message */
@@ -194,8 +194,10 @@ function rates() {
   Object.values(pads).forEach(add);
   add(pad);
   if (!parked.mouse && performance.now() - mouse.at < MOUSE_FRESH) add(mouse.rates);
-  // A yaw that the arm does not have must not end its motion by a jog of zero rates.
+  // A yaw or an elbow that the arm does not have must not end its motion by a jog of zero rates.
   if (steps?.freedoms !== 6) sum[5] = 0;
+  // The elbow moves while the tool rests.
+  if (!steps?.turnsElbow || sum.slice(0, 6).some(Boolean)) sum[6] = 0;
   return sum.map((value, i) => Math.max(-1, Math.min(1, value)) * (i < 3 ? LINEAR : ANGULAR));
 }
 
@@ -208,9 +210,10 @@ function sendJog() {
   moving = moves;
   sentAt = performance.now();
   const frame = first("[name=frame]:checked", HTMLInputElement);
-  const [x, y, z, pitch, roll, yaw] = now;
+  const [x, y, z, pitch, roll, yaw, elbow] = now;
   // With six freedoms a turn about each axis of the frame.
   const sent = steps?.freedoms === 6 ? [x, y, z, roll, pitch, yaw] : [x, y, z, pitch, roll];
+  if (elbow) sent.push(elbow);
   say({ do: "jog", rates: sent, frame: frame.value === "tool" ? "tool" : "base" });
 }
 

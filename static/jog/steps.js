@@ -6,8 +6,9 @@ import { readArm } from "../server.js";
 const SIZES = [0, 0.1, 1, 10]; // mm or degrees; 0 to hold
 const RADIANS = Math.PI / 180;
 const EDGE = 0.5; // fraction of a stick's travel that counts as a press
-// Name and unit of each step of the tool; only an arm with six freedoms has the last.
-const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"], ["Yaw", "°"]];
+// Name and unit of each step of the tool; only an arm with six freedoms has the yaw, and one with an arm angle the elbow.
+const AXES = [["x", "mm"], ["y", "mm"], ["z", "mm"], ["Pitch", "°"], ["Roll", "°"], ["Yaw", "°"], ["Elbow", "°"]];
+const ELBOW = 6; // its place in AXES
 /** @typedef {Record<string, [axis: number, sign: number]>} Moves */
 /** @type {Record<string, "open" | "closed">} */
 const GRIPPER_KEYS = { KeyO: "open", KeyC: "closed" };
@@ -18,7 +19,7 @@ export class Steps {
   /** @type {"base" | "tool" | "joints"} */
   #frame = "base";
   #arm; // the description of the arm
-  #held = [0, 0, 0, 0, 0, 0]; // signs of the gamepad's sticks
+  #held = [0, 0, 0, 0, 0, 0, 0]; // signs of the gamepad's sticks
   #gripped = [false, false];
   #grid = html("div", { id: "steps", hidden: "" });
   #gripper = html("fieldset", { id: "gripper" }, html("legend", {}, "Gripper"));
@@ -50,8 +51,8 @@ export class Steps {
       pads.before(this.#gripper);
     }
     root.addEventListener("change", ({ target }) => target instanceof HTMLInputElement && this.#choose(target));
-    const yaws = /** @type {NodeListOf<HTMLElement>} */ (root.querySelectorAll("[data-hold^=yaw]"));
-    if (arm.freedoms === 6) for (const yaw of yaws) yaw.hidden = false;
+    for (const [name, has] of [["yaw", arm.freedoms === 6], ["elbow", this.turnsElbow]])
+      for (const button of root.querySelectorAll(`[data-hold^=${name}]`)) button.toggleAttribute("hidden", !has);
     if (arm.joints_only) first("[value=joints]", HTMLInputElement, root).click();
   }
 
@@ -66,6 +67,10 @@ export class Steps {
       const by = this.#arm.slides[axis] ? this.#size / 1000 : this.#size * RADIANS;
       return this.#say({ do: "nudge", axis: axis + 1, by: sign * by });
     }
+    if (axis === ELBOW) {
+      if (this.turnsElbow) this.#say({ do: "turn_elbow", by: sign * this.#size * RADIANS });
+      return;
+    }
     /** @type {number[]} */
     const by = new Array(this.freedoms).fill(0);
     if (axis >= this.freedoms) return;
@@ -78,6 +83,11 @@ export class Steps {
   // Number of numbers in a jog or a step of the tool.
   get freedoms() {
     return this.#arm.freedoms ?? 0;
+  }
+
+  // Whether the elbow moves while the tool rests.
+  get turnsElbow() {
+    return this.#arm.turns_elbow ?? false;
   }
 
   // Return whether the key was handled. moves: {code: [axis, sign]} of the keys that move.
@@ -134,7 +144,7 @@ export class Steps {
   #draw() {
     const columns = this.#frame === "joints"
       ? this.#arm.joints.map((_, i) => [this.#arm.links[i].label, this.#arm.slides[i] ? "mm" : "°"])
-      : AXES.slice(0, this.freedoms);
+      : AXES.slice(0, this.turnsElbow ? AXES.length : this.freedoms);
     this.#grid.replaceChildren(
       ...columns.map(([name, unit], axis) => {
         /** @param {number} sign */

@@ -97,7 +97,7 @@ DEVICES = """() => {
 """Script that gives the browser a gamepad and a SpaceMouse; x of the latter is to the right."""
 
 BEGIN = """() => {
-    const say = ({ rates }) => rates && said.push(rates);
+    const say = ({ rates, by }) => said.push(rates ?? by);
     Jog.begin({ say, stop: () => { stops += 1; Jog.quiet(); } });
     Jog.show(true);
 }"""
@@ -251,7 +251,7 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         page.get_by_role("button", name="z minus 10 mm").click()
         assert said()[0]["by"] == [0, 0, -0.01, 0, 0]
         for stick in (0.4, 0.9, 1.0, 0.0, 0.9):
-            page.evaluate("(x) => steps.deflect([x, 0, 0, 0, 0, 0])", stick)
+            page.evaluate("(x) => steps.deflect([x, 0, 0, 0, 0, 0, 0])", stick)
         assert [each["by"][0] for each in said()] == [0.01, 0.01]
         # Joints move by steps only.
         choose("step", "0")
@@ -264,6 +264,30 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         for buttons in ([True, False], [True, False], [False, True]):
             page.evaluate("(buttons) => steps.grip(...buttons)", buttons)
         assert [each["angle"] for each in said()] == [0.3, -0.4]
+
+
+def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> None:
+    with bare_page(browser, arm={**ARM, "freedoms": 6, "turns_elbow": True}) as page:
+        page.evaluate(DEVICES)
+        load(page, "Jog", "jog.js")
+        page.evaluate(BEGIN)
+        page.evaluate("document.getElementById('jog').hidden = false")
+        page.locator("[data-hold='elbow+']").wait_for()
+        key(page, "down", "KeyH")
+        moves(page, 6, 1)
+        # With a motion of the tool the elbow waits.
+        key(page, "down", "KeyW")
+        moves(page, 0, 1)
+        key(page, "up", "KeyW")
+        key(page, "up", "KeyH")
+        rests(page)
+        page.evaluate("() => { pad.buttons[4].pressed = pad.buttons[6].pressed = true }")
+        moves(page, 6, -1)
+        page.evaluate("() => { pad.buttons[4].pressed = pad.buttons[6].pressed = false }")
+        rests(page)
+        page.locator("#jog [name=step][value='10'] + span").click()
+        page.get_by_role("button", name="Elbow minus 10 °").click()
+        assert page.evaluate("said.at(-1)") == pytest.approx(-0.174533, abs=1e-6)
 
 
 # Touch

@@ -313,6 +313,7 @@ class Arm(Answer, frozen=True, kw_only=True):
         joints_only: Reason for which no tool can be moved to a pose; empty where one can.
         freedoms: Number of numbers in ``jog`` and ``step_tool``, 5 or 6; 0 without tools.
         touch: Whether states have ``touch``, the forces in the hand.
+        turns_elbow: Whether ``turn_elbow``, and the seventh rate of a ``jog``, move the elbow.
     """
 
     name: str
@@ -333,6 +334,7 @@ class Arm(Answer, frozen=True, kw_only=True):
     joints_only: str
     freedoms: int = 0
     touch: bool = False
+    turns_elbow: bool = False
 
 
 class BranchOption(msgspec.Struct, frozen=True, kw_only=True):

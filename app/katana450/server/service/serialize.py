@@ -242,6 +242,7 @@ def arm(robot: Robot, ready: list[float], hand: Hand | None) -> answers.Arm:
         joints_only=robot.why,
         freedoms=0 if mounted is None else mounted.kinematics.freedoms,
         touch=hand is not None and hand.grip_model is not None,
+        turns_elbow=mounted is not None and mounted.kinematics.turns_elbow,
     )
 
 
