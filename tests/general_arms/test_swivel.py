@@ -58,7 +58,7 @@ def test_reachable_poses_are_reached_inside_the_limits(name: str) -> None:
     for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
         T = forward(chain, q)
         started = time.thread_time()
-        found = solver.inverse(T)
+        found = list(solver.inverse(T))
         times.append(time.thread_time() - started)
         usable = [each for each in found if each.within_limits]
         reached += any(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -158,7 +158,7 @@ class ClosedForm(GeneralKinematics):
         return FileRounding(self.chain, self.form.links)
 
     @cached_property
-    def _canonical(self) -> Callable[[FloatArray, Sequence[float]], list[Angles]]:
+    def _canonical(self) -> Callable[[FloatArray, Sequence[float]], Iterable[Angles]]:
         """A function for the canonical angles of all branches, without the rounding of the file.
 
         It takes a pose (4, 4) and the canonical angles that are used where it leaves them free.
@@ -167,7 +167,7 @@ class ClosedForm(GeneralKinematics):
         solve = form.build(form.links, FLOATS)
         before, after = form.links.T_1_S, form.T_after
 
-        def canonical(T: FloatArray, free: Sequence[float]) -> list[Angles]:
+        def canonical(T: FloatArray, free: Sequence[float]) -> Iterable[Angles]:
             pose = se3.inverse(T) if is_reversed else T
             # For one pose `dot` takes half the time of `@`.
             return solve(before.dot(pose).dot(after).tolist(), free)
@@ -209,7 +209,7 @@ class ClosedForm(GeneralKinematics):
 
         def again(targets: FloatArray) -> FloatArray:
             return np.array(
-                [joints(canonical(target, alpha)[k]) for k, target in enumerate(targets)]
+                [joints([*canonical(target, alpha)][k]) for k, target in enumerate(targets)]
             )
 
         poses = np.repeat(T[None], len(q), axis=0)
@@ -224,23 +224,19 @@ class ClosedForm(GeneralKinematics):
         """
         pose = se3.validated(T)
         if q_hint is None and not self.rounding.is_corrected:
-            # The joint angles of a branch follow from its canonical angles when they are read.
-            angles = self._canonical(pose, self.form.links.shift)
-            return self._solutions(pose, angles, self._joints)
+            # A branch is computed when it is read.
+            return self._solutions(
+                pose, map(self._joints, self._canonical(pose, self.form.links.shift))
+            )
         hint = None if q_hint is None else self.chain.check_q(q_hint)
         angles = self.solve(pose, None if hint is None else hint.tolist())
         if hint is not None:
             angles = list(map(tuple, nearest_turn(self.chain, np.array(angles), hint).tolist()))
         return self._solutions(pose, angles)
 
-    def _solutions(
-        self,
-        T: FloatArray,
-        angles: Sequence[Angles],
-        joints: Callable[[Angles], Angles] = tuple,
-    ) -> Solutions:
+    def _solutions(self, T: FloatArray, angles: Iterable[Angles]) -> Solutions:
         slack = self.rounding.slack
-        return Solutions(self.chain, T, angles, self.branches, lambda _T: (slack, slack), joints)
+        return Solutions(self.chain, T, angles, self.branches, lambda _T: (slack, slack))
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] for poses `T` (N, 4, 4) [m].
@@ -264,9 +260,12 @@ class ClosedForm(GeneralKinematics):
         chain_poses = inverses(poses) if self.is_reversed else poses
         shift = self.form.links.shift
         with np.errstate(all="ignore"):
-            solutions = self._solve_arrays(
-                np.moveaxis(self.form.links.T_1_S @ chain_poses @ self.form.T_after, 0, -1), shift
-            )
+            solutions = [
+                *self._solve_arrays(
+                    np.moveaxis(self.form.links.T_1_S @ chain_poses @ self.form.T_after, 0, -1),
+                    shift,
+                )
+            ]
         zeros = np.zeros(len(poses))
         alpha = np.array([[angle + zeros for angle in angles] for angles in solutions])
         q = alpha.transpose(2, 0, 1) - shift

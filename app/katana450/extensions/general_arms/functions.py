@@ -35,7 +35,8 @@ class Operations(NamedTuple):
     Attributes:
         atan2, hypot, cos, sin: as in `math`.
         root: sqrt(x), and 0 where x < 0.
-        select: (condition, a, b) to a where the condition holds, else b.
+        select: (condition, a, b) to a where the condition holds, else b. The condition is that of
+            the rare case, or both are the same number.
         bounded: the nearest number in [-1, 1].
         is_scalar: whether the numbers are floats. A formula may then take a shorter way where a
             condition holds, and has further ways for rare poses. Arrays take the way that is right

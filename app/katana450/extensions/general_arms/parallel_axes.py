@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -73,12 +73,11 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
     loosened = _loosened(links.a[1], links.a[2], ex, ey, held)
     atan2 = f.atan2
 
-    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+    def solve(rows: list[list[Number]], free: Angles) -> Iterator[Angles]:
         (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
         z = z - d1
         offset = (c1 * z - height) / s1
         up = c1 * offset + s1 * z
-        solutions = []
         for c, s, length in turns(x, y, offset, free[0]):
             one = atan2(s, c)
             m11, m12, m13 = c * r11 + s * r21, c * r12 + s * r22, c * r13 + s * r23
@@ -102,8 +101,7 @@ def six_axes(links: DHLinks, f: Operations) -> Solve:
                         )
                 for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
                     four = flip * (psi - two - bend_)
-                    solutions.append((one, two, flip2 * bend_, four, five, six))
-        return solutions
+                    yield one, two, flip2 * bend_, four, five, six
 
     return solve
 
@@ -176,7 +174,7 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
     near = tolerances.NEAR_AXIS_1 * links.reach
     atan2, hypot, cos, sin = f.atan2, f.hypot, f.cos, f.sin
 
-    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+    def solve(rows: list[list[Number]], free: Angles) -> Iterator[Angles]:
         (r11, _, r13, x), (r21, _, r23, y), (r31, _, _, z), _ = rows
         z = z - d1
         offset = (c1 * z - height) / s1
@@ -186,7 +184,6 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
         planes: Angles = (*front, *back)
         if f.is_scalar and front[2] <= near:
             planes = _by_axes(*planes, x, y, offset, *along)
-        solutions = []
         for c, s, outward in (planes[:3], planes[3:]):
             one = atan2(s, c)
             m11, m21 = c * r11 + s * r21, c1 * (c * r21 - s * r11) + s1 * r31
@@ -194,8 +191,7 @@ def four_axes(links: DHLinks, f: Operations) -> Solve:
             u, v = outward - a1 - length * cos(psi), up - length * sin(psi)
             towards, opening, bend, _ = bent(u, v)
             for two, bend_ in ((towards - opening, bend), (towards + opening, -bend)):
-                solutions.append((one, two, flip2 * bend_, flip * (psi - two - bend_)))
-        return solutions
+                yield one, two, flip2 * bend_, flip * (psi - two - bend_)
 
     return solve
 

@@ -27,7 +27,7 @@ exact there and near there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -43,7 +43,7 @@ from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
 from katana450.maths.geometry.arrays import FloatArray
 
 Angles = tuple[Number, ...]
-Solve = Callable[..., list[Angles]]
+Solve = Callable[..., Iterable[Angles]]
 
 
 def wrist_centre(links: DHLinks) -> tuple[float, float, float]:
@@ -56,7 +56,8 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
     """Return solve(rows, free) for axes 2 and 3 parallel; the module's text lists the steps.
 
     ``rows`` is the pose of the last frame in the first, ``free`` (6,) the angles [rad] that are
-    used where the pose leaves them free. The 8 solutions are the canonical angles [rad].
+    used where the pose leaves them free. The 8 solutions are the canonical angles [rad], each
+    computed when it is taken.
     """
     (s1, c1), (_, flip) = sine_and_cosine(links.t[0]), sine_and_cosine(links.t[1])
     st, ct = sine_and_cosine(links.t[1] + links.t[2])
@@ -69,13 +70,12 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
     atan2, cos, sin = f.atan2, f.cos, f.sin
     offset = flip * bearing
 
-    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+    def solve(rows: list[list[Number]], free: Angles) -> Iterator[Angles]:
         (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
         z = z - d1
         side = (c1 * z - height) / s1
         up = c1 * side + s1 * z
         free4 = free[3]
-        solutions = []
         for c, s, length in turns(x, y, side, free[0]):
             one = atan2(s, c)
             towards, opening, bend, _ = bent(length - a1, up)
@@ -95,9 +95,8 @@ def parallel_shoulder(links: DHLinks, f: Operations) -> Solve:
                     free4,
                 )
                 three = flip * bend_ - bearing
-                solutions.append((one, two, three, first[0], first[1], first[2]))
-                solutions.append((one, two, three, second[0], second[1], second[2]))
-        return solutions
+                yield one, two, three, first[0], first[1], first[2]
+                yield one, two, three, second[0], second[1], second[2]
 
     return solve
 
@@ -126,15 +125,16 @@ def crossing_shoulder(
     amplitude, middle = hypot(along, across), atan2(across, along)
     split = three_turns(f, links.t[3], links.t[4])
 
-    def solve(rows: list[list[Number]], free: Angles) -> list[Angles]:
+    def solve(rows: list[list[Number]], free: Angles) -> Iterator[Angles]:
         (r11, r12, r13, x), (r21, r22, r23, y), (r31, r32, r33, z), _ = rows
         z = z - d1
-        radius = hypot(x, y)
-        excess = x * x + y * y + z * z - fixed
+        radius, excess = hypot(x, y), x * x + y * y + z * z - fixed
         opening = 2.0 * atan2(root(amplitude - excess), root(amplitude + excess))
         heading, on_axis = atan2(y, x), radius <= FREE
         free1, free2, free4 = free[0], free[1], free[3]
-        solutions = []
+        columns = [(r11, r21, r31), (r12, r22, r32), (r13, r23, r33)]
+        # Arrays take all columns at once.
+        columns = columns if f.is_scalar else [(rows[0][:3], rows[1][:3], rows[2][:3])]
         for three in (middle + opening, middle - opening):
             ct, st = cos(three), sin(three)
             px, py = cx * ct - cy * st, cx * st + cy * ct
@@ -150,14 +150,14 @@ def crossing_shoulder(
                 root((rho - level) * (rho + level)),
                 root((radius - offset) * (radius + offset)),
             )
-            bearing, beside_axis = atan2(vy, vx), rho > FREE
+            bearing, is_above = atan2(vy, vx), rho <= FREE
             for side in (length, -length):
-                two = select(beside_axis, atan2(level, side) - bearing, free2)
+                two = select(is_above, free2, atan2(level, side) - bearing)
                 one = select(on_axis, free1, heading - atan2(offset, side))
                 c, s = cos(one), sin(one)
                 cb, sb = cos(two), sin(two)
                 q = []
-                for r1, r2, r3 in ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33)):
+                for r1, r2, r3 in columns:
                     m1, m2 = c * r1 + s * r2, c * r2 - s * r1
                     m2, m3 = c1 * m2 + s1 * r3, c1 * r3 - s1 * m2
                     m1, m2 = cb * m1 + sb * m2, cb * m2 - sb * m1
@@ -166,11 +166,12 @@ def crossing_shoulder(
                     n3 = g13 * m1 + g23 * m2 + g33 * m3
                     n1, n2 = ct * n1 + st * n2, ct * n2 - st * n1
                     q.append((n1, c3 * n2 + s3 * n3, c3 * n3 - s3 * n2))
-                (q11, q21, q31), (q12, q22, q32), (q13, q23, q33) = q
+                (q11, q21, q31), (q12, q22, q32), (q13, q23, q33) = (
+                    q if f.is_scalar else zip(*q[0], strict=True)
+                )
                 wrist = split((q11, q12, q13), (q21, q22, q23), (q31, q32, q33), free4)
                 for a, b, c6, _, _ in wrist[:2]:
-                    solutions.append((one, two, three, a, b, c6))
-        return solutions
+                    yield one, two, three, a, b, c6
 
     return solve
 

@@ -9,14 +9,16 @@ the swivel. The formulas are those of spherical_wrist.py, on arrays of swivels:
     axis 7 or 5      the same seen from the tool (Panda: axes 1, 2 and 3 meet, and 5 and 6).
 
 Of all swivels, the posture of each branch is taken that keeps farthest from the joint limits, or
-nearest to a given posture, inside the limits if there is one. A first round tries swivels over the
-whole range, a second one between the neighbours of the best.
+nearest to a given posture, inside the limits if there is one. A grid of swivels covers the whole
+range. Each branch is computed when it is read.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -27,11 +29,12 @@ from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding
-from katana450.extensions.general_arms.functions import ARRAYS
+from katana450.extensions.general_arms.functions import ARRAYS, Operations
 from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.spherical_wrist import (
+    Solve,
     crossing_shoulder,
     is_crossing_shoulder,
     is_parallel_shoulder,
@@ -43,14 +46,24 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.solution import Solutions
+from katana450.maths.kinematics.solution import Angles, Solutions
 from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
-SWIVELS: Final = 64
-"""Number of swivels of the first round."""
+SWIVELS: Final = 192
+"""Number of swivels on the grid."""
 
-FINER: Final = 9
-"""Number of swivels of the second round for each branch."""
+REACHED: Final = ARRAYS._replace(
+    root=np.sqrt, bounded=lambda x: x, select=lambda _condition, _a, b: b
+)
+"""Operations whose angles are not numbers where no posture takes the pose, nor at a singularity."""
+
+ROUNDED: Final = 1e-14
+"""[1], [m^2] Negative number whose root is 0, because it is only rounding."""
+
+BOUNDED: Final = ARRAYS._replace(
+    root=lambda x: np.sqrt(np.where((x < 0.0) & (x > -ROUNDED), 0.0, x))
+)
+"""Operations whose angles are not numbers where no posture takes the pose, beyond rounding."""
 
 CONTINUITY: Final = 10.0
 """Weight of the distance to a given posture [1/rad] beside the room to the limits."""
@@ -142,34 +155,56 @@ class SevenAxes(GeneralKinematics):
 
         They are for the pose `T` (4, 4), or for one pose at each swivel (N, 4, 4).
         """
-        links = self.links
-        alpha = swivels + links.shift[self.locked]
+        q = np.empty((len(swivels), 8, 7))
+        with np.errstate(all="ignore"):
+            for k, angles in enumerate(self._at(swivels, ARRAYS)(self._rows(T))):
+                q[:, k] = angles.T
+        return in_limits_turns(self.chain, q)
+
+    def _rows(self, T: FloatArray) -> FloatArray:
+        """Return poses (..., 4, 4) as the formulas read them."""
         if self.is_reversed:
             T = se3.inverse(T) if T.ndim == 2 else inverses(T)
-        rows = links.T_1_S @ T @ links.T_tool_n
-        zeros = np.zeros_like(swivels)
-        with np.errstate(all="ignore"):
-            if self.locked == 2:
-                six = _six_of(links)
-                solve = crossing_shoulder(six, ARRAYS, swivel_link(links, alpha))
-                places = (0, 1, 3, 4, 5, 6)
-                columns = [[rows[..., i, j] + zeros for j in range(4)] for i in range(4)]
-            else:
-                six = links.from_axis(1)
-                form = parallel_shoulder if is_parallel_shoulder(six) else crossing_shoulder
-                solve, places = form(six, ARRAYS), (1, 2, 3, 4, 5, 6)
-                columns = _after_first(links, rows, alpha)
-            solutions = solve(columns, six.shift)
-        q = np.empty((len(swivels), 8, 7))
-        q[:, :, self.locked] = swivels[:, None]
-        for k, angles in enumerate(solutions):
-            for place, angle in zip(places, angles, strict=True):
-                q[:, k, place] = angle - links.shift[place]
-        return in_limits_turns(self.chain, q[:, :, ::-1] if self.is_reversed else q)
+        return self.links.T_1_S @ T @ self.links.T_tool_n
+
+    @cached_property
+    def _first_link(self) -> FloatArray:
+        """The inverse (4, 4) of the link between axes 1 and 2."""
+        return se3.inverse(self.links.link(0))
+
+    def _at(
+        self, swivels: FloatArray, f: Operations
+    ) -> Callable[[FloatArray], Iterator[FloatArray]]:
+        """Return a function of `_rows` for the joint angles (7, N) [rad] of each branch in turn.
+
+        The angles may be whole turns beyond the limits.
+        """
+        links, locked, order = self.links, self.locked, -1 if self.is_reversed else 1
+        alpha = swivels + links.shift[locked]
+        before = None
+        if locked == 2:
+            solve, places = _around_third(links, f, alpha), (0, 1, 3, 4, 5, 6)
+        else:
+            solve, places = _after_first(links, f), (1, 2, 3, 4, 5, 6)
+            before = self._first_link @ _turned_back(alpha)
+        shifts = [links.shift[place] for place in places]
+
+        def branches(rows: FloatArray) -> Iterator[FloatArray]:
+            if before is not None:
+                rows = before @ rows
+            several = rows if rows.ndim == 3 else rows[None]
+            for angles in solve(np.moveaxis(several, 0, -1).copy(), shifts):
+                q = np.empty((7, len(swivels)))
+                q[locked] = swivels
+                for place, angle, shift in zip(places, angles, shifts, strict=True):
+                    q[place] = angle - shift
+                yield q[::order]
+
+        return branches
 
     def postures(self, T: FloatArray, near: FloatArray) -> FloatArray:
-        """Return `best` with ``near`` as the hint."""
-        return self.best(T, near)
+        """Return `best` of all branches with ``near`` as the hint."""
+        return np.array([*self.best(T, near)])
 
     def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray:
         """Return `at_swivels` with the swivel of ``near`` for each of the poses."""
@@ -183,86 +218,105 @@ class SevenAxes(GeneralKinematics):
         """
         pose = se3.validated(T)
         hint = None if q_hint is None else self.chain.check_q(q_hint)
-        return Solutions(self.chain, pose, self.best(pose, hint).tolist(), self.branches)
+        return Solutions(self.chain, pose, self.best(pose, hint), self.branches)
 
-    def best(self, T: FloatArray, hint: FloatArray | None = None) -> FloatArray:
-        """Return the joint angles (8, 7) [rad] of the best swivel of each branch."""
-        low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
-        if is_wide := high - low >= math.tau:
-            low, high = -math.pi, math.pi
-
-        def bounded(angles: npt.ArrayLike) -> FloatArray:
-            swivels = np.asarray(angles, dtype=np.float64)
-            turns = np.round(swivels / math.tau) if is_wide else 0.0
-            return np.clip(swivels - math.tau * turns, low, high)
-
-        step = (high - low) / SWIVELS
-        swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
+    def best(self, T: FloatArray, hint: FloatArray | None = None) -> Iterator[Angles]:
+        """Yield the joint angles (7,) [rad] of the best swivel of each branch."""
+        rows, solved, nearest = self._rows(T), self._on_grid, None
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
             neighbour = search_of(self.chain).solve(T, hint, seeds=0)
-            ends = [hint[self.swivel], neighbour[self.swivel]]
-            swivels = np.append(swivels, bounded(ends))
-        q = nearest_turn(self.chain, self.at_swivels(T, swivels), hint)
-        cost = self._cost(q, T, hint)
-        first = q[cost.argmin(axis=0), np.arange(8)]
-        least = cost.min(axis=0)
-        offsets = np.linspace(-step, step, FINER)
-        finer = bounded(first[:, self.swivel, None] + offsets).ravel()
-        q = self.at_swivels(T, finer).reshape(8, FINER, 8, 7)
-        q = nearest_turn(self.chain, q[np.arange(8), :, np.arange(8)].swapaxes(0, 1), hint)
-        cost = self._cost(q, T, hint)
-        second = q[cost.argmin(axis=0), np.arange(8)]
-        better = cost.min(axis=0) < least
-        chosen: FloatArray = np.where(better[:, None], second, first)
+            ends = self._bounded(np.array([hint[self.swivel], neighbour[self.swivel]]))
+            solved = self._at(np.append(self._grid, ends), BOUNDED)
+        postures = solved(rows)
+        for branch in range(8):
+            with np.errstate(all="ignore"):
+                q = self._turned(next(postures), hint)
+                cost = self._cost(q, hint)
+            best = int(cost.argmin())
+            q = q[:, best]
+            if cost[best] == math.inf:
+                # No swivel takes the pose: the one that comes nearest.
+                if nearest is None:
+                    nearest = self.at_swivels(T, self._grid)
+                targets = np.broadcast_to(T, (SWIVELS, 4, 4))
+                position, rotation = errors_of(self.chain, nearest[:, branch, None], targets)
+                q = nearest[int((position + rotation).argmin()), branch]
+            elif self.rounding.is_corrected:
 
-        def again(aimed: FloatArray) -> FloatArray:
-            branches = np.arange(8)
-            return self.at_swivels(aimed, chosen[:, self.swivel])[branches, branches]
+                def again(aimed: FloatArray, q: FloatArray = q, branch: int = branch) -> FloatArray:
+                    return self.at_swivels(aimed, q[[self.swivel]])[:, branch]
 
-        q = self.rounding.corrected(chosen, np.broadcast_to(T, (8, 4, 4)), again)
-        return nearest_turn(self.chain, q, hint)
+                q = self.rounding.corrected(q[None], T[None], again).T
+                q = self._turned(q, hint)[:, 0]
+            yield tuple(q.tolist())
 
-    def _cost(self, q: FloatArray, T: FloatArray, hint: FloatArray | None) -> FloatArray:
-        """Return a number (N, 8) for each of `q` (N, 8, 7), least for the best.
+    @cached_property
+    def _grid(self) -> FloatArray:
+        low, high = self._range
+        return np.linspace(low, high, SWIVELS, endpoint=False) + 0.5 * (high - low) / SWIVELS
 
-        It adds 1000 for a posture that misses the pose and 100 outside of the limits, with the
-        excess. Inside it is the room to the limits as a negative fraction, 0.5 at most.
+    @cached_property
+    def _on_grid(self) -> Callable[[FloatArray], Iterator[FloatArray]]:
+        return self._at(self._grid, REACHED)
+
+    @cached_property
+    def _range(self) -> tuple[float, float]:
+        low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
+        return (low, high) if high - low < math.tau else (-math.pi, math.pi)
+
+    def _bounded(self, swivels: FloatArray) -> FloatArray:
+        """Return `swivels` [rad] inside the range of the grid."""
+        low, high = self._range
+        turns = np.round((swivels - 0.5 * (low + high)) / math.tau)
+        return np.clip(swivels - math.tau * turns, low, high)
+
+    @cached_property
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        """The middle (7, 1) and the width (7, 1) of the joints' ranges [rad]."""
+        lower, upper = self.chain.lower[:, None], self.chain.upper[:, None]
+        return 0.5 * (lower + upper), upper - lower
+
+    def _turned(self, q: FloatArray, hint: FloatArray | None) -> FloatArray:
+        """Return `q` (7, N) [rad] in the turns amid the limits, or nearest to a hint."""
+        middle, _ = self._limits
+        q = q - math.tau * np.rint((q - middle) * (1.0 / math.tau))
+        return q if hint is None else nearest_turn(self.chain, q.T, hint).T
+
+    def _cost(self, q: FloatArray, hint: FloatArray | None) -> FloatArray:
+        """Return a number (N,) for each of `q` (7, N) [rad], least for the best.
+
+        It is infinite for a posture that misses the pose. Else it is the excess over the limits or
+        the room to them, as a fraction, and with a hint the distance to it. Then the limits weigh
+        100.
         """
-        chain = self.chain
-        room = (np.minimum(q - chain.lower, chain.upper - q) / (chain.upper - chain.lower)).min(
-            axis=-1
-        )
-        cost: FloatArray = np.where(room < 0.0, 100.0, 0.0) - room
+        middle, width = self._limits
+        cost: FloatArray = (np.abs(q - middle) / width).max(axis=0) - 0.5
         if hint is not None:
-            cost = cost + CONTINUITY * np.abs(q - hint).max(axis=-1)
-        # Forward kinematics take the most time: postures outside of the limits need none at first.
-        inside = room >= -tolerances.LIMIT_SLACK
-        checked = inside if inside.any(axis=0).all() else np.ones_like(inside)
-        distance, turn = errors_of(
-            chain, q[checked][:, None], np.broadcast_to(T, (int(checked.sum()), 4, 4))
-        )
-        off = self.rounding.offset
-        exact = (distance <= tolerances.SAME_POSITION + off) & (
-            turn <= tolerances.SAME_ROTATION + off
-        )
-        cost[checked] = np.where(exact[:, 0], cost[checked], 1000.0 + (distance + turn)[:, 0])
+            cost += np.where(cost > 0.0, 100.0, 0.0)
+            cost += CONTINUITY * np.abs(q.T - hint).max(axis=-1)
+        cost[np.isnan(cost)] = math.inf
         return cost
 
 
-def _after_first(links: DHLinks, rows: FloatArray, alpha: FloatArray) -> list[list[FloatArray]]:
-    """Return the pose `rows` in the frame of axis 2, after axis 1 turned by `alpha` (N,) [rad].
+def _around_third(links: DHLinks, f: Operations, alpha: FloatArray) -> Solve:
+    """Return the solver of the axes beside the third, which is turned by `alpha` (N,) [rad]."""
+    return crossing_shoulder(_six_of(links), f, swivel_link(links, alpha))
 
-    `rows` are (4, 4), or (N, 4, 4).
-    """
-    c, s = np.cos(alpha), np.sin(alpha)
-    first, second, *others = ([rows[..., i, j] for j in range(4)] for i in range(4))
-    turned = [
-        [c * x + s * y for x, y in zip(first, second, strict=True)],
-        [c * y - s * x for x, y in zip(first, second, strict=True)],
-    ]
-    whole = [*turned, *([value + 0.0 * c for value in row] for row in others)]
-    inverse = se3.inverse(links.link(0))
-    return [
-        [sum(inverse[i, k] * whole[k][j] for k in range(4)) for j in range(4)] for i in range(4)
-    ]
+
+@lru_cache(maxsize=64)
+def _after_first(links: DHLinks, f: Operations) -> Solve:
+    """Return the solver of the axes after the first."""
+    six = links.from_axis(1)
+    form = parallel_shoulder if is_parallel_shoulder(six) else crossing_shoulder
+    return form(six, f)
+
+
+def _turned_back(alpha: FloatArray) -> FloatArray:
+    """Return the poses (N, 4, 4) of turns about z by the negative angles `alpha` (N,) [rad]."""
+    turns = np.zeros((len(alpha), 4, 4))
+    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(alpha)
+    turns[:, 0, 1] = sine = np.sin(alpha)
+    turns[:, 1, 0] = -sine
+    turns[:, 2, 2] = turns[:, 3, 3] = 1.0
+    return turns

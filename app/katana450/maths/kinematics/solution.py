@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Final, overload
 
 import numpy as np
@@ -122,41 +122,35 @@ class Solution:
 
 
 class Solutions(Sequence[Solution]):
-    """The solutions of one pose in the order of the branches, each created when first read."""
+    """The solutions of one pose in the order of the branches, each computed when first read."""
 
-    __slots__ = ("_T", "_angles", "_branches", "_chain", "_joints", "_made", "_slack")
+    __slots__ = ("_T", "_branches", "_chain", "_made", "_rest", "_slack")
 
     def __init__(
         self,
         chain: Chain,
         T: npt.ArrayLike,
-        angles: Sequence[Angles],
+        angles: Iterable[Angles],
         branches: Sequence[AnyBranch],
         slack: Slack = no_slack,
-        joints: Callable[[Angles], Angles] = tuple,
     ) -> None:
-        """Hold the ``angles`` of each of ``branches`` for the pose `T` (4, 4).
-
-        ``joints`` returns the joint angles [rad] of angles.
-        """
+        """Hold the joint ``angles`` [rad] of each of ``branches`` for the pose `T` (4, 4)."""
         self._chain = chain
         self._T = T
-        self._angles = angles
+        self._rest = iter(angles)
         self._branches = branches
         self._slack = slack
-        self._joints = joints
-        self._made: list[Solution | None] = [None] * len(angles)
+        self._made: list[Solution] = []
 
     def _solution(self, k: int) -> Solution:
-        solution = self._made[k]
-        if solution is None:
-            angles, branch = self._joints(self._angles[k]), self._branches[k]
-            solution = Solution(self._chain, self._T, angles, branch, self._slack)
-            self._made[k] = solution
-        return solution
+        solutions = self._made
+        while len(solutions) <= k:
+            branch = self._branches[len(solutions)]
+            solutions.append(Solution(self._chain, self._T, next(self._rest), branch, self._slack))
+        return solutions[k]
 
     def __len__(self) -> int:
-        return len(self._angles)
+        return len(self._branches)
 
     @overload
     def __getitem__(self, index: int) -> Solution: ...
@@ -165,10 +159,12 @@ class Solutions(Sequence[Solution]):
     def __getitem__(self, index: slice) -> tuple[Solution, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Solution | tuple[Solution, ...]:
-        return tuple(self)[index] if isinstance(index, slice) else self._solution(index)
+        if isinstance(index, slice):
+            return tuple(self)[index]
+        return self._solution(range(len(self._branches))[index])
 
     def __iter__(self) -> Iterator[Solution]:
-        return map(self._solution, range(len(self._angles)))
+        return map(self._solution, range(len(self._branches)))
 
     def __repr__(self) -> str:
         """Return the solutions as text."""
