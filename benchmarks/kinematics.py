@@ -50,8 +50,7 @@ class Entry:
 
 
 ONE_BY_ONE = (
-    Entry(OWN, "katana450 `inverse`"),
-    Entry("katana450-public", "katana450 `Arm.ik`, angles read"),
+    Entry(OWN, "katana450 `arm.ik`"),
     Entry("katana450-bare", "katana450 `Solver`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("roboticstoolbox", "roboticstoolbox `ik_LM`, limits kept", "roboticstoolbox-python"),
@@ -63,7 +62,7 @@ ONE_BY_ONE = (
 )
 BATCH = (
     Entry(FLOOR, "C, `-O3`"),
-    Entry(OWN, "katana450"),
+    Entry(OWN, "katana450 `arm.ik`"),
     Entry("eaik", "EAIK, 1 thread", "EAIK"),
     Entry("eaik-threads", f"EAIK, {os.cpu_count()} threads", "EAIK"),
 )

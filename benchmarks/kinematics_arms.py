@@ -14,29 +14,29 @@ import platform
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks import kinematics_report as report
-from benchmarks.kinematics import DOCS, ROOT, Bench, Entry
+from benchmarks.kinematics import DOCS, OWN, ROOT, Bench, Entry
 from benchmarks.kinematics_own import chain_of
 from benchmarks.kinematics_report import Machine, Row
 from benchmarks.kinematics_task import FloatArray, Task
+from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 
 BEGIN = "<!-- kinematics of arms: written by `python -m benchmarks.kinematics_arms --docs` -->"
 END = "<!-- kinematics of arms: end -->"
 
-OWN = "katana450-general"
 CLOSED = (
-    Entry(OWN, "katana450 `inverse`"),
-    Entry("katana450-public", "katana450 `Arm.ik`, angles read"),
+    Entry(OWN, "katana450 `arm.ik`"),
     Entry("katana450-general-bare", "katana450 `solve`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("ik-geo", "ik-geo", "ik-geo"),
 )
+BATCH = (CLOSED[0], CLOSED[2])
 NUMERICAL = (
     Entry("katana450-numerical", "katana450, numerical, limits kept"),
     Entry("trac-ik", "TRAC-IK, limits kept, 5 ms", "pytracik"),
@@ -45,14 +45,14 @@ NUMERICAL = (
     Entry("mink", "mink, limits kept", "mink"),
 )
 SIX = (*CLOSED, *NUMERICAL)
-SEVEN = (*CLOSED[:2], *NUMERICAL)
+SEVEN = (*CLOSED[:1], *NUMERICAL)
 
 LETTERS = {letter: np.eye(3)["xyz".index(letter)] for letter in "xyz"}
 
 
 @dataclass(frozen=True, eq=False)
 class ArmData:
-    """An arm whose axes at zero lie along those of its base.
+    """An arm whose axes at zero lie along those of its base, but for the rounding of its file.
 
     Attributes:
         name: for people.
@@ -60,6 +60,7 @@ class ArmData:
         places: a point on each axis, then the tool point [m].
         limits: limits of each joint [deg].
         elbow: the angle of axis 3 at which the arm is stretched [rad].
+        tilt: angle [rad] by which the file is off at the right angles after axes 1 and 4.
     """
 
     name: str
@@ -67,17 +68,17 @@ class ArmData:
     places: Sequence[tuple[float, float, float]]
     limits: Sequence[tuple[float, float]]
     elbow: float = 0.0
+    tilt: float = 0.0
 
     def task(self, q: Callable[[np.random.Generator, FloatArray, FloatArray], FloatArray]) -> Task:
         """Return the task with the poses at the joint angles ``q(rng, lower, upper)`` (N, n)."""
         lower, upper = np.radians(self.limits).T
-        task = Task(
-            axes=np.array([LETTERS[letter] for letter in self.letters]),
-            offsets=np.diff(np.array(self.places), axis=0, prepend=np.zeros((1, 3))),
-            lower=lower,
-            upper=upper,
-            T=np.empty((0, 4, 4)),
-        )
+        axes = np.array([LETTERS[letter] for letter in self.letters])
+        offsets = np.diff(np.array(self.places), axis=0, prepend=np.zeros((1, 3)))
+        for first in (1, 4) if self.tilt else ():
+            R = so3.rotation_x(self.tilt)
+            axes[first:], offsets[first + 1 :] = axes[first:] @ R.T, offsets[first + 1 :] @ R.T
+        task = Task(axes, offsets, lower=lower, upper=upper, T=np.empty((0, 4, 4)))
         chain = chain_of(task)
         postures = q(np.random.default_rng(450), lower, upper)
         return Task(**(vars(task) | {"T": np.array([forward(chain, each) for each in postures])}))
@@ -89,10 +90,12 @@ UR5E = ArmData(
     "zyyyzy",
     [
         *((0.0, 0.0, 0.0), (0.0, 0.0, 0.1625), (0.425, 0.0, 0.1625), (0.8172, 0.0, 0.1625)),
-        *((0.8172, 0.1333, 0.0), (0.8172, 0.1333, 0.0628), (0.8172, 0.2329, 0.0628)),
+        *((0.8172, 0.1333, 0.1625), (0.8172, 0.1333, 0.0628), (0.8172, 0.2329, 0.0628)),
     ],
     [TURN] * 6,
 )
+UR5E_FILE = replace(UR5E, name="UR5e with the digits of its maker's file", tilt=2.0510349e-10)
+"""Its right angles are written 1.570796327."""
 KR_6 = ArmData(
     "KUKA KR 6",
     "zyyxyx",
@@ -155,15 +158,22 @@ def singular_postures(
 
 
 def measured(
-    arm: ArmData, entries: Sequence[Entry], task: Task, blocks: int, peers: Path
+    arm: ArmData,
+    entries: Sequence[Entry],
+    task: Task,
+    blocks: int,
+    peers: Path,
+    *,
+    in_batch: bool = False,
 ) -> list[Row]:
     """Run the solvers on the task of ``arm`` and return their rows."""
     edges = np.linspace(0, len(task.T), blocks + 1).astype(int).tolist()
+    pairs: Sequence[tuple[int, int] | None] = list(itertools.pairwise(edges))
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         task.save(folder / "task.npz")
         bench = Bench(stack, entries, folder / "task.npz", peers)
-        times = bench.rounds(entries, list(itertools.pairwise(edges)), len(task.T))
+        times = bench.rounds(entries, [None] * blocks if in_batch else pairs, len(task.T))
         rows = bench.rows(entries, times, entries[0].name, chain_of(task), task)
     print(arm.name, *(f"{row.title}: {row.failed}" for row in rows if row.failed), sep="; ")
     return rows
@@ -173,9 +183,15 @@ def tables(poses: int, blocks: int, peers: Path) -> str:
     """Return all tables with the conditions of the measurement."""
     before = os.getloadavg()[0]
     parts: list[str] = []
-    for arm, entries in ((UR5E, SIX), (KR_6, SIX), (PANDA, SEVEN), (IIWA, SEVEN)):
-        rows = measured(arm, entries, arm.task(random_postures(poses)), blocks, peers)
+    arms = ((UR5E, SIX), (UR5E_FILE, CLOSED), (KR_6, SIX), (PANDA, SEVEN), (IIWA, SEVEN))
+    for arm, entries in arms:
+        task = arm.task(random_postures(poses))
+        rows = measured(arm, entries, task, blocks, peers)
         parts += [f"{arm.name}, one pose a call:", "", *report.single_table(rows), ""]
+        if entries is not SEVEN:
+            rows = measured(arm, BATCH, task, blocks, peers, in_batch=True)
+            parts += [f"{arm.name}, all {poses} poses in one call:", ""]
+            parts += [*report.batch_table(rows, "katana450"), ""]
     for arm in (UR5E, KR_6):
         task = arm.task(singular_postures(poses, arm.elbow))
         rows = measured(arm, CLOSED, task, blocks, peers)

@@ -12,19 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.kinematics_task import FloatArray, Task
+from benchmarks.kinematics_task import FloatArray, Task, urdf
 from katana450 import tolerances
 from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
-from katana450.library.solutions import IKSolutions
+from katana450.library.loading import load
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.inverse_batch import inverse_batch
-from katana450.maths.kinematics.solver import Solver, inverse
+from katana450.maths.kinematics.solver import Solver
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
 FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")
@@ -46,48 +45,38 @@ def chain_of(task: Task) -> Chain:
     )
 
 
-class Katana450:
-    """`inverse`: all branches, whether each is inside the limits, and its residual."""
-
-    package = "katana450"
-
-    def __init__(self, task: Task) -> None:
-        self._chain = chain_of(task)
-
-    def solve(self, T: FloatArray) -> Any:
-        """Return all solutions for the pose ``T`` (4, 4)."""
-        return inverse(self._chain, T)
-
-    def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (k, 5) [rad] of ``found``."""
-        return np.array([solution.q for solution in found]).reshape(-1, 5)
-
-    def solve_batch(self, T: FloatArray) -> Any:
-        """Return all solutions for the poses ``T`` (N, 4, 4)."""
-        return inverse_batch(self._chain, T)
-
-    def joints_batch(self, found: Any) -> list[FloatArray]:
-        """Return the joint angles (k, 5) [rad] of each pose in ``found``."""
-        return list(found)
-
-
 class Public:
-    """The work of `Arm.ik` for poses in {S}, whose joint angles are then read."""
+    """`Arm.ik` of the arm in a URDF, and the reading of its first solution."""
 
     package = "katana450"
 
     def __init__(self, task: Task) -> None:
-        self._kinematics = kinematics_of(chain_of(task))
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "arm.urdf"
+            path.write_text(urdf(task), encoding="utf-8")
+            self._arm = load(path, tool="tool", frame="base")
 
     def solve(self, T: FloatArray) -> Any:
-        """Return all solutions for the pose ``T`` (4, 4)."""
-        solutions = IKSolutions(self._kinematics, T)
-        return solutions, solutions.q
+        """Return all solutions for the pose ``T`` (4, 4), the first of which is read."""
+        solutions = self._arm.ik(T)
+        return solutions, next(iter(solutions)).q
 
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
+        exact = [solution.q for solution in found[0] if solution.exact]
+        return np.array(exact).reshape(-1, self._arm.n)
+
+    def solve_batch(self, T: FloatArray) -> Any:
+        """Return all solutions for the poses ``T`` (N, 4, 4), whose angles are read."""
+        solutions = self._arm.ik(T)
+        return solutions, solutions.q
+
+    def joints_batch(self, found: Any) -> list[FloatArray]:
+        """Return the joint angles (k, n) [rad] of the exact solutions of each pose in ``found``."""
         solutions, q = found
-        return np.array(q[[each.exact for each in solutions]])
+        exact = solutions.position_error <= tolerances.SAME_POSITION
+        exact &= solutions.rotation_error <= tolerances.SAME_ROTATION
+        return [angles[chosen] for angles, chosen in zip(q, exact, strict=True)]
 
 
 class Bare:
@@ -105,23 +94,6 @@ class Bare:
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, 5) [rad] of ``found``."""
         return np.array(found)
-
-
-class General:
-    """`kinematics_of`: all branches of an arm of any kind, with limits and residuals on request."""
-
-    package = "katana450"
-
-    def __init__(self, task: Task) -> None:
-        self._kinematics = kinematics_of(chain_of(task))
-
-    def solve(self, T: FloatArray) -> Any:
-        """Return all solutions for the pose ``T`` (4, 4)."""
-        return self._kinematics.inverse(T)
-
-    def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
-        return np.array([each.q for each in found if each.exact]).reshape(-1, len(found[0].q))
 
 
 class GeneralBare:

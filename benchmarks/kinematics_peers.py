@@ -14,7 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.kinematics_task import SOLVED_POSITION, SOLVED_ROTATION, FloatArray, Task
+from benchmarks.kinematics_task import (
+    SOLVED_POSITION,
+    SOLVED_ROTATION,
+    FloatArray,
+    Task,
+    numbers_text,
+    urdf,
+)
 
 # An iteration stops an order of magnitude below the error of a solved pose.
 _CLOSE_POSITION = 0.1 * SOLVED_POSITION
@@ -34,11 +41,15 @@ class Eaik:
             raise RuntimeError("EAIK has no decomposition for this arm")
 
     def solve(self, T: FloatArray) -> Any:
-        """Return all solutions for the pose ``T`` (4, 4)."""
-        return self._robot.IK(T)
+        """Return all solutions for the pose ``T`` (4, 4), of which the angles are read."""
+        found = self._robot.IK(T)
+        return found, found.Q
 
     def joints(self, found: Any) -> FloatArray:
         """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
+        return self._exact(found[0])
+
+    def _exact(self, found: Any) -> FloatArray:
         exact = [q for q, rough in zip(found.Q, found.is_LS, strict=True) if not rough]
         return np.array(exact, dtype=np.float64).reshape(-1, self._axes)
 
@@ -48,7 +59,7 @@ class Eaik:
 
     def joints_batch(self, found: Any) -> list[FloatArray]:
         """Return the joint angles (k, n) [rad] of each pose in ``found``."""
-        return [self.joints(each) for each in found]
+        return [self._exact(each) for each in found]
 
 
 class IkGeo:
@@ -87,7 +98,7 @@ class TracIk:
     def __init__(self, task: Task) -> None:
         solver = import_module("trac_ik").TracIK
         with tempfile.NamedTemporaryFile("w", suffix=".urdf") as file:
-            file.write(_urdf(task))
+            file.write(urdf(task))
             file.flush()
             self._solver = solver("base", "tool", file.name, self._TIMEOUT, _CLOSE_POSITION)
         self._start = task.middle
@@ -286,41 +297,16 @@ def _is_close(error: FloatArray) -> bool:
 
 def _mjcf(task: Task) -> str:
     """Return the arm as MuJoCo XML; MuJoCo requires masses, although they have no effect here."""
-
-    def text(values: FloatArray) -> str:
-        return " ".join(repr(float(value)) for value in values)
-
     bodies = "".join(
-        f'<body pos="{text(offset)}"><joint type="hinge" axis="{text(axis)}" '
-        f'range="{text(np.array(limits))}"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+        f'<body pos="{numbers_text(offset)}"><joint type="hinge" axis="{numbers_text(axis)}" '
+        f'range="{numbers_text(np.array(limits))}"/>'
+        f'<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
         for offset, axis, *limits in zip(
             task.offsets[:-1], task.axes, task.lower, task.upper, strict=True
         )
     )
-    tool = f'<site name="tool" pos="{text(task.offsets[-1])}"/>'
+    tool = f'<site name="tool" pos="{numbers_text(task.offsets[-1])}"/>'
     return (
         '<mujoco><compiler angle="radian"/><worldbody>'
         f"{bodies}{tool}{'</body>' * len(task.axes)}</worldbody></mujoco>"
-    )
-
-
-def _urdf(task: Task) -> str:
-    """Return the arm as URDF."""
-
-    def text(values: FloatArray) -> str:
-        return " ".join(repr(float(value)) for value in values)
-
-    names = ["base", *(f"link{number + 1}" for number in range(task.n)), "tool"]
-    joints = "".join(
-        f'<joint name="joint{number + 1}" type="revolute"><parent link="{names[number]}"/>'
-        f'<child link="{names[number + 1]}"/><origin xyz="{text(task.offsets[number])}"/>'
-        f'<axis xyz="{text(task.axes[number])}"/><limit lower="{float(task.lower[number])!r}" '
-        f'upper="{float(task.upper[number])!r}" velocity="1" effort="1"/></joint>'
-        for number in range(task.n)
-    )
-    links = "".join(f'<link name="{name}"/>' for name in names)
-    return (
-        f'<robot name="arm">{links}{joints}<joint name="end" type="fixed">'
-        f'<parent link="{names[-2]}"/><child link="tool"/>'
-        f'<origin xyz="{text(task.offsets[-1])}"/></joint></robot>'
     )

@@ -75,6 +75,30 @@ class Task:
         return [self.middle, *rng.uniform(self.lower, self.upper, (count, self.n))]
 
 
+def urdf(task: Task) -> str:
+    """Return the arm as URDF, with the links ``base`` and ``tool`` at its ends."""
+    names = ["base", *(f"link{number + 1}" for number in range(task.n)), "tool"]
+    joints = "".join(
+        f'<joint name="joint{number + 1}" type="revolute"><parent link="{names[number]}"/>'
+        f'<child link="{names[number + 1]}"/><origin xyz="{numbers_text(task.offsets[number])}"/>'
+        f'<axis xyz="{numbers_text(task.axes[number])}"/>'
+        f'<limit lower="{float(task.lower[number])!r}" upper="{float(task.upper[number])!r}" '
+        f'velocity="1" effort="1"/></joint>'
+        for number in range(task.n)
+    )
+    links = "".join(f'<link name="{name}"/>' for name in names)
+    return (
+        f'<robot name="arm">{links}{joints}<joint name="end" type="fixed">'
+        f'<parent link="{names[-2]}"/><child link="tool"/>'
+        f'<origin xyz="{numbers_text(task.offsets[-1])}"/></joint></robot>'
+    )
+
+
+def numbers_text(values: FloatArray) -> str:
+    """Return the values with all their digits, separated by blanks."""
+    return " ".join(repr(float(value)) for value in values)
+
+
 class Solver(Protocol):
     """One solver. Only `solve` is timed; it returns the value of the library unchanged."""
 

@@ -41,10 +41,8 @@ def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
 
 
 SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
-    "katana450": lambda: _own("Katana450"),
-    "katana450-public": lambda: _own("Public"),
+    "katana450": lambda: _own("Public"),
     "katana450-bare": lambda: _own("Bare"),
-    "katana450-general": lambda: _own("General"),
     "katana450-general-bare": lambda: _own("GeneralBare"),
     "katana450-numerical": lambda: _own("Search"),
     "floor": lambda: _own("Floor"),

@@ -72,7 +72,7 @@ def test_the_tables_go_between_the_marks(tables: Tables, tmp_path: Path) -> None
     assert "old" not in first
     assert first.startswith("before\n")
     assert first.endswith("\nafter\n")
-    assert "| katana450 `inverse` |" in first
+    assert "| katana450 `arm.ik` |" in first
     report.write_into(document, tables)
     assert document.read_text(encoding="utf-8") == first
     document.write_text("no marks", encoding="utf-8")
@@ -92,6 +92,6 @@ def test_the_command_prints_both_tables_and_writes_json(
     assert "in one call" in printed
     figures = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"))
     (row,) = figures["one_by_one"]
-    assert row["solver"] == "katana450 `inverse`"
+    assert row["solver"] == "katana450 `arm.ik`"
     assert row["least_microseconds"] == min(row["microseconds"])
-    assert {row["solver"] for row in figures["batch"]} == {"C, `-O3`", "katana450"}
+    assert {row["solver"] for row in figures["batch"]} == {"C, `-O3`", "katana450 `arm.ik`"}
