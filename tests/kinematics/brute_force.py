@@ -1,127 +1,129 @@
-"""The nearest pose by a slow, approximate search without closed forms."""
+"""The nearest pose of any member of the family by slow, approximate searches."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from katana450.maths.geometry.arrays import FloatArray
-from katana450.maths.kinematics.branch import Branch
+from katana450.maths.kinematics.arm import arm_of
+from katana450.maths.kinematics.batch import errors_of, forward_batch
+from katana450.maths.kinematics.branch import BRANCHES, Branch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.inverse_batch import inverse_batch
+from katana450.maths.kinematics.tool import ToolTarget
 
 Mask = npt.NDArray[np.bool_]
 
-
-def tool_points(lengths: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return tool points (k, 3) and radial coordinates (k,) of joint angles (k, >= 4).
-
-    Computed by trigonometry.
-    """
-    a = q[:, 1]
-    b = a + q[:, 2]
-    c = b + q[:, 3]
-    l1, l2, l3 = lengths
-    r = l1 * np.cos(a) + l2 * np.cos(b) + l3 * np.cos(c)
-    z = -l1 * np.sin(a) - l2 * np.sin(b) - l3 * np.sin(c)
-    return np.stack((r * np.cos(q[:, 0]), r * np.sin(q[:, 0]), z), axis=1), r
+STARTS, SAMPLES, ROUNDS = 12, 40, 120
 
 
-def on_branch(branch: Branch | None, r: FloatArray, theta3: FloatArray) -> Mask:
-    if branch is None:
-        return np.ones(r.shape, dtype=np.bool_)
-    shoulder = r >= 0.0 if branch.shoulder == "front" else r <= 0.0
-    elbow = theta3 >= 0.0 if branch.elbow == "up" else theta3 <= 0.0
-    return np.asarray(shoulder & elbow)
-
-
-class NearestPoint:
-    """The minimum distance between the tool point inside the limits and a target."""
-
-    STARTS, SAMPLES, ROUNDS = 12, 48, 160
-
-    def __init__(self, chain: Chain, lengths: FloatArray, steps: int) -> None:
-        self.lower, self.upper = chain.lower[:4], chain.upper[:4]
-        self.lengths = lengths
-        axes = [np.linspace(a, b, steps) for a, b in zip(self.lower, self.upper, strict=True)]
-        self.grid = np.stack([g.ravel() for g in np.meshgrid(*axes, indexing="ij")], axis=1)
-        self.points, self.r = tool_points(lengths, self.grid)
-
-    def distance(self, target: FloatArray, branch: Branch | None, seed: int) -> float:
-        """Return the minimum distance [m] that a shrinking random search finds.
-
-        It starts from the best grid points.
-        """
-        rng = np.random.default_rng(seed)
-        d = np.linalg.norm(self.points - target, axis=1)
-        d[~on_branch(branch, self.r, self.grid[:, 2])] = np.inf
-        start = np.argpartition(d, self.STARTS)[: self.STARTS]
-        best, least = self.grid[start], d[start]
-        width = np.full(self.STARTS, 0.2)
-        rows = np.arange(self.STARTS)
-        for _ in range(self.ROUNDS):
-            step = rng.normal(size=(self.STARTS, self.SAMPLES, 4)) * width[:, None, None]
-            # Moving few joints at a time keeps the others at their limits.
-            step *= rng.random(step.shape) < 0.6
-            tried = np.clip(best[:, None] + step, self.lower, self.upper)
-            flat = tried.reshape(-1, 4)
-            points, r = tool_points(self.lengths, flat)
-            d = np.linalg.norm(points - target, axis=1)
-            d[~on_branch(branch, r, flat[:, 2])] = np.inf
-            d = d.reshape(self.STARTS, self.SAMPLES)
-            k = d.argmin(axis=1)
-            better = d[rows, k] < least
-            best[better] = tried[rows, k][better]
-            least = np.where(better, d[rows, k], least)
-            width *= np.where(better, 1.3, 0.75)
-        return float(least.min())
-
-
-def least_rotation(
-    chain: Chain,
-    lengths: FloatArray,
-    T: FloatArray,
-    point: FloatArray,
-    branch: Branch | None,
-    theta1s: FloatArray,
+def minimum(
+    objective: Callable[[FloatArray], FloatArray],
+    lower: FloatArray,
+    upper: FloatArray,
+    rng: np.random.Generator,
 ) -> float:
-    """Return the minimum rotation angle [rad] to `T` found with the tool point at `point`.
+    """Return the minimum of ``objective`` that a shrinking random search within the limits finds.
 
-    ``theta1s`` are the angles to try. The pitch is scanned in steps of a thousandth of a radian,
-    for both elbows by the law of cosines; so is the roll.
+    ``objective`` has a value for each row (k, 5) of angles [rad], which is infinite for one that is
+    not allowed. It may also change the row.
     """
-    l1, l2, l3 = lengths
-    lower, upper = chain.lower, chain.upper
-    roll = np.linspace(lower[4], upper[4], 1500)
-    least = np.pi
-    for theta1 in theta1s:
-        r = float(point[0] * np.cos(theta1) + point[1] * np.sin(theta1))
-        phi = np.linspace(-np.pi, np.pi, 6284)
-        wr, wz = r - l3 * np.cos(phi), point[2] + l3 * np.sin(phi)
-        cosine = (wr**2 + wz**2 - l1**2 - l2**2) / (2.0 * l1 * l2)
-        reachable = np.abs(cosine) <= 1.0
-        bend = np.arccos(np.clip(cosine, -1.0, 1.0))
-        for theta3 in (bend, -bend):
-            theta2 = np.arctan2(-wz, wr) - np.arctan2(l2 * np.sin(theta3), l1 + l2 * np.cos(theta3))
-            theta4 = phi - theta2 - theta3
-            fits = reachable & on_branch(branch, np.full(phi.shape, r), theta3)
-            for i, theta in ((1, theta2), (2, theta3), (3, theta4)):
-                turned = np.arctan2(np.sin(theta), np.cos(theta))
-                fits &= (turned >= lower[i]) & (turned <= upper[i])
-            if fits.any():
-                least = min(least, _over_roll(T[:3, :3], theta1, phi[fits], roll))
-    return least
+    q = rng.uniform(lower, upper, size=(20_000, 5))
+    values = objective(q)
+    best = np.argpartition(values, STARTS)[:STARTS]
+    q, least, width = q[best], values[best], np.full(STARTS, 0.2)
+    rows = np.arange(STARTS)
+    for _ in range(ROUNDS):
+        step = rng.normal(size=(STARTS, SAMPLES, 5)) * width[:, None, None]
+        # Moving few joints at a time keeps the others at their limits.
+        step *= rng.random(step.shape) < 0.6
+        # With axis 4 at a limit the two axes before it must move against each other.
+        step[:, ::3, 2] = -step[:, ::3, 1]
+        moved = np.clip(q[:, None] + step, lower, upper).reshape(-1, 5)
+        values = objective(moved).reshape(STARTS, SAMPLES)
+        k = values.argmin(axis=1)
+        better = values[rows, k] < least
+        q[better] = moved.reshape(STARTS, SAMPLES, 5)[rows, k][better]
+        least = np.where(better, values[rows, k], least)
+        width *= np.where(better, 1.3, 0.75)
+    return float(least.min())
 
 
-def _over_roll(R: FloatArray, theta1: float, phi: FloatArray, roll: FloatArray) -> float:
-    """Return the minimum angle over the grid phi x roll, from the trace of the rotation between."""
-    c, s = np.cos(theta1), np.sin(theta1)
-    A = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ R
-    cf, sf = np.cos(phi)[:, None], np.sin(phi)[:, None]
-    cp, sp = np.cos(roll)[None, :], np.sin(roll)[None, :]
-    # trace(A^T Ry(phi) Rx(roll)), with the columns of Ry Rx written out.
-    trace = (
-        (A[0, 0] * cf - A[2, 0] * sf)
-        + (A[0, 1] * sf * sp + A[1, 1] * cp + A[2, 1] * cf * sp)
-        + (A[0, 2] * sf * cp - A[1, 2] * sp + A[2, 2] * cf * cp)
-    )
-    return float(np.arccos(np.clip(0.5 * (trace.max() - 1.0), -1.0, 1.0)))
+def on_branch(chain: Chain, q: FloatArray, points: FloatArray, branch: Branch | None) -> Mask:
+    """Return which joint vectors (k, 5) [rad] are on `branch`; None stands for all.
+
+    ``points`` are their tool points (k, 3) [m] in {S}.
+    """
+    if branch is None:
+        return np.ones(len(q), dtype=np.bool_)
+    arm = arm_of(chain)
+    alpha = arm.canonical(q)
+    x, y, _ = arm.T_C_S[:3, :3] @ points.T + arm.T_C_S[:3, 3:]
+    r = x * np.cos(alpha[:, 0]) + y * np.sin(alpha[:, 0])
+    shoulder = r >= 0.0 if branch.shoulder == "front" else r <= 0.0
+    return np.asarray(shoulder & ((np.sin(alpha[:, 2]) >= 0.0) == (branch.elbow == "up")))
+
+
+def nearest_point(
+    chain: Chain, target: FloatArray, branch: Branch | None, rng: np.random.Generator
+) -> float:
+    """Return the minimum distance [m] of the tool point inside the limits from `target` (3,)."""
+
+    def distances(q: FloatArray) -> FloatArray:
+        points = forward_batch(chain, q)[:, :3, 3]
+        away = np.linalg.norm(points - target, axis=1)
+        return np.where(on_branch(chain, q, points, branch), away, np.inf)
+
+    return minimum(distances, chain.lower, chain.upper, rng)
+
+
+def planes(chain: Chain, point: FloatArray, theta1: float) -> list[float]:
+    """Return the angles [rad] of axis 1 whose planes hold `point`, or `theta1` if all do."""
+    return [ToolTarget(point).facing(chain, branch, theta1) for branch in BRANCHES[::2]]
+
+
+def postures_at(
+    chain: Chain,
+    point: FloatArray,
+    theta1s: Sequence[float] | FloatArray,
+    pitches: int,
+    branches: Sequence[Branch] = BRANCHES,
+) -> FloatArray:
+    """Return joint vectors (k, 5) [rad] with the tool point at `point` and the roll at 0.
+
+    They are those on ``branches``, in planes at ``theta1s`` [rad], at a number of pitches, with
+    axes 1 to 4 inside their limits.
+    """
+    arm = arm_of(chain)
+    turns = arm.signs[0] * np.array(theta1s)
+    alpha, pitch = np.meshgrid(turns, np.linspace(-np.pi, np.pi, pitches))
+    c, s, cp, sp = np.cos(alpha), np.sin(alpha), np.cos(pitch), np.sin(pitch)
+    zero = np.zeros_like(c)
+    R = np.array([[c * cp, -s, c * sp], [s * cp, c, s * sp], [-sp, zero, cp]]).T.reshape(-1, 3, 3)
+    poses = np.tile(np.eye(4), (len(R), 1, 1))
+    poses[:, :3, :3] = arm.T_C_S[:3, :3].T @ R.transpose(0, 2, 1) @ arm.T_K_tool[:3, :3]
+    poses[:, :3, 3] = point
+    q = inverse_batch(chain, poses)
+    position, rotation = errors_of(chain, q, poses)
+    fits = ((q >= chain.lower) & (q <= chain.upper))[:, :, :4].all(axis=2)
+    fits &= (position < 1e-9) & (rotation < 1e-9)
+    return q[fits & [branch in branches for branch in BRANCHES]]
+
+
+def least_rotation(chain: Chain, T: FloatArray, q: FloatArray) -> float:
+    """Return the minimum angle [rad] to `T` of the postures `q` (k, 5) [rad] with any roll."""
+    arm = arm_of(chain)
+    level = np.array(q)
+    level[:, 4] = arm.joints(np.zeros(5))[4]
+    R = arm.T_C_S[:3, :3] @ forward_batch(chain, level)[:, :3, :3] @ arm.T_tool_K[:3, :3]
+    M = R.transpose(0, 2, 1) @ arm.pose(T)[:3, :3]
+    lower, upper = arm.canonical((chain.lower, chain.upper))[:, 4].tolist()
+    roll = np.linspace(lower, upper, 500)
+    # trace(Rx(roll)^T M)
+    turning = np.outer(M[:, 1, 1] + M[:, 2, 2], np.cos(roll))
+    turning += np.outer(M[:, 2, 1] - M[:, 1, 2], np.sin(roll))
+    trace = float((M[:, 0, 0] + turning.max(axis=1)).max(initial=-1.0))
+    return float(np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0)))

@@ -49,14 +49,14 @@ def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:
         return vector(G[:3, :3] @ p + G[:3, 3])
 
     along = vector(G[:3, :3] @ five[0])
-    found: list[FloatArray] = []
+    solutions: list[FloatArray] = []
     backwards = scale(-1.0, one[0])
     turns = subproblem4(backwards, one[1], moved(tool), two[0], dot(two[0], tool))
     for theta1 in turns.angles:
-        seen = rotate(moved(tool), *one, -theta1)
+        turned = rotate(moved(tool), *one, -theta1)
         direction = rotate(along, one[0], ORIGIN, -theta1)
         pitch = subproblem1(two[0], ORIGIN, five[0], direction).angles[0]
-        w = add(seen, rotate(sub(wrist, tool), two[0], ORIGIN, pitch))
+        w = add(turned, rotate(sub(wrist, tool), two[0], ORIGIN, pitch))
         bends = subproblem3(*three, wrist, shoulder, norm(sub(w, shoulder)))
         for theta3 in bends.angles if bends.exact else ():
             bent = rotate(wrist, *three, theta3)
@@ -64,10 +64,10 @@ def solve(chain: Chain, T: FloatArray) -> list[FloatArray]:
             before = [(three, theta3), (two, theta2), (one, theta1)]
             theta4 = subproblem1(*four, tool, _undone(moved(tool), before)).angles[0]
             before = [(four, theta4), *before]
-            beside = add(tool, four[0])
-            theta5 = subproblem1(*five, beside, _undone(moved(beside), before)).angles[0]
-            found.append(np.array([theta1, theta2, theta3, theta4, theta5]))
-    return found
+            aside = add(tool, four[0])
+            theta5 = subproblem1(*five, aside, _undone(moved(aside), before)).angles[0]
+            solutions.append(np.array([theta1, theta2, theta3, theta4, theta5]))
+    return solutions
 
 
 def _undone(p: Vector, turns: list[tuple[Line, float]]) -> Vector:

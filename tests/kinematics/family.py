@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from tests.kinematics.conftest import L1, L2, TOOL_LENGTHS, katana
 
 
-@dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True)
 class Offsets:
     """The dimensions of a member; lengths in m, angles in rad.
 
@@ -38,21 +40,27 @@ class Offsets:
         return abs(self.radial) + abs(self.lateral) + sum(self.links) + abs(self.roll_offset)
 
 
+KATANA = Offsets(
+    0.0, 0.0, (L1, L2, TOOL_LENGTHS["tcp"]), (0.0, 0.0, 0.0), 0.0, signs=(1, 1, 1, 1, 1)
+)
+"""The dimensions of the Katana450."""
+
+
 def random_offsets(rng: np.random.Generator, *, lateral: bool) -> Offsets:
     """Return random offsets; each is zero in some members, so that simple arms are tested too."""
-    there = rng.random(4) < 0.7
-    low, middle, high = rng.uniform(-math.pi, math.pi, 3) * there[0]
+    present = rng.random(4) < 0.7
+    low, middle, high = rng.uniform(-math.pi, math.pi, 3) * present[0]
     one, two, three, four, five = rng.choice((-1, 1), size=5).tolist()
     return Offsets(
-        radial=float(rng.uniform(-0.08, 0.12) * there[1]),
-        lateral=float(rng.uniform(-0.06, 0.06) * there[2]) if lateral else 0.0,
+        radial=float(rng.uniform(-0.08, 0.12) * present[1]),
+        lateral=float(rng.uniform(-0.06, 0.06) * present[2]) if lateral else 0.0,
         links=(
             float(rng.uniform(0.08, 0.3)),
             float(rng.uniform(0.08, 0.3)),
             float(rng.uniform(0.05, 0.3)),
         ),
         bearings=(float(low), float(middle), float(high)),
-        roll_offset=float(rng.uniform(-0.05, 0.05) * there[3]),
+        roll_offset=float(rng.uniform(-0.05, 0.05) * present[3]),
         signs=(one, two, three, four, five),
     )
 
@@ -110,3 +118,17 @@ def random_member(rng: np.random.Generator, *, lateral: bool = True) -> tuple[Ch
     offsets = random_offsets(rng, lateral=lateral)
     turned = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), np.zeros(3))
     return member(offsets, random_pose(rng, 0.5), turned), offsets
+
+
+def limited_member(rng: np.random.Generator, *, lateral: bool = True) -> Chain:
+    """Return a member with limits of random width and place."""
+    chain, _ = random_member(rng, lateral=lateral)
+    middle, half = rng.uniform(-1.5, 1.5, 5), rng.uniform(0.4, 2.4, 5)
+    return dataclasses.replace(chain, lower=middle - half, upper=middle + half)
+
+
+def arms(rng: np.random.Generator, number: int, *, lateral: bool = True) -> Iterator[Chain]:
+    """Yield the Katana450, and then a ``number`` of random members."""
+    yield katana()
+    for _ in range(number):
+        yield random_member(rng, lateral=lateral)[0]

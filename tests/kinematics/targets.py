@@ -1,4 +1,4 @@
-"""Poses that the arm cannot take, and a check of postures found for them."""
+"""Poses that an arm cannot take, and a check of postures of the Katana450 for them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.branch import Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -23,7 +24,9 @@ def pose(w: npt.ArrayLike, p: npt.ArrayLike) -> FloatArray:
 
 def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatArray]:
     """Return poses of every kind that the arm cannot take, one of each per round."""
-    result = []
+    arm = arm_of(chain)
+    T_S_C = se3.inverse(arm.T_C_S)
+    result: list[FloatArray] = []
     for _ in range(rounds):
         turned = forward(chain, rng.uniform(chain.lower, chain.upper))
         turned[:3, :3] = turned[:3, :3] @ so3.exp(0.5 * rng.normal(size=3))
@@ -34,15 +37,15 @@ def targets(chain: Chain, rng: np.random.Generator, rounds: int) -> list[FloatAr
             *(10.0 ** rng.uniform(-6, -1.5) * rng.normal(size=2)),
             rng.uniform(-0.6, 0.65),
         ]
+        places: list[npt.ArrayLike] = [
+            far,
+            0.12 * rng.normal(size=3),
+            [0.4 * math.cos(behind), 0.4 * math.sin(behind), rng.uniform(-0.4, 0.5)],
+            beside_axis,
+        ]
         result += [
             turned,
-            pose(2.0 * rng.normal(size=3), far),
-            pose(2.0 * rng.normal(size=3), 0.12 * rng.normal(size=3)),
-            pose(
-                2.0 * rng.normal(size=3),
-                [0.4 * math.cos(behind), 0.4 * math.sin(behind), rng.uniform(-0.4, 0.5)],
-            ),
-            pose(2.0 * rng.normal(size=3), beside_axis),
+            *(T_S_C @ pose(2.0 * rng.normal(size=3), place) @ arm.T_K_tool for place in places),
             forward(chain, rng.uniform(chain.lower - 0.6, chain.upper + 0.6)),
         ]
     return result

@@ -22,11 +22,11 @@ def random_q(chain: Chain, rng: np.random.Generator, n: int) -> FloatArray:
 
 def assert_as_single_poses(chain: Chain, T: FloatArray, angle: float, error: float) -> None:
     """Compare angles [rad] and errors [m or rad] of every branch with those of `inverse`."""
-    found = inverse_batch(chain, T)
-    position, rotation = errors_of(chain, found, validated_poses(T))
+    solutions = inverse_batch(chain, T)
+    position, rotation = errors_of(chain, solutions, validated_poses(T))
     for i, pose in enumerate(T):
         for b, s in enumerate(inverse(chain, pose)):
-            between = np.angle(np.exp(1j * (found[i, b] - s.q)))
+            between = np.angle(np.exp(1j * (solutions[i, b] - s.q)))
             assert np.abs(between).max() < angle
             miss = pytest.approx(s.position_error, rel=1e-12, abs=error)
             assert position[i, b] == miss
@@ -46,16 +46,16 @@ def test_every_solution_takes_its_pose_over_several_chunks(
 ) -> None:
     q = random_q(chain, rng, 2 * CHUNK + 17)
     T = forward_batch(chain, q)
-    found = inverse_batch(chain, T)
-    assert found.shape == (len(q), 4, 5)
-    position, rotation = errors_of(chain, found, T)
+    solutions = inverse_batch(chain, T)
+    assert solutions.shape == (len(q), 4, 5)
+    position, rotation = errors_of(chain, solutions, T)
     assert position.max() < 2e-15
     assert rotation.max() < 1e-12
-    original = np.abs(found - q[:, None]).max(axis=2).min(axis=1)
+    original = np.abs(solutions - q[:, None]).max(axis=2).min(axis=1)
     # Near the stretched arm angles are known to the root of rounding.
     assert original.max() < 1e-6
     assert np.median(original) < 1e-14
-    within = ((found >= chain.lower) & (found <= chain.upper)).all(axis=2)
+    within = ((solutions >= chain.lower) & (solutions <= chain.upper)).all(axis=2)
     assert 2.0 < within.sum(axis=1).mean() < 2.4
 
 

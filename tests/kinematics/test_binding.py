@@ -20,7 +20,7 @@ from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import pitch_and_roll
 from tests.kinematics.conftest import katana
-from tests.kinematics.family import Offsets, member, random_member
+from tests.kinematics.family import Offsets, limited_member, member
 
 CASES = 1000 if os.environ.get("KATANA450_LONG") else 40
 
@@ -28,17 +28,10 @@ SAME = 1e-7
 """A smaller gain [m], [rad] by a wider limit is rounding."""
 
 
-def limited_member(seed: int, *, lateral: bool) -> Chain:
-    rng = np.random.default_rng(seed)
-    chain, _ = random_member(rng, lateral=lateral)
-    middle, half = rng.uniform(-1.0, 1.0, 5), rng.uniform(0.6, 2.4, 5)
-    return dataclasses.replace(chain, lower=middle - half, upper=middle + half)
-
-
 CHAINS = {
     "katana": katana(),
-    "member": limited_member(1, lateral=False),
-    "lateral member": limited_member(2, lateral=True),
+    "member": limited_member(np.random.default_rng(1), lateral=False),
+    "lateral member": limited_member(np.random.default_rng(2), lateral=True),
 }
 
 
@@ -76,7 +69,7 @@ def misses(p: Projection, priority: Priority) -> tuple[float, ...]:
 
 def same_way(chain: Chain, a: Projection, b: Projection) -> bool:
     """Return True if both tools face away from axis 1, or both towards it."""
-    (one, _), (two, _) = (pitch_and_roll(chain, each.q) for each in (a, b))
+    (one, _), (two, _) = (pitch_and_roll(chain, projection.q) for projection in (a, b))
     return abs(math.remainder(one - two, math.tau)) <= SAME
 
 

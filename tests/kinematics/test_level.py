@@ -56,7 +56,7 @@ def gap(
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("elbow", ["up", "down"])
 def test_found_posture_is_the_nearest(elbow: str, side: int, rng: np.random.Generator) -> None:
-    arm, found = planar(elbow, side), 0
+    arm, number = planar(elbow, side), 0
     for _ in range(25):
         u, v = rng.uniform(-0.8, 0.8, size=2)
         phi = float(rng.uniform(-math.pi, math.pi))
@@ -65,7 +65,7 @@ def test_found_posture_is_the_nearest(elbow: str, side: int, rng: np.random.Gene
         if posture is None:
             assert least == math.inf
             continue
-        found += 1
+        number += 1
         pu, pv = arm.tool(posture)
         assert math.remainder(posture.phi - phi, math.tau) == pytest.approx(0.0, abs=1e-9)
         assert pu * side >= -1e-12
@@ -73,7 +73,7 @@ def test_found_posture_is_the_nearest(elbow: str, side: int, rng: np.random.Gene
             assert ends.lower <= angle <= ends.upper
         # The pitch is feasible, so the search may miss the optimum but not beat it.
         assert math.hypot(pu - u, pv - v) <= least + 1e-9
-    assert found > 8
+    assert number > 8
 
 
 def test_reachable_point_is_reached(rng: np.random.Generator) -> None:

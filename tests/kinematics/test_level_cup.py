@@ -16,8 +16,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection, project
 from katana450.maths.kinematics.tool import pitch_and_roll
-from tests.kinematics.family import random_pose
-from tests.kinematics.test_projection_family import limited_member
+from tests.kinematics.family import limited_member, random_pose
 
 LEVEL = 1e-6
 """Tolerance of the level [rad]."""
@@ -119,7 +118,7 @@ def level_postures(chain: Chain, branch: Branch, rng: np.random.Generator) -> tu
     alpha = arm.canonical(rng.uniform(chain.lower, chain.upper, size=(20_000, 5)))
     lower, upper = np.sort((arm.canonical(chain.lower), arm.canonical(chain.upper)), axis=0)
     middle = 0.5 * (lower + upper)[3]
-    found = []
+    possible = []
     for pitch in (0.0, math.pi):
         four = pitch + arm.tilt - alpha[:, 1] - alpha[:, 2] - middle
         alpha[:, 3] = middle + (four + math.pi) % math.tau - math.pi
@@ -129,5 +128,5 @@ def level_postures(chain: Chain, branch: Branch, rng: np.random.Generator) -> tu
         inside = (alpha[:, 3] >= lower[3]) & (alpha[:, 3] <= upper[3])
         inside &= (r > 1e-3) if branch.shoulder == "front" else (r < -1e-3)
         inside &= (np.sin(alpha[:, 2]) >= 0.0) == (branch.elbow == "up")
-        found.append(bool(inside.any()))
-    return found[0], found[1]
+        possible.append(bool(inside.any()))
+    return possible[0], possible[1]

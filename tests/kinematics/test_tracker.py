@@ -102,13 +102,13 @@ def test_where_limits_split_the_pitches_the_goal_does_not_leap(chain: Chain, spl
     start = plain[0].q
     leaps = np.abs(np.diff([best.q for best in plain], axis=0)).max(axis=1)
     assert leaps.max() == pytest.approx(split.leap, abs=0.05)
-    at = int(leaps.argmax())
-    assert max(plain[at].position_error, plain[at + 1].position_error) < 1e-9
+    place = int(leaps.argmax())
+    assert max(plain[place].position_error, plain[place + 1].position_error) < 1e-9
 
     goals = list(dragged(chain, split, start, stops))
     steps = np.abs(np.diff([tracked.best.q for _, tracked in goals], axis=0)).max(axis=1)
     # Before the leap nothing differs; after it the goal moves on as the target does.
-    assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(at))
+    assert all(np.allclose(goals[i][1].best.q, plain[i].q, atol=1e-9) for i in range(place))
     assert steps.max() < HOP
     end = goals[-1][1]
     assert end.beyond_gap is not None
@@ -225,7 +225,7 @@ def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
     chain: Chain, turn: float, rng: np.random.Generator
 ) -> None:
     """Also test the back shoulder, where theta1 is not the direction of the target."""
-    seen = set()
+    branches = set()
     for q in rng.uniform(chain.lower + 0.1, chain.upper - 0.1, size=(40, 5)):
         q[0] *= 0.75
         end = q + np.array([turn, 0.0, 0.0, 0.0, 0.0])
@@ -233,8 +233,8 @@ def test_every_branch_follows_a_turn_of_axis_1_the_short_way(
         for _ in range(3):
             goal = track(chain, goal, target, branch=branch).best.q
         np.testing.assert_allclose(goal, end, atol=1e-6)
-        seen.add(branch)
-    assert len(seen) == 4
+        branches.add(branch)
+    assert len(branches) == 4
 
 
 @pytest.mark.parametrize("priority", PRIORITIES)

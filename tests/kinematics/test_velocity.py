@@ -34,9 +34,9 @@ H = 1e-6
 
 def finite_twist(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
     """Return the twist of the tool point in the axes of {S} by central differences."""
-    ahead, behind = forward(chain, q + H * qd), forward(chain, q - H * qd)
-    omega = so3.log(ahead[:3, :3] @ behind[:3, :3].T) / (2.0 * H)
-    return np.concatenate((omega, (ahead[:3, 3] - behind[:3, 3]) / (2.0 * H)))
+    after, behind = forward(chain, q + H * qd), forward(chain, q - H * qd)
+    omega = so3.log(after[:3, :3] @ behind[:3, :3].T) / (2.0 * H)
+    return np.concatenate((omega, (after[:3, 3] - behind[:3, 3]) / (2.0 * H)))
 
 
 def postures(chain: Chain, rng: np.random.Generator, number: int) -> FloatArray:
@@ -127,14 +127,14 @@ def test_jogging_for_long_stays_inside_limits_and_speeds(
     singular = 0
     for q in postures(chain, rng, 12):
         V = np.concatenate((rng.normal(size=3), rng.normal(scale=0.5, size=3)))
-        at = np.array(q)
+        place = np.array(q)
         for _ in range(60):
-            qd = jog(chain, at, V, JogFrame.BASE, 0.05)
+            qd = jog(chain, place, V, JogFrame.BASE, 0.05)
             assert np.isfinite(qd).all()
             assert (np.abs(qd) <= chain.speed * (1 + 1e-12)).all()
-            at = at + 0.05 * qd
-            assert chain.within_limits(at)
-            singular += singular_values(chain, at)[-1] < WELL_CONDITIONED
+            place = place + 0.05 * qd
+            assert chain.within_limits(place)
+            singular += singular_values(chain, place)[-1] < WELL_CONDITIONED
     assert singular > 50
 
 
@@ -184,12 +184,12 @@ def test_invalid_jog_is_refused(
 def test_branch_metrics_give_the_cost_of_a_branch(chain: Chain) -> None:
     T = forward(chain, READY)
     all_metrics = [
-        BranchMetrics.of(chain, found, READY) for found in inverse(chain, T, q_hint=READY)
+        BranchMetrics.of(chain, solution, READY) for solution in inverse(chain, T, q_hint=READY)
     ]
     assert tuple(metrics.branch for metrics in all_metrics) == BRANCHES
-    here = all_metrics[0]
-    assert here.distance == pytest.approx(0.0, abs=1e-9)
-    assert here.within_limits
+    present = all_metrics[0]
+    assert present.distance == pytest.approx(0.0, abs=1e-9)
+    assert present.within_limits
     for metrics in all_metrics:
         assert np.allclose(forward(chain, metrics.q), T, atol=1e-9)
         assert metrics.position_error < 1e-9
