@@ -6,8 +6,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.stopping import clear_refusal
 from katana450.arm.control.state.state import State
-
-TICK = 0.01
+from tests.ticks import TICK, ticked
 
 
 def cleared(session: Session, state: State) -> State:
@@ -15,8 +14,7 @@ def cleared(session: Session, state: State) -> State:
     for _ in range(1000):
         if not clear_refusal(state, state.t):
             break
-        state = session.step(state, [], state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
+        state = ticked(session, state)
     else:
         raise AssertionError(clear_refusal(state, state.t))
     state = session.step(state, [cmd.ClearStop()], state.t + TICK)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import pytest
 
@@ -14,8 +12,8 @@ from katana450.arm.control.state.state import Reason, State, Status
 from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
+from tests.ticks import TICK, until_rest
 
-TICK = 0.01
 SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """Posture with the fingers about 10 cm above the table."""
@@ -33,20 +31,12 @@ def clearance(world: CollisionWorld, state: State) -> float:
 
 
 def run(
-    session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 500
+    session: Session, state: State, *commands: cmd.Command, ticks: int = 500
 ) -> tuple[State, list[float]]:
     """Return the last state when the arm rests, and the clearance after each tick [m]."""
-    commands = list(commands)
-    near = []
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        if session.world is not None:
-            near.append(clearance(session.world, state))
-        commands = []
-        if not state.moving:
-            return state, near
-    raise AssertionError("the arm never came to rest")
+    passed = until_rest(session, state, *commands, ticks=ticks)
+    world = session.world
+    return passed[-1], [] if world is None else [clearance(world, after) for after in passed]
 
 
 def standing(session: Session, q: FloatArray, gripper: float = 0.0) -> State:
@@ -67,7 +57,7 @@ INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
 @pytest.mark.parametrize("what", INTO)
 def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> None:
     start, commands, met = INTO[what]
-    state, near = run(guarded, standing(guarded, start), commands)
+    state, near = run(guarded, standing(guarded, start), *commands)
     assert min(near) >= MIN_CLEARANCE - SLIGHTLY
     assert state.blocked
     assert state.status is Status.BLOCKED
@@ -83,13 +73,13 @@ def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> 
 @pytest.mark.parametrize("what", INTO)
 def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None:
     start, commands, _ = INTO[what]
-    blocked, _ = run(guarded, standing(guarded, start), commands)
+    blocked, _ = run(guarded, standing(guarded, start), *commands)
     back = cmd.Joints(start)
-    state, near = run(guarded, blocked, [back])
+    state, near = run(guarded, blocked, back)
     assert (state.setpoint == start).all()
     assert state.findings == ()
     free, _ = run(
-        Session(guarded.require_arm(), guarded.ready), standing(guarded, blocked.setpoint), [back]
+        Session(guarded.require_arm(), guarded.ready), standing(guarded, blocked.setpoint), back
     )
     assert state.t - blocked.t <= free.t + 2.0 * TICK
     assert min(near) >= MIN_CLEARANCE - SLIGHTLY
@@ -97,7 +87,7 @@ def test_arm_leaves_a_contact_at_full_speed(guarded: Session, what: str) -> None
 
 def test_blocked_arm_stays_still_to_the_bit(guarded: Session) -> None:
     start, commands, _ = INTO["table"]
-    blocked, _ = run(guarded, standing(guarded, start), commands)
+    blocked, _ = run(guarded, standing(guarded, start), *commands)
     state = blocked
     for _ in range(50):
         state = guarded.step(state, [], state.t + TICK)
@@ -109,19 +99,19 @@ def test_blocked_arm_continues_once_its_path_is_clear(
     guarded: Session, world: CollisionWorld
 ) -> None:
     start, commands, _ = INTO["cup"]
-    blocked, _ = run(guarded, standing(guarded, start), commands)
+    blocked, _ = run(guarded, standing(guarded, start), *commands)
     cup = len(world.parts) - 1
     pairs = [pair for pair in world.pairs if cup not in pair]
     without_cup = CollisionWorld(world.linkage, world.parts[:-1], pairs)
     freed = Session(guarded.require_arm(), guarded.ready, without_cup)
-    state, _ = run(freed, blocked, [])
+    state, _ = run(freed, blocked)
     assert (state.setpoint == state.goal).all()
     assert state.status is Status.OK
 
 
 def test_end_of_a_drag_before_a_contact_drops_the_rest_of_the_path(guarded: Session) -> None:
     state = standing(guarded, LOW)
-    blocked, _ = run(guarded, state, [cmd.Position(np.array([0.40, 0.23, -0.35]))])
+    blocked, _ = run(guarded, state, cmd.Position(np.array([0.40, 0.23, -0.35])))
     assert blocked.blocked
     let_go = guarded.step(blocked, [cmd.EndDrag()], blocked.t + TICK)
     assert (let_go.goal == blocked.setpoint).all()
@@ -133,14 +123,14 @@ def test_end_of_a_drag_before_a_contact_drops_the_rest_of_the_path(guarded: Sess
 def test_fingers_wait_before_a_cup_until_the_arm_moves_away(guarded: Session) -> None:
     """The closed tool is beside the cup; then the fingers open, and the arm moves."""
     start, commands, _ = INTO["cup"]
-    blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), commands)
+    blocked, _ = run(guarded, standing(guarded, start, gripper=-0.44), *commands)
     at_cup = guarded.step(blocked, [cmd.Hold()], blocked.t + TICK)
-    state, near = run(guarded, at_cup, [cmd.Gripper(0.30)])
+    state, near = run(guarded, at_cup, cmd.Gripper(0.30))
     assert state.blocked
     assert state.gripper_setpoint < 0.30
     assert min(near) >= MIN_CLEARANCE - SLIGHTLY
     assert "cup" in (state.findings[0].parts or ())
-    state, near = run(guarded, state, [cmd.Joint(1, 0.5)])
+    state, near = run(guarded, state, cmd.Joint(1, 0.5))
     assert state.setpoint[0] == 0.5
     assert state.gripper_setpoint == 0.30
     assert min(near) >= MIN_CLEARANCE - SLIGHTLY
@@ -152,10 +142,10 @@ def test_arm_in_a_contact_may_only_leave_it(guarded: Session, world: CollisionWo
     state = standing(guarded, inside)
     depth = clearance(world, state)
     assert depth < 0.0
-    deeper, near = run(guarded, state, [cmd.Joint(2, 0.0)])
+    deeper, near = run(guarded, state, cmd.Joint(2, 0.0))
     assert deeper.blocked
     assert min(near) >= depth - SLIGHTLY
-    state, near = run(guarded, deeper, [cmd.Joint(2, np.radians(-70.0))])
+    state, near = run(guarded, deeper, cmd.Joint(2, np.radians(-70.0)))
     assert state.status is Status.OK
     assert near[-1] > MIN_CLEARANCE
 
@@ -171,7 +161,7 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
     for choice in met:
         assert choice.contact is not None
         assert choice.contact.distance < MIN_CLEARANCE
-        taken, near = run(guarded, state, [cmd.Branch(name=str(choice.metrics.branch))], 2000)
+        taken, near = run(guarded, state, cmd.Branch(name=str(choice.metrics.branch)), ticks=2000)
         assert taken.status is Status.BLOCKED
         assert min(near) > 0.0
 
@@ -184,7 +174,7 @@ def test_braking_arm_with_a_new_target_keeps_its_finding(guarded: Session) -> No
         commands = [] if tick % 4 else [cmd.Joint(2, float(angle))]
         state = guarded.step(state, commands, state.t + TICK)
         named |= {f.parts for f in state.findings if f.reason is Reason.CONTACT}
-    state, _ = run(guarded, state, [])
+    state, _ = run(guarded, state)
     (finding,) = (f for f in state.findings if f.reason is Reason.CONTACT)
     assert state.status is Status.BLOCKED
     assert finding.parts is not None

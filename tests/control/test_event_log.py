@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,19 +13,15 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.event_log import LogEntry, entries_between
 from katana450.arm.control.state.messages import REASONS, STATUS, sentence
 from katana450.arm.control.state.state import Finding, Reason, State, Status
-
-TICK = 0.01
+from tests.ticks import TICK, during
 
 
 def run(
     session: Session, state: State, commands: Sequence[cmd.Command], ticks: int
 ) -> tuple[State, list[LogEntry]]:
-    entries: list[LogEntry] = []
-    for number in range(ticks):
-        before = state
-        state = session.step(state, commands if number == 0 else [], state.t + TICK)
-        entries += entries_between(before, state)
-    return state, entries
+    passed = [state, *during(session, state, ticks * TICK, *commands)]
+    entries = [entry for pair in pairwise(passed) for entry in entries_between(*pair)]
+    return passed[-1], entries
 
 
 FAULTS: dict[Reason, list[cmd.Command]] = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -31,8 +30,8 @@ from katana450.maths.planning.plan import Plan
 from katana450.settings import Settings
 from tests.control.clearing import cleared
 from tests.control.test_contact import clearance
+from tests.ticks import TICK, until_rest
 
-TICK = 0.01
 SLIGHTLY = 2e-5  # m
 LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """Posture with the fingers about 10 cm above the table."""
@@ -80,17 +79,6 @@ def trace(
     return states
 
 
-def run(
-    session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 2000
-) -> list[State]:
-    """Return the states until the arm rests."""
-    states = [session.step(state, commands, state.t + TICK)]
-    while states[-1].moving:
-        states.append(session.step(states[-1], [], states[-1].t + TICK))
-        assert len(states) < ticks, "the arm never came to rest"
-    return states
-
-
 def check_limits(session: Session, states: list[State]) -> None:
     """Check that finite differences over a tick keep the limits of the derivatives."""
     limits, rounding = session.require_arm().limits, 1e-12
@@ -123,7 +111,7 @@ def off_path(states: list[State], plan: Plan) -> float:
 def test_plan_is_followed_to_its_end_in_its_duration(session: Session, state: State) -> None:
     goal = np.array([1.0, -0.8, 0.9, 0.5, 1.2])
     plan = plan_to(session.require_arm(), None, state, goal)
-    states = run(session, state, [cmd.Follow(plan)])
+    states = until_rest(session, state, cmd.Follow(plan))
     last = states[-1]
     assert (last.setpoint == goal).all()
     assert (last.goal == goal).all()
@@ -185,12 +173,12 @@ def test_plan_can_be_followed_step_by_step(session: Session, poured: Plan) -> No
     state = session.step(start, [cmd.Follow(poured), cmd.Pause()], TICK)
     for begin in poured.begins[1:]:
         fraction = begin / poured.span
-        state = run(session, state, [cmd.GoAlong(fraction), cmd.Resume()])[-1]
+        state = until_rest(session, state, cmd.GoAlong(fraction), cmd.Resume())[-1]
         assert state.following is not None
         assert state.following.fraction == pytest.approx(fraction, abs=1e-12)
         assert state.motion.at_rest
         assert state.setpoint == pytest.approx(poured.q(begin), abs=1e-9)
-    back = run(session, state, [cmd.GoAlong(0.0)])[-1]
+    back = until_rest(session, state, cmd.GoAlong(0.0))[-1]
     assert (back.setpoint == poured.start).all()
 
 
@@ -239,7 +227,7 @@ def test_other_motion_ends_the_plan_inside_the_limits(
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)
     assert not under_way[-1].motion.at_rest
-    after = run(session, under_way[-1], [command])
+    after = until_rest(session, under_way[-1], command)
     assert after[-1].following is None
     assert not after[-1].moving
     limits, slack = session.require_arm().limits, 1.0 + 1e-6
@@ -261,7 +249,7 @@ def test_tool_and_gripper_commands_do_not_end_the_plan(session: Session, poured:
 def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured: Plan) -> None:
     start = session.begin(poured.start, 0.0, 0.0)
     under_way = trace(session, start, {0: [cmd.Follow(poured)]}, 120)[-1]
-    stopped = run(session, under_way, [cmd.Stop()])
+    stopped = until_rest(session, under_way, cmd.Stop())
     (finding,) = stopped[-1].findings
     assert finding.reason is Reason.STOPPED
     assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
@@ -289,7 +277,7 @@ def test_plan_goes_around_the_cup_if_the_straight_path_is_blocked(
     sigma = np.linspace(0.0, 1.0, 50)
     same = joint_derivatives(plan.segments[0].path, sigma) == joint_derivatives(again, sigma)
     assert same.all()
-    states = run(guarded, state, [cmd.Follow(plan)])
+    states = until_rest(guarded, state, cmd.Follow(plan))
     assert (states[-1].setpoint == BEYOND_CUP).all()
     assert not any(each.blocked for each in states)
     near = min(clearance(world, each) for each in states)
@@ -305,10 +293,10 @@ def test_stop_beside_the_cup_keeps_clear_of_it(
 ) -> None:
     """A joint-by-joint brake would leave the path, and there is not room for that everywhere."""
     start = guarded.begin(LOW, 0.0, 0.0)
-    states = run(guarded, start, [cmd.Follow(round_cup)])
+    states = until_rest(guarded, start, cmd.Follow(round_cup))
     along = 0
     for at in range(60, len(states) - 40, 12):
-        stopped = run(guarded, states[at], [cmd.Stop()])
+        stopped = until_rest(guarded, states[at], cmd.Stop())
         along += stopped[0].following is not None
         assert min(clearance(world, each) for each in stopped) >= MIN_CLEARANCE - SLIGHTLY
         assert stopped[-1].motion.at_rest
@@ -329,18 +317,18 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     )
     start = Session(arm, guarded.ready, cupless).begin(LOW, 0.0, 0.0)
     plan = plan_to(arm, cupless, start, BEYOND_CUP)
-    states = run(guarded, start, [cmd.Follow(plan)])
+    states = until_rest(guarded, start, cmd.Follow(plan))
     assert states[-1].status is Status.BLOCKED
     assert "cup" in (states[-1].findings[0].parts or ())
     # Where the plan is not known to be clear, no shorter piece of the path is checked.
     assert min(clearance(world, each) for each in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
     assert off_path(states, plan) <= 1e-15
     # The path back is clear, and so is the path onwards without the cup.
-    back = run(guarded, states[-1], [cmd.GoAlong(0.0)])
+    back = until_rest(guarded, states[-1], cmd.GoAlong(0.0))
     assert (back[-1].setpoint == LOW).all()
     assert back[-1].status is Status.OK
     freed = Session(arm, guarded.ready, cupless)
-    assert (run(freed, states[-1], [])[-1].setpoint == BEYOND_CUP).all()
+    assert (until_rest(freed, states[-1])[-1].setpoint == BEYOND_CUP).all()
 
 
 def test_goal_in_the_table_is_refused(

@@ -26,6 +26,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.settings import Settings
+from tests.ticks import rested
 
 OPEN = 0.3
 PITCH = np.deg2rad(40.0)
@@ -48,18 +49,6 @@ def session(robot: Robot, arm: MountedArm) -> Session:
         hand=hand_of(robot, world),
         objects=scene_objects_of(load_props()),
     )
-
-
-def run(session: Session, state: State, *commands: cmd.Command, seconds: float = 12.0) -> State:
-    """Tick until the arm rests."""
-    state = session.step(state, commands, state.t + 0.01)
-    state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    for _ in range(int(100 * seconds)):
-        if not state.moving:
-            return state
-        state = session.step(state, (), state.t + 0.01)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    raise AssertionError(f"The arm still moves: {state.findings}")
 
 
 def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:
@@ -95,13 +84,13 @@ def before_cup(
 def holding(session: Session, arm: MountedArm) -> State:
     """The state with the cup between the fingers, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
-    state = run(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
+    state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     before = before_cup(session, arm, state, BEFORE)
-    state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
+    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
     at = before_cup(session, arm, state, AT)
-    state = run(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, at)))
+    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, at)))
     np.testing.assert_allclose(state.q, at, rtol=0, atol=1e-9)
-    return run(session, state, cmd.Gripper(-0.44))
+    return rested(session, state, cmd.Gripper(-0.44))
 
 
 def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) -> None:
@@ -128,10 +117,8 @@ def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     at = ToolTarget.at(chain, state.q)
     up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
     way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)  # type: ignore[arg-type]
-    return run(
-        session,
-        state,
-        cmd.Follow(plan_along(arm, session.world_at(state), state, [way])),
+    return rested(
+        session, state, cmd.Follow(plan_along(arm, session.world_at(state), state, [way]))
     )
 
 
@@ -146,7 +133,7 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
     at = ToolTarget.at(chain, up.q)
-    down = run(session, up, cmd.Position(at.position - [0.0, 0.0, 0.2]))
+    down = rested(session, up, cmd.Position(at.position - [0.0, 0.0, 0.2]))
     (met,) = (f for f in down.findings if f.reason is Reason.CONTACT)
     assert met.parts is not None
     assert set(met.parts) == {"cup", "table"}
@@ -160,12 +147,12 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
 def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
     session: Session, holding: State
 ) -> None:
-    tight = run(session, holding, cmd.Gripper(-0.44))
+    tight = rested(session, holding, cmd.Gripper(-0.44))
     assert tight.gripper == holding.grip
     hand = session.environment.hand
     assert hand is not None
     assert touching(hand, tight) == hand.fingers
-    stopped = run(session, session.step(tight, [cmd.Joint(1, 0.3)], tight.t + 0.01), cmd.Stop())
+    stopped = rested(session, session.step(tight, [cmd.Joint(1, 0.3)], tight.t + 0.01), cmd.Stop())
     cup, _ = cup_of(session, stopped)
     assert cup.held
     assert stopped.stopped is not None
@@ -176,7 +163,7 @@ def test_opened_fingers_leave_the_cup_on_the_table(
 ) -> None:
     up = lifted(session, arm, holding, 0.03)
     _, T_up = cup_of(session, up)
-    left = run(session, up, cmd.Gripper(OPEN))
+    left = rested(session, up, cmd.Gripper(OPEN))
     cup, T = cup_of(session, left)
     assert not cup.held
     assert left.grip is None
@@ -185,7 +172,7 @@ def test_opened_fingers_leave_the_cup_on_the_table(
     np.testing.assert_allclose(T[2, :3], (0.0, 0.0, 1.0), rtol=0, atol=1e-12)
     # The arm may move away from an object between its open fingers.
     back = before_cup(session, arm, left, BEFORE)
-    away = run(session, left, cmd.Joints(back))
+    away = rested(session, left, cmd.Joints(back))
     np.testing.assert_allclose(away.q, back, rtol=0, atol=1e-9)
 
 
@@ -193,12 +180,12 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
     session: Session, arm: MountedArm
 ) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    state = run(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
+    state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back, beside=0.008)
         plan = plan_to(arm, session.world_at(state), state, q)
-        state = run(session, state, cmd.Follow(plan))
-    closed = run(session, state, cmd.Gripper(-0.44))
+        state = rested(session, state, cmd.Follow(plan))
+    closed = rested(session, state, cmd.Gripper(-0.44))
     assert not cup_of(session, closed)[0].held
     (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
     assert lopsided.parts is not None
@@ -207,7 +194,7 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
     hand = session.environment.hand
     assert hand is not None
     assert {*touching(hand, closed), lopsided.parts[0]} == set(hand.fingers)
-    opened = run(session, closed, cmd.Gripper(OPEN))
+    opened = rested(session, closed, cmd.Gripper(OPEN))
     assert not any(f.reason is Reason.LOPSIDED for f in opened.findings)
     assert touching(hand, opened) == ()
 

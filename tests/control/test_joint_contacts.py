@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -25,6 +25,7 @@ from katana450.maths.collision.clearance import DISTANCE_ROUNDING, MIN_CLEARANCE
 from katana450.maths.collision.world import CollisionWorld
 from tests.robot.hands import column, hand, rail
 from tests.robot.on_the_table import block
+from tests.ticks import during
 
 DT = 0.01
 
@@ -65,21 +66,6 @@ def begun(session: Session) -> State:
     return session.begin(session.ready, 0.0, 0.0)
 
 
-def ticks(session: Session, state: State, seconds: float, *first: cmd.Command) -> Iterator[State]:
-    t, end = state.t, state.t + seconds
-    while t < end - DT / 2:
-        t += DT
-        state = session.step(state, first, t)
-        state = session.observe(state, state.setpoint, 0.0)
-        first = ()
-        yield state
-
-
-def after(session: Session, state: State, seconds: float, *first: cmd.Command) -> State:
-    *_, last = ticks(session, state, seconds, *first)
-    return last
-
-
 def excess(world: CollisionWorld, state: State) -> float:
     """Return the smallest distance of any pair beyond what it keeps [m]."""
     placed, kept = world.at(state.x_setpoint), world.kept(MIN_CLEARANCE)
@@ -89,7 +75,7 @@ def excess(world: CollisionWorld, state: State) -> float:
 def test_carriages_on_one_rail_stop_before_each_other(make: Make) -> None:
     made = make(rail())
     session, world = made.session, made.world
-    state = after(session, begun(session), 4.0, made.move(slide_left=0.4))
+    state = during(session, begun(session), 4.0, made.move(slide_left=0.4))[-1]
     # 0.2 m apart, 50 mm wide, and 5 mm stay between them.
     assert state.setpoint[0] == pytest.approx(0.144, abs=1.5e-3)
     assert world.gap(state.x_setpoint, "left", "right") >= MIN_CLEARANCE - DISTANCE_ROUNDING
@@ -104,10 +90,10 @@ def test_both_carriages_brake_and_the_blocked_one_continues_once_free(make: Make
     made = make(rail())
     session, world = made.session, made.world
     command = made.move(slide_left=0.4, slide_right=-0.3)
-    seen = list(ticks(session, begun(session), 3.0, command))
+    seen = during(session, begun(session), 3.0, command)
     assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
     assert seen[-1].blocked
-    state = after(session, seen[-1], 4.0, made.move(slide_right=0.3))
+    state = during(session, seen[-1], 4.0, made.move(slide_right=0.3))[-1]
     np.testing.assert_allclose(state.setpoint, (0.4, 0.3), atol=1e-9)
     assert (state.status, state.findings) == (Status.OK, ())
 
@@ -129,12 +115,12 @@ def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> N
 def test_stop_and_pause_work_before_a_contact(make: Make) -> None:
     made = make(rail())
     session, world = made.session, made.world
-    state = after(session, begun(session), 0.4, made.move(slide_left=0.4))
+    state = during(session, begun(session), 0.4, made.move(slide_left=0.4))[-1]
     assert state.moving
-    stopped = after(session, state, 2.0, cmd.Stop())
+    stopped = during(session, state, 2.0, cmd.Stop())[-1]
     assert stopped.status is Status.STOPPED
     assert excess(world, stopped) >= 0.0
-    paused = after(session, state, 2.0, cmd.Pause())
+    paused = during(session, state, 2.0, cmd.Pause())[-1]
     assert (paused.status, paused.moving) == (Status.PAUSED, False)
 
 
@@ -142,7 +128,7 @@ def test_thumb_and_finger_meet_and_the_following_joint_counts(make: Make) -> Non
     made = make(hand())
     session, world = made.session, made.world
     command = made.move(thumb_bend1=0.0, finger2_bend1=1.5, finger2_bend2=1.2)
-    seen = list(ticks(session, begun(session), 4.0, command))
+    seen = during(session, begun(session), 4.0, command)
     assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
     state = seen[-1]
     assert state.blocked
@@ -168,10 +154,10 @@ def test_no_motion_of_a_hand_brings_its_parts_too_near(
     state = begun(session)
     for q, seconds in wanted:
         goal = made.joints.clamp(np.array(q))
-        seen = list(ticks(session, state, seconds, cmd.Joints(goal)))
+        seen = during(session, state, seconds, cmd.Joints(goal))
         assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
         state = seen[-1]
-    stopping = ticks(session, state, 0.5, cmd.Stop())
+    stopping = during(session, state, 0.5, cmd.Stop())
     assert min(excess(world, each) for each in stopping) >= -DISTANCE_ROUNDING
 
 
@@ -181,22 +167,22 @@ def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: M
     session, world = made.session, made.world
     assert min(world.close.values()) == pytest.approx(1.5e-3, abs=1e-6)
     command = made.move(finger1_spread=0.3)
-    state = after(session, begun(session), 2.0, command)
+    state = during(session, begun(session), 2.0, command)[-1]
     free = world.gap(state.x_setpoint, "finger1_link1", "finger2_link1")
-    state = after(session, state, 2.0, made.move(finger1_spread=-0.3))
+    state = during(session, state, 2.0, made.move(finger1_spread=-0.3))[-1]
     near = world.gap(state.x_setpoint, "finger1_link3", "finger2_link3")
     assert min(free, near) >= 1.5e-3 - DISTANCE_ROUNDING
     assert state.blocked
     assert sentence(state).endswith("mm apart: they must not come nearer.")
     # Each finger alone bends past its neighbours.
-    bent = after(session, begun(session), 3.0, made.move(finger2_bend1=1.4))
+    bent = during(session, begun(session), 3.0, made.move(finger2_bend1=1.4))[-1]
     assert bent.setpoint[made.joints.names.index("finger2_bend1")] == 1.4
 
 
 def test_without_a_world_joints_pass_each_other(make: Make) -> None:
     made = make(rail())
     unchecked = Session(made.joints, made.joints.ready)
-    state = after(unchecked, begun(unchecked), 3.0, made.move(slide_left=0.4))
+    state = during(unchecked, begun(unchecked), 3.0, made.move(slide_left=0.4))[-1]
     assert state.setpoint[0] == 0.4
 
 
@@ -205,10 +191,10 @@ def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:
     session, world = made.session, made.world
     state = session.begin(np.array((0.149, 0.0)), 0.0, 0.0)
     assert world.gap(state.x_setpoint, "left", "right") < MIN_CLEARANCE
-    nearer = after(session, state, 1.0, made.move(slide_left=0.2))
+    nearer = during(session, state, 1.0, made.move(slide_left=0.2))[-1]
     assert nearer.setpoint[0] == 0.149
     assert nearer.blocked
-    away = after(session, replace(state, blocked=False), 2.0, made.move(slide_left=0.0))
+    away = during(session, replace(state, blocked=False), 2.0, made.move(slide_left=0.0))[-1]
     assert away.setpoint[0] == 0.0
 
 
@@ -220,7 +206,7 @@ def height(state: State) -> float:
 @pytest.mark.parametrize("foot", [0.0, -0.3])
 def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
     made = make(column(foot))
-    seen = list(ticks(made.session, begun(made.session), 4.0, made.move(lift=-0.4)))
+    seen = during(made.session, begun(made.session), 4.0, made.move(lift=-0.4))
     state = seen[-1]
     assert min(map(height, seen)) >= MIN_CLEARANCE - DISTANCE_ROUNDING
     assert height(state) == pytest.approx(MIN_CLEARANCE, abs=1.5e-3)
@@ -232,14 +218,14 @@ def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
 def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
     made = make(column(-0.3))
     session = made.session
-    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(-0.3)))
-    seen = list(ticks(session, state, 4.0, made.move(lift=-0.4)))
+    state = during(session, begun(session), 0.05, cmd.PlaceObject(block(-0.3)))[-1]
+    seen = during(session, state, 4.0, made.move(lift=-0.4))
     state = seen[-1]
     assert min(map(height, seen)) >= 0.1 + MIN_CLEARANCE - DISTANCE_ROUNDING
     assert height(state) == pytest.approx(0.1 + MIN_CLEARANCE, abs=3e-3)
     assert (state.status, state.findings[0].parts) == (Status.BLOCKED, ("beam", "block"))
     # The goal stays, so the beam continues down to the table once the object is away.
-    state = after(session, state, 3.0, cmd.Remove("block"))
+    state = during(session, state, 3.0, cmd.Remove("block"))[-1]
     assert height(state) == pytest.approx(MIN_CLEARANCE, abs=3e-3)
     assert state.near == {"beam", "table"}
 
@@ -260,6 +246,6 @@ def test_commands_about_a_hand_or_water_are_refused(make: Make) -> None:
 
 def test_an_object_is_put_down_on_the_table_below_the_base(make: Make) -> None:
     session = make(column(-0.3)).session
-    state = after(session, begun(session), 0.05, cmd.PlaceObject(block(0.2)))
-    (down,) = after(session, state, 0.05, cmd.Attach("block", Attachment.TABLE)).objects
+    state = during(session, begun(session), 0.05, cmd.PlaceObject(block(0.2)))[-1]
+    (down,) = during(session, state, 0.05, cmd.Attach("block", Attachment.TABLE))[-1].objects
     np.testing.assert_allclose(down.T[:3, 3], (0.2, 0.0, -0.3), atol=1e-6)

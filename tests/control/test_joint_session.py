@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +16,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.appearance import AppearanceTrait, DisplayMode
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.errors import InputError
+from tests.ticks import during, rested
 
 DT = 0.01
 
@@ -40,23 +40,6 @@ def state(session: Session) -> State:
     return session.begin(JOINTS.ready, 0.0, 0.0)
 
 
-def after(session: Session, state: State, seconds: float, *first: cmd.Command) -> State:
-    *_, last = ticks(session, state, seconds, *first)
-    return last
-
-
-def ticks(session: Session, state: State, seconds: float, *first: cmd.Command) -> Iterator[State]:
-    t, end = state.t, state.t + seconds
-    while t < end - DT / 2:
-        t += DT
-        state = session.step(state, first, t)
-        state = session.observe(state, state.setpoint, 0.0)
-        first = ()
-        yield state
-        if not state.moving and state.servo is None:
-            return
-
-
 def test_session_begins_at_the_posture_nearest_to_zero(state: State) -> None:
     np.testing.assert_array_equal(state.q, (0.05, 0.0, 0.0))
     assert (state.status, state.moving, state.tool) == (Status.OK, False, "")
@@ -74,12 +57,12 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
     targets: list[tuple[tuple[float, float, float], float]], fraction: float
 ) -> None:
     rules = Session(JOINTS, JOINTS.ready)
-    state = after(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.Speed(fraction))
+    state = during(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.Speed(fraction))[-1]
     limits, seen = JOINTS.limits, [state]
     for target, seconds in targets:
-        seen += ticks(rules, state, seconds, cmd.Joints(np.array(target)))
+        seen += during(rules, state, seconds, cmd.Joints(np.array(target)))
         state = seen[-1]
-    state = after(rules, state, 20.0)
+    state = rested(rules, state)
     goal = np.clip(targets[-1][0], limits.lower, limits.upper)
     np.testing.assert_array_equal(state.q, goal)
     for before, now in pairwise(seen):
@@ -92,45 +75,45 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
 
 
 def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
-    there = after(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))
+    there = during(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))[-1]
     findings = [(f.reason, f.axis, f.amount) for f in there.findings]
     assert findings == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
     assert there.status is Status.LIMITED
-    assert after(session, there, 10.0, cmd.SetAxes(((1, 0.1), (2, 0.0)))).findings == ()
+    assert rested(session, there, cmd.SetAxes(((1, 0.1), (2, 0.0)))).findings == ()
 
 
 def test_stop_takes_the_reported_distance_and_holds_until_cleared(
     session: Session, state: State
 ) -> None:
-    moving = after(session, state, 0.8, cmd.Joints(np.array((0.4, 3.0, 0.3))))
-    stopped = after(session, moving, DT, cmd.Stop())
+    moving = during(session, state, 0.8, cmd.Joints(np.array((0.4, 3.0, 0.3))))[-1]
+    stopped = during(session, moving, DT, cmd.Stop())[-1]
     assert stopped.stopped is not None
-    rest = after(session, stopped, stopped.stopped.time)
+    rest = during(session, stopped, stopped.stopped.time)[-1]
     assert rest.motion.at_rest
     np.testing.assert_allclose(rest.q, stopped.goal, rtol=0, atol=1e-9)
     far = np.abs(moving.setpoint - rest.q).max()
     assert stopped.stopped.way == pytest.approx(far, abs=1e-9)
-    ignored = after(
+    ignored = during(
         session, rest, 0.5, cmd.Home(), cmd.SetAppearance("a", AppearanceTrait.CHOICE, -1)
-    )
+    )[-1]
     np.testing.assert_array_equal(ignored.q, rest.q)
     assert ignored.appearance.of("a").choice is DisplayMode.HIDDEN
-    free = after(session, ignored, 0.5, cmd.ClearStop())
+    free = during(session, ignored, 0.5, cmd.ClearStop())[-1]
     assert (free.stopped, free.findings, free.moving) == (None, (), False)
-    home = after(session, free, 10.0, cmd.Home())
+    home = rested(session, free, cmd.Home())
     np.testing.assert_array_equal(home.q, JOINTS.ready)
 
 
 def test_pause_keeps_the_goal_and_hold_drops_it(session: Session, state: State) -> None:
     goal = np.array((0.3, 2.0, 0.1))
-    moving = after(session, state, 0.8, cmd.Joints(goal))
-    paused = after(session, moving, 3.0, cmd.Pause())
+    moving = during(session, state, 0.8, cmd.Joints(goal))[-1]
+    paused = during(session, moving, 3.0, cmd.Pause())[-1]
     assert paused.status is Status.PAUSED
     assert not paused.moving
     fraction = (paused.q - state.q) / (goal - state.q)
     np.testing.assert_allclose(fraction, fraction[0], rtol=0, atol=1e-9)
-    np.testing.assert_array_equal(after(session, paused, 10.0, cmd.Resume()).q, goal)
-    held = after(session, moving, 3.0, cmd.Hold())
+    np.testing.assert_array_equal(rested(session, paused, cmd.Resume()).q, goal)
+    held = during(session, moving, 3.0, cmd.Hold())[-1]
     assert not held.moving
     assert not np.allclose(held.q, goal)
 
@@ -139,10 +122,10 @@ def test_stream_is_followed_and_ends_at_rest(session: Session, state: State) -> 
     q = np.array(JOINTS.ready)
     for _ in range(200):
         q = q + np.array((0.1, 0.5, 0.0)) * DT
-        state = after(session, state, DT, cmd.Servo(q))
+        state = during(session, state, DT, cmd.Servo(q))[-1]
     # The setpoint is one tick ahead of the newest sample, where the stream will be then.
     np.testing.assert_allclose(state.q, q, rtol=0, atol=0.5 * DT * 2.1)
-    over = after(session, state, 2.0)
+    over = during(session, state, 2.0)[-1]
     assert over.servo is None
     assert not over.moving
     assert 0.0 < float(over.q[1] - state.q[1]) < 0.5

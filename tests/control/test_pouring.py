@@ -22,6 +22,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.units import ML, counted
 from katana450.settings import Settings
+from tests.ticks import ticked
 
 FULL = counted(200.0 * ML)
 
@@ -41,17 +42,9 @@ def session(robot: Robot, arm: MountedArm) -> Session:
     )
 
 
-def tick(session: Session, state: State, *commands: cmd.Command, times: int = 1) -> State:
-    for number in range(times):
-        given = commands if number == 0 else ()
-        state = session.step(state, given, state.t + 0.01)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    return state
-
-
 @pytest.fixture
 def full(session: Session) -> State:
-    return tick(session, session.begin(session.ready, 0.0, 0.0), cmd.Fill(200.0))
+    return ticked(session, session.begin(session.ready, 0.0, 0.0), cmd.Fill(200.0))
 
 
 def held_level(session: Session, state: State) -> State:
@@ -64,13 +57,13 @@ def held_level(session: Session, state: State) -> State:
     objects: tuple[SceneObject, ...] = tuple(
         held if each is cup else each for each in state.objects
     )
-    return tick(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0))
+    return ticked(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0))
 
 
 def test_water_at_rest_keeps_its_value(session: Session, full: State) -> None:
     assert full.poured is not None
     assert full.poured.water.cup.volume == FULL
-    assert tick(session, full, times=3).poured is full.poured
+    assert ticked(session, full, ticks=3).poured is full.poured
 
 
 def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State) -> None:
@@ -82,11 +75,11 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     state = replace(state, poured=replace(state.poured, water=water))
     start, seen = state.t, []
     for _ in range(1050):
-        state = tick(session, state)
+        state = ticked(session, state)
         assert state.poured is not None
         seen.append(state.poured.water)
     assert 9 <= sum(a is not b for a, b in pairwise(seen)) <= 12
-    moving = tick(session, state, cmd.Joint(1, 0.1), times=2)
+    moving = ticked(session, state, cmd.Joint(1, 0.1), ticks=2)
     assert moving.poured is not None
     assert session.pouring is not None
     flow = WaterFlow(session.pouring.water_environment(state.objects))
@@ -101,7 +94,7 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
 def test_moved_cup_keeps_its_water(session: Session, full: State) -> None:
     (cup,) = (each for each in full.objects if each.name == "cup")
     T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
-    moved = tick(session, full, cmd.PlaceObject(replace(cup, T=T)), times=50)
+    moved = ticked(session, full, cmd.PlaceObject(replace(cup, T=T)), ticks=50)
     assert moved.poured is not None
     assert moved.poured.water.cup.volume == FULL
     np.testing.assert_array_equal(moved.poured.water.cup.T, T)
@@ -112,7 +105,7 @@ def test_overturned_cup_loses_all_its_water_and_volume_is_conserved(
     session: Session, full: State
 ) -> None:
     state = held_level(session, full)
-    state = tick(session, state, cmd.Joint(5, 2.6), times=600)
+    state = ticked(session, state, cmd.Joint(5, 2.6), ticks=600)
     assert state.poured is not None
     water = state.poured.water
     assert water.total == FULL
@@ -124,17 +117,17 @@ def test_stop_during_a_pour_leaves_the_water_that_the_tilt_holds(
     session: Session, full: State
 ) -> None:
     state = held_level(session, full)
-    state = tick(session, state, cmd.Speed(0.2), cmd.Joint(5, 2.6))
+    state = ticked(session, state, cmd.Speed(0.2), cmd.Joint(5, 2.6))
     while state.poured is not None and state.poured.water.cup.volume > 0.8 * FULL:
         assert state.moving
-        state = tick(session, state)
-    state = tick(session, state, cmd.Stop(), times=500)
+        state = ticked(session, state)
+    state = ticked(session, state, cmd.Stop(), ticks=500)
     assert state.stopped is not None
     assert state.poured is not None
     assert state.poured.water.cup.volume > 0
     assert state.poured.water.total == FULL
     assert not state.poured.water.parcels
-    later = tick(session, state, times=100)
+    later = ticked(session, state, ticks=100)
     assert later.poured is not None
     # Only a film may still drain into the cup.
     assert later.poured.water.cup.kept == state.poured.water.cup.kept
@@ -150,9 +143,9 @@ def test_volume_above_the_capacity_is_refused(session: Session) -> None:
 
 
 def test_fill_without_a_cup_is_refused(session: Session, full: State) -> None:
-    gone = tick(session, full, cmd.Remove("cup"), times=2)
+    gone = ticked(session, full, cmd.Remove("cup"), ticks=2)
     assert gone.poured is None
-    assert tick(session, gone, cmd.Fill(100.0)).poured is None
+    assert ticked(session, gone, cmd.Fill(100.0)).poured is None
 
 
 def swing(session: Session, state: State, steps: tuple[float, ...]) -> tuple[float, float]:

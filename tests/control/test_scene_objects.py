@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,8 +29,8 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.ticks import TICK, until_rest
 
-TICK = 0.01
 SLIGHTLY = 2e-5  # m
 
 
@@ -64,19 +63,6 @@ def begun(session: Session, *objects: SceneObject) -> State:
     return session.step(state, [cmd.ReplaceScene(objects)], TICK)
 
 
-def run(
-    session: Session, state: State, commands: Sequence[cmd.Command], ticks: int = 600
-) -> list[State]:
-    states = []
-    for tick in range(ticks):
-        state = session.step(state, () if tick else commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        states.append(state)
-        if not state.moving:
-            return states
-    raise AssertionError("The arm never came to rest.")
-
-
 def x_of(state: State) -> FloatArray:
     return np.append(state.setpoint, state.gripper_setpoint)
 
@@ -105,7 +91,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
     )
     low = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
     state = session.step(session.begin(low, 0.0, 0.0), [cmd.ReplaceScene((scene_object,))], TICK)
-    states = run(session, state, [cmd.Joint(1, -0.6)])
+    states = until_rest(session, state, cmd.Joint(1, -0.6))
     (finding,) = states[-1].findings
     assert finding.reason is Reason.CONTACT
     assert "knot" in (finding.parts or ())
@@ -122,7 +108,7 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
             assert (local @ normals.T - heights).max(axis=1).min() > 0.0
     bare = session.begin(low, 0.0, 0.0)
     bare = session.step(bare, [cmd.ReplaceScene(()), cmd.Joint(1, -0.6)], TICK)
-    assert run(session, bare, [])[-1].findings == ()
+    assert until_rest(session, bare)[-1].findings == ()
 
 
 def test_attached_object_moves_with_the_hand(session: Session) -> None:
@@ -135,7 +121,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     assert fixed.fixed
     assert not fixed.held
     np.testing.assert_allclose(session.environment.pose(fixed, x_of(state)), before, atol=1e-12)
-    moved = run(session, state, [cmd.Joint(1, 0.4), cmd.Gripper(0.3)])[-1]
+    moved = until_rest(session, state, cmd.Joint(1, 0.4), cmd.Gripper(0.3))[-1]
     assert moved.gripper_setpoint == 0.3
     (carried,) = moved.objects
     assert carried is fixed
@@ -149,7 +135,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     hand = session.environment.hand
     assert hand is not None
     assert all(world.gap(x_of(moved), "knot", finger) == np.inf for finger in hand.fingers)
-    low = run(session, moved, [cmd.Joint(2, 0.3)])[-1]
+    low = until_rest(session, moved, cmd.Joint(2, 0.3))[-1]
     (finding,) = (each for each in low.findings if each.reason is Reason.CONTACT)
     assert set(finding.parts or ()) == {"knot", "table"}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -18,18 +17,7 @@ from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.tool import pitch_and_roll
-
-TICK = 0.01
-
-
-def run(session: Session, state: State, commands: Iterable[cmd.Command], ticks: int = 1) -> State:
-    """Run ``ticks`` ticks with an arm that follows exactly."""
-    commands = list(commands)
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        commands = []
-    return state
+from tests.ticks import TICK, ticked
 
 
 def tool_point(arm: ArmModel, state: State, q: FloatArray | None = None) -> FloatArray:
@@ -65,9 +53,9 @@ def test_nothing_moves_while_time_stands_or_runs_back(session: Session, state: S
 def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    state = run(session, state, [cmd.Turn(0.6, 0.4)], ticks=5)
+    state = ticked(session, state, cmd.Turn(0.6, 0.4), ticks=5)
     desired = np.array([0.25, 0.25, -0.05])
-    state = run(session, state, [cmd.Position(desired)], ticks=5)
+    state = ticked(session, state, cmd.Position(desired), ticks=5)
     assert np.allclose(tool_point(arm, state), desired, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.6, 0.4), abs=1e-12
@@ -77,7 +65,7 @@ def test_moving_the_tool_keeps_pitch_and_roll_without_a_yaw(
 
 def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, state: State) -> None:
     before = tool_point(arm, state)
-    state = run(session, state, [cmd.Turn(0.55, -1.0)], ticks=5)
+    state = ticked(session, state, cmd.Turn(0.55, -1.0), ticks=5)
     assert np.allclose(tool_point(arm, state), before, atol=1e-12)
     assert pitch_and_roll(session.require_arm().chain, state.goal) == pytest.approx(
         (0.55, -1.0), abs=1e-12
@@ -87,7 +75,7 @@ def test_turning_the_tool_keeps_its_position(arm: ArmModel, session: Session, st
 def test_lost_yaw_of_a_pose_is_reported(arm: ArmModel, session: Session, state: State) -> None:
     R = so3.rotation_z(math.radians(23.0)) @ so3.rotation_y(0.5)
     T = se3.from_rotation_translation(R, np.array([0.35, 0.0, 0.0]))
-    state = run(session, state, [cmd.Pose(T)])
+    state = ticked(session, state, cmd.Pose(T))
     assert isinstance(state.target, PoseTarget)
     assert np.allclose(tool_point(arm, state), T[:3, 3], atol=1e-12)
     (yaw,) = (f for f in state.findings if f.reason is Reason.YAW_FIXED)
@@ -99,7 +87,7 @@ def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     far = np.array([0.9, 0.0, 0.1])
-    state = run(session, state, [cmd.Position(far)], ticks=10)
+    state = ticked(session, state, cmd.Position(far), ticks=10)
     reached = tool_point(arm, state)
     lengths = float(np.linalg.norm(arm.tools["tcp"][:3, 3]))
     assert np.linalg.norm(reached) == pytest.approx(lengths, abs=1e-9)
@@ -112,11 +100,11 @@ def test_goal_out_of_reach_is_the_nearest_point_with_a_finding(
 
 
 def test_drag_back_into_reach_restores_the_target_pitch(session: Session, state: State) -> None:
-    home = run(session, state, [cmd.Position(np.array([0.44, 0.0, 0.0]))], ticks=5)
+    home = ticked(session, state, cmd.Position(np.array([0.44, 0.0, 0.0])), ticks=5)
     pitch, _ = pitch_and_roll(session.require_arm().chain, home.goal)
-    away = run(session, home, [cmd.Position(np.array([0.9, 0.0, 0.0]))], ticks=50)
+    away = ticked(session, home, cmd.Position(np.array([0.9, 0.0, 0.0])), ticks=50)
     assert abs(pitch_and_roll(session.require_arm().chain, away.goal)[0] - pitch) > 0.3
-    back = run(session, away, [cmd.Position(np.array([0.44, 0.0, 0.0]))], ticks=10)
+    back = ticked(session, away, cmd.Position(np.array([0.44, 0.0, 0.0])), ticks=10)
     assert pitch_and_roll(session.require_arm().chain, back.goal)[0] == pytest.approx(
         pitch, abs=1e-12
     )
@@ -125,14 +113,14 @@ def test_drag_back_into_reach_restores_the_target_pitch(session: Session, state:
 def test_end_of_a_drag_makes_the_goal_the_target_and_keeps_the_finding(
     session: Session, state: State
 ) -> None:
-    away = run(session, state, [cmd.Position(np.array([0.9, 0.0, 0.0]))], ticks=10)
+    away = ticked(session, state, cmd.Position(np.array([0.9, 0.0, 0.0])), ticks=10)
     assert not isinstance(away.target, JointTarget)
-    away = run(session, away, [cmd.EndDrag()])
+    away = ticked(session, away, cmd.EndDrag())
     assert isinstance(away.target, JointTarget)
     assert away.target.q is away.goal
     assert reasons(away) == {Reason.OUT_OF_REACH, Reason.LINKS}
     # The next target starts from the posture of the arm, and clears the reason.
-    back = run(session, away, [cmd.Turn(*pitch_and_roll(session.require_arm().chain, away.goal))])
+    back = ticked(session, away, cmd.Turn(*pitch_and_roll(session.require_arm().chain, away.goal)))
     assert np.allclose(back.goal, away.goal, atol=1e-6)
     assert reasons(back) == set()
 
@@ -142,25 +130,25 @@ def test_drag_that_ends_at_once_still_reaches_its_target(
 ) -> None:
     """One tick cannot track all of the path; the target remains after the end of the drag."""
     desired = np.array([-0.2, 0.35, 0.1])
-    released = run(session, state, [cmd.Position(desired), cmd.EndDrag()])
+    released = ticked(session, state, cmd.Position(desired), cmd.EndDrag())
     assert released.since is not None
     assert released.findings == ()
     assert math.dist(tool_point(arm, released), desired) > 0.1
-    there = run(session, released, [], ticks=15)
+    there = ticked(session, released, ticks=15)
     assert there.since is None
     assert np.allclose(tool_point(arm, there), desired, atol=1e-12)
     assert isinstance(there.target, JointTarget)
     assert there.target.q is there.goal
     # A new drag on the way replaces the target.
-    again = run(session, released, [cmd.Position(desired)], ticks=15)
+    again = ticked(session, released, cmd.Position(desired), ticks=15)
     assert np.allclose(tool_point(arm, again), desired, atol=1e-12)
     assert not isinstance(again.target, JointTarget)
     # Any other command ends the drag.
     for command in (cmd.Hold(), cmd.Home(), cmd.Joint(1, 0.1), cmd.Tool("flange")):
-        ended = run(session, released, [command])
+        ended = ticked(session, released, command)
         assert ended.since is None
         assert isinstance(ended.target, JointTarget)
-        assert (run(session, ended, [], ticks=3).goal == ended.goal).all()
+        assert (ticked(session, ended, ticks=3).goal == ended.goal).all()
 
 
 @pytest.mark.parametrize("axis", range(5))
@@ -168,7 +156,7 @@ def test_slider_at_its_end_makes_no_finding(
     arm: ArmModel, session: Session, state: State, axis: int
 ) -> None:
     end = math.radians(math.degrees(arm.chain.upper[axis]))
-    state = run(session, state, [cmd.Joint(axis + 1, math.nextafter(end, math.inf))])
+    state = ticked(session, state, cmd.Joint(axis + 1, math.nextafter(end, math.inf)))
     assert state.findings == ()
     assert state.goal[axis] <= arm.chain.upper[axis]
 
@@ -178,7 +166,7 @@ def test_slider_at_its_end_makes_no_finding(
 def test_joint_stops_at_its_limit_and_reports_it(
     arm: ArmModel, session: Session, state: State, axis: int, side: float
 ) -> None:
-    state = run(session, state, [cmd.Joint(axis + 1, side * 4.0)])
+    state = ticked(session, state, cmd.Joint(axis + 1, side * 4.0))
     limit = (arm.chain.upper if side > 0 else arm.chain.lower)[axis]
     assert state.goal[axis] == limit
     (finding,) = state.findings
@@ -190,38 +178,38 @@ def test_joint_stops_at_its_limit_and_reports_it(
 
 
 def test_zero_posture_hold_and_home(session: Session, state: State) -> None:
-    state = run(session, state, [cmd.GoToZero()])
+    state = ticked(session, state, cmd.GoToZero())
     assert (state.goal == 0.0).all()
-    state = run(session, state, [], ticks=20)
+    state = ticked(session, state, ticks=20)
     assert state.moving
-    held = run(session, state, [cmd.Hold()], ticks=100)
+    held = ticked(session, state, cmd.Hold(), ticks=100)
     assert not held.moving
     assert (held.goal == held.setpoint).all()
-    home = run(session, held, [cmd.Home()])
+    home = ticked(session, held, cmd.Home())
     assert (home.goal == session.ready).all()
 
 
 def test_tool_change_moves_nothing(arm: ArmModel, session: Session, state: State) -> None:
-    changed = run(session, state, [cmd.Tool("flange")])
+    changed = ticked(session, state, cmd.Tool("flange"))
     assert (changed.goal == state.goal).all()
     assert not changed.moving
-    moved = run(session, changed, [cmd.Position(np.array([0.25, 0.0, 0.05]))], ticks=5)
+    moved = ticked(session, changed, cmd.Position(np.array([0.25, 0.0, 0.05])), ticks=5)
     assert np.allclose(forward(arm.chain_to("flange"), moved.goal)[:3, 3], [0.25, 0.0, 0.05])
 
 
 def test_gripper_moves_at_its_speed_and_stops_at_its_limit(
     arm: ArmModel, session: Session, state: State
 ) -> None:
-    state = run(session, state, [cmd.Gripper(1.0)])
+    state = ticked(session, state, cmd.Gripper(1.0))
     assert state.gripper_goal == arm.gripper.upper
     assert reasons(state) == {Reason.GRIPPER_LIMIT}
     assert 0.0 < state.gripper_setpoint <= arm.gripper.speed * TICK * (1 + 1e-12)
-    state = run(session, state, [], ticks=100)
+    state = ticked(session, state, ticks=100)
     assert state.gripper_setpoint == arm.gripper.upper
     # A command of the arm keeps the gripper's finding; a valid gripper command clears it.
-    state = run(session, state, [cmd.Home()])
+    state = ticked(session, state, cmd.Home())
     assert reasons(state) == {Reason.GRIPPER_LIMIT}
-    assert reasons(run(session, state, [cmd.Gripper(0.0)])) == set()
+    assert reasons(ticked(session, state, cmd.Gripper(0.0))) == set()
 
 
 @pytest.mark.parametrize(
@@ -252,8 +240,8 @@ def test_ready_posture_outside_the_limits_is_refused(arm: ArmModel) -> None:
 def test_arm_keeps_its_azimuth_over_the_base(
     session: Session, state: State, point: tuple[float, float, float]
 ) -> None:
-    turned = run(session, state, [cmd.Joint(1, 0.7)])
-    over = run(session, turned, [cmd.Position(np.array(point))], ticks=10)
+    turned = ticked(session, state, cmd.Joint(1, 0.7))
+    over = ticked(session, turned, cmd.Position(np.array(point)), ticks=10)
     assert over.goal[0] == pytest.approx(0.7, abs=1e-9)
     assert np.isfinite(over.goal).all()
 
@@ -264,12 +252,12 @@ def test_limit_of_a_drag_is_no_outcome_of_the_gripper_or_the_speed(
     others: list[cmd.Command] = [cmd.Gripper(0.1), cmd.Speed(0.9)]
     far = cmd.Position(np.array([0.9, 0.0, 0.1]))
     verdicts = []
-    before = away = run(session, state, [far])
+    before = away = ticked(session, state, far)
     while away.status is Status.OK:
-        before, away = away, run(session, away, others)
+        before, away = away, ticked(session, away, *others)
         verdicts += [each.verdict for each in away.outcomes]
     assert len(verdicts) > 2
     assert set(verdicts) == {Verdict.ACCEPTED}
     # In the tick that reaches the limit, a drag is limited and not what follows it.
-    beyond = run(session, before, [far, *others])
+    beyond = ticked(session, before, far, *others)
     assert [each.verdict for each in beyond.outcomes] == [Verdict.LIMITED, *2 * [Verdict.ACCEPTED]]

@@ -19,18 +19,11 @@ from katana450.arm.control.state.stop_cause import WATCHDOG, StopCause, pressed
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.velocity import JogFrame
 from tests.control.clearing import cleared
-from tests.control.test_session import reasons, run
+from tests.control.test_session import reasons
+from tests.ticks import TICK, ticked
 
-TICK = 0.01
 ANNA = pressed("Anna", "a", "one", 1.0)
 BERT = pressed("Bert", "b", "two", 2.0)
-
-
-def ticked(session: Session, state: State, *commands: cmd.Command, ticks: int = 1) -> State:
-    for number in range(ticks):
-        state = session.step(state, commands if number == 0 else (), state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    return state
 
 
 def test_stop_is_not_cleared_while_the_arm_brakes(session: Session, state: State) -> None:
@@ -128,17 +121,17 @@ def test_profile_chooses_between_stop_and_pause() -> None:
 
 
 def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
-    paused = run(session, moving, [cmd.PauseFor(LATE)], ticks=100)
+    moving = ticked(session, state, cmd.Joint(1, 1.0), ticks=20)
+    paused = ticked(session, moving, cmd.PauseFor(LATE), ticks=100)
     assert paused.pause_cause == LATE
     assert not paused.moving
-    resumed = run(session, paused, [cmd.Resume()], ticks=300)
+    resumed = ticked(session, paused, cmd.Resume(), ticks=300)
     assert resumed.pause_cause is None
     assert not resumed.findings
     assert resumed.q[0] == 1.0
     # The pause of a person lasts, whether it came before or after.
     for pauses in ([cmd.Pause(), cmd.PauseFor(LATE)], [cmd.PauseFor(LATE), cmd.Pause()]):
-        both = run(session, moving, pauses, ticks=100)
+        both = ticked(session, moving, *pauses, ticks=100)
         assert both.paused
         assert both.pause_cause is None
 
@@ -146,8 +139,8 @@ def test_pause_by_the_server_keeps_the_path_until_resume(session: Session, state
 @pytest.fixture
 def paused(session: Session, state: State) -> State:
     """Return a state after a pause in a motion."""
-    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
-    return run(session, moving, [cmd.HoldFor(LATE)], ticks=100)
+    moving = ticked(session, state, cmd.Joint(1, 1.0), ticks=20)
+    return ticked(session, moving, cmd.HoldFor(LATE), ticks=100)
 
 
 @pytest.mark.parametrize(
@@ -167,9 +160,9 @@ def test_paused_arm_rests_until_the_next_command(
     assert paused.status is Status.PAUSED
     assert reasons(paused) == {Reason.WAITING, Reason.LOOP_LATE}
     assert not paused.moving
-    later = run(session, paused, [], ticks=100)
+    later = ticked(session, paused, ticks=100)
     np.testing.assert_array_equal(later.q, paused.q)
-    assert not run(session, later, [command]).waits
+    assert not ticked(session, later, command).waits
 
 
 def test_plan_that_begins_elsewhere_keeps_a_pause(
@@ -177,7 +170,7 @@ def test_plan_that_begins_elsewhere_keeps_a_pause(
 ) -> None:
     elsewhere = plan_to(session.require_arm(), None, state, paused.goal)
     for _ in range(2):
-        paused = run(session, paused, [cmd.Follow(elsewhere)])
+        paused = ticked(session, paused, cmd.Follow(elsewhere))
         assert paused.status is Status.PAUSED
         assert reasons(paused) == {Reason.WAITING, Reason.LOOP_LATE, Reason.NOT_AT_START}
         assert len(paused.findings) == 3
@@ -185,14 +178,14 @@ def test_plan_that_begins_elsewhere_keeps_a_pause(
 
 @pytest.mark.parametrize("command", [cmd.Speed(0.5), cmd.SetPriority(Priority.PITCH)])
 def test_settings_keep_a_pause(session: Session, paused: State, command: cmd.Command) -> None:
-    assert run(session, paused, [command]).waits
+    assert ticked(session, paused, command).waits
 
 
 def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State) -> None:
-    moving = run(session, state, [cmd.Joint(1, 1.0)], ticks=20)
-    stopped = run(session, moving, [cmd.Stop(finding=LATE)], ticks=100)
+    moving = ticked(session, state, cmd.Joint(1, 1.0), ticks=20)
+    stopped = ticked(session, moving, cmd.Stop(finding=LATE), ticks=100)
     assert reasons(stopped) == {Reason.STOPPED, Reason.LOOP_LATE}
-    again = run(session, stopped, [cmd.Stop()])
+    again = ticked(session, stopped, cmd.Stop())
     assert reasons(again) == {Reason.STOPPED, Reason.LOOP_LATE}
     assert reasons(cleared(session, again)) == set()
 
@@ -200,15 +193,15 @@ def test_stop_keeps_its_cause_until_it_is_cleared(session: Session, state: State
 def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(
     session: Session, state: State
 ) -> None:
-    moving = run(session, state, [cmd.Speed(0.5), cmd.Joint(1, 1.0)], ticks=20)
+    moving = ticked(session, state, cmd.Speed(0.5), cmd.Joint(1, 1.0), ticks=20)
     assert moving.moving
     kept = at_rest(moving)
     begun = session.begin(kept.q, kept.gripper, 5.0)
     first = restarted(begun, kept)
     assert reasons(first) == {Reason.STOPPED, Reason.RESTARTED}
     assert (first.speed, first.objects, first.status) == (0.5, moving.objects, Status.STOPPED)
-    later = run(session, first, [], ticks=50)
+    later = ticked(session, first, ticks=50)
     np.testing.assert_array_equal(later.q, moving.q)
-    cleared = run(session, later, [cmd.ClearStop()], ticks=50)
+    cleared = ticked(session, later, cmd.ClearStop(), ticks=50)
     np.testing.assert_array_equal(cleared.q, moving.q)
     assert restarted(begun, None).stopped is not None

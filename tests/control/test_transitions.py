@@ -33,8 +33,7 @@ from katana450.maths.kinematics.branch import BRANCHES
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.priority import Priority
 from tests.control.test_traits import examples
-
-TICK = 0.01
+from tests.ticks import ticked
 
 COMMANDS = classes_of(cmd.Command)
 
@@ -42,20 +41,12 @@ FAR = np.array([-0.2, 0.35, 0.1])
 """[m] A target farther than a drag moves in one tick."""
 
 
-def run(session: Session, state: State, commands: list[cmd.Command], ticks: int = 1) -> State:
-    """Run ``ticks`` ticks, with ``commands`` in each of them."""
-    for _ in range(ticks):
-        state = session.step(state, commands, state.t + TICK)
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-    return state
-
-
 def followed(session: Session, state: State) -> State:
     """Return ``state`` in the middle of a plan."""
     goal = np.array(state.setpoint)
     goal[0] += 0.8
     plan = plan_to(session.require_arm(), session.world_at(state), state, goal)
-    return run(session, run(session, state, [cmd.Follow(plan)]), [], 60)
+    return ticked(session, ticked(session, state, cmd.Follow(plan)), ticks=60)
 
 
 OF_FIVE_AXES = [each for each in COMMANDS if each not in (cmd.Orient, cmd.TurnElbow)]
@@ -103,7 +94,7 @@ def streamed(session: Session, state: State) -> State:
     """Return ``state`` in a stream that turns axis 1."""
     for number in range(10):
         q: FloatArray = session.ready + np.array([0.003 * number, 0.0, 0.0, 0.0, 0.0])
-        state = run(session, state, [cmd.Servo(q)])
+        state = ticked(session, state, cmd.Servo(q))
     return state
 
 
@@ -111,18 +102,20 @@ def left(session: Session, state: State) -> State:
     """Return ``state`` that brakes along a plan, and will jog from there."""
     state = followed(session, state)
     assert isinstance(state.mode, Following)
-    jogged = run(session, state, [example(session, state, cmd.Jog)])
+    jogged = ticked(session, state, example(session, state, cmd.Jog))
     assert isinstance(jogged.intent, Jogging)
     return replace(jogged, mode=Leaving(state.mode, jogged.intent))
 
 
 BEGINNINGS: dict[type[Mode], Callable[[Session, State], State]] = {
     Idle: lambda _, state: state,
-    Positioning: lambda session, state: run(
-        session, state, [example(session, state, cmd.Pose), cmd.Joint(1, 0.9)], 5
+    Positioning: lambda session, state: ticked(
+        session, state, example(session, state, cmd.Pose), cmd.Joint(1, 0.9), ticks=5, every=True
     ),
-    Tracking: lambda session, state: run(session, state, [cmd.Position(FAR)]),
-    Jogging: lambda session, state: run(session, state, [example(session, state, cmd.Jog)], 5),
+    Tracking: lambda session, state: ticked(session, state, cmd.Position(FAR)),
+    Jogging: lambda session, state: ticked(
+        session, state, example(session, state, cmd.Jog), ticks=5, every=True
+    ),
     Servoing: streamed,
     Following: followed,
     Leaving: left,
@@ -164,7 +157,7 @@ def test_each_command_has_its_effect_in_each_mode(
     assert isinstance(before.mode, mode)
     command = example(shipped, before, kind)
     row, effect = row_of(kind), effect_of(command, before)
-    after = run(shipped, before, [command])
+    after = ticked(shipped, before, command)
     if kind is cmd.Follow and not before.motion.at_rest:
         found = [each.reason for each in after.findings]
         # A jog reports its own findings in every tick.
@@ -182,7 +175,7 @@ def test_each_command_has_its_effect_in_each_mode(
         case Effect.SUPERSEDES:
             assert type(after.intent) is row.begins
         case Effect.REFUSED:
-            assert trace(after) == trace(run(shipped, before, []))
+            assert trace(after) == trace(ticked(shipped, before))
             assert type(after.intent) is type(before.intent)
 
 
@@ -190,35 +183,35 @@ def test_each_command_has_its_effect_in_each_mode(
 def test_stop_refuses_all_commands_but_the_listed(
     shipped: Session, begun: dict[type[Mode], State], kind: type[cmd.Command]
 ) -> None:
-    stopped = run(shipped, begun[Jogging], [cmd.Stop()])
+    stopped = ticked(shipped, begun[Jogging], cmd.Stop())
     assert stopped.stopped is not None
     command = example(shipped, begun[Jogging], kind)
     if kind is cmd.ClearStop:
-        stopped = run(shipped, stopped, [], 120)
-    after = run(shipped, stopped, [command, cmd.Batch((cmd.Speed(0.9),))])
+        stopped = ticked(shipped, stopped, ticks=120)
+    after = ticked(shipped, stopped, command, cmd.Batch((cmd.Speed(0.9),)))
     assert isinstance(after.mode, Idle)
     # Only ClearStop ends a stop.
     assert (after.stopped is None) == (kind is cmd.ClearStop)
     if not kind.traits.while_stopped:
         assert effect_of(command, stopped) is Effect.REFUSED
-        idle = run(shipped, stopped, [cmd.Speed(0.9)])
+        idle = ticked(shipped, stopped, cmd.Speed(0.9))
         assert trace(after) == trace(idle)
 
 
 def test_jog_is_refused_during_a_pause(shipped: Session) -> None:
     state = shipped.begin(shipped.ready, 0.0, 0.0)
-    paused = run(shipped, state, [cmd.Pause()])
+    paused = ticked(shipped, state, cmd.Pause())
     command = example(shipped, state, cmd.Jog)
     assert effect_of(command, paused) is Effect.REFUSED
-    after = run(shipped, paused, [command], 20)
+    after = ticked(shipped, paused, command, ticks=20, every=True)
     assert after.findings == (Finding(Reason.PAUSED),)
-    assert isinstance(run(shipped, after, [cmd.Resume()], 20).mode, Idle)
+    assert isinstance(ticked(shipped, after, cmd.Resume(), ticks=20, every=True).mode, Idle)
     np.testing.assert_array_equal(after.setpoint, state.setpoint)
 
 
 def test_batch_has_the_effects_of_its_commands(
     shipped: Session, begun: dict[type[Mode], State]
 ) -> None:
-    after = run(shipped, begun[Jogging], [cmd.Batch((cmd.Speed(0.3), cmd.Home()))])
+    after = ticked(shipped, begun[Jogging], cmd.Batch((cmd.Speed(0.3), cmd.Home())))
     assert after.speed == 0.3
     assert isinstance(after.mode, Positioning)

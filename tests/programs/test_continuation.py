@@ -24,6 +24,7 @@ from katana450.extensions.programs.steps.pouring import POURING
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
 from tests.programs.conftest import TICK, Stage
+from tests.ticks import rested
 
 SCRIPT = """\
 name: Interrupted
@@ -46,17 +47,6 @@ def program(stage: Stage) -> Program:
     return stage.planned(SCRIPT)
 
 
-def given(stage: Stage, state: State, *commands: cmd.Command) -> State:
-    """Return the state in which ``commands`` are done and the arm is at rest."""
-    for _ in range(3000):
-        state = stage.session.step(state, commands, state.t + TICK)
-        state = stage.session.observe(state, state.setpoint, state.gripper_setpoint)
-        commands = ()
-        if not state.moving:
-            return state
-    raise AssertionError("The arm does not come to rest.")
-
-
 def stopped_after(
     stage: Stage, program: Program, ticks: int, start: State | None = None
 ) -> tuple[Run, State]:
@@ -73,7 +63,7 @@ def stop(stage: Stage, program: Program, run: Run, state: State) -> tuple[Run, S
     for _ in range(math.ceil(HOLD_OFF / TICK) + 100):
         run, state = stage.tick(program, run, state)
     assert run.phase is Phase.STOPPED
-    state = given(stage, state, cmd.ClearStop())
+    state = rested(stage.session, state, cmd.ClearStop())
     assert state.stopped is None
     return run, state
 
@@ -150,7 +140,7 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
     run, state = stopped_after(stage, program, 60)
     interruption = interruption_of(program, run, state)
     stood = state.setpoint
-    state = given(stage, state, cmd.Joints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
+    state = rested(stage.session, state, cmd.Joints(stood + np.array([0.3, 0.1, -0.1, 0.2, 0.4])))
     rest = continued(interruption, stage.plan_context, state)
     added = rest.tasks[rest.first : rest.first + 2]
     assert [task.name for task in added] == ["move: speed", RETURN]
@@ -166,7 +156,7 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
 def test_tool_frame_of_the_run_is_selected_again(stage: Stage, program: Program) -> None:
     run, state = stopped_after(stage, program, 60)
     interruption = interruption_of(program, run, state)
-    state = given(stage, state, cmd.Tool("flange"))
+    state = rested(stage.session, state, cmd.Tool("flange"))
     states = played(stage, continued(interruption, stage.plan_context, state), state)
     assert (states[0].tool, states[-1].tool) == ("flange", "tcp")
 
@@ -183,7 +173,7 @@ def test_changed_surroundings_are_refused_by_name(
         "gripper": cmd.Gripper(stage.plan_context.arm.gripper.upper),
         "scene": cmd.PlaceObject(SceneObject("box", Shape.BOX, (0.05, 0.05, 0.05), T)),
     }
-    state = given(stage, state, commands[changed])
+    state = rested(stage.session, state, commands[changed])
     assert changed in interruption.changed_to(state)
     with pytest.raises(InputError, match=changed):
         continued(interruption, stage.plan_context, state)
@@ -239,15 +229,15 @@ def test_full_cup_returns_straight_or_not_at_all(stage: Stage, pour: Program) ->
         run, state = stage.tick(pour, run, state)
     run, state = stop(stage, pour, run, state)
     interruption = interruption_of(pour, run, state)
-    aside = given(stage, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
+    aside = rested(stage.session, state, cmd.Joints(state.setpoint + np.array([0.4, 0, 0, 0, 0])))
     rest = continued(interruption, stage.plan_context, aside)
     assert any(task.name == RETURN for task in rest.tasks)
     T = np.eye(4)
     chain = stage.plan_context.arm.chain_to("tcp")
     middle = forward(chain, 0.5 * (state.setpoint + aside.setpoint))
     T[:2, 3] = (stage.plan_context.T_base_shoulder @ middle)[:2, 3]
-    walled = given(
-        stage, aside, cmd.PlaceObject(SceneObject("wall", Shape.BOX, (0.02, 0.02, 0.6), T))
+    walled = rested(
+        stage.session, aside, cmd.PlaceObject(SceneObject("wall", Shape.BOX, (0.02, 0.02, 0.6), T))
     )
     known = replace(interruption, situation=interruption_of(pour, run, walled).situation)
     with pytest.raises(BlockedError, match="straight back"):

@@ -17,7 +17,8 @@ from katana450.extensions.programs.run.runner import Phase, Run
 from katana450.extensions.programs.run.simulation import Timeline, moments
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.server.step_list import current_step, page, steps_of
-from tests.programs.conftest import TICK, Stage
+from tests.programs.conftest import Stage
+from tests.ticks import TICK, ticked
 
 HEAD = "frame: base\nsteps:\n"
 
@@ -51,9 +52,7 @@ def planned(stage: Stage, text: str, state: State) -> Program:
 
 
 def with_water(stage: Stage, ml: float) -> State:
-    state = stage.begin()
-    state = stage.session.step(state, (cmd.Fill(ml),), state.t + TICK)
-    return stage.session.observe(state, state.setpoint, state.gripper_setpoint)
+    return ticked(stage.session, stage.begin(), cmd.Fill(ml))
 
 
 def turned(state: State, end: State, axis: int) -> float:

@@ -11,7 +11,6 @@ import yourdfpy
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject, Shape
-from katana450.arm.control.state.state import State
 from katana450.arm.robot.collision import hand_of, world_of
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
@@ -22,6 +21,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.settings import Settings
 from tests.collision.distances import distances
 from tests.robot.public_arms import PX150, urdf
+from tests.ticks import rested
 
 BOX = '<link name="{0}"><{1}><geometry><box size="{2}"/></geometry></{1}></link>'
 THICK = 0.01
@@ -85,24 +85,13 @@ def test_no_distance_changes_more_than_their_bodies_travel(
         x = np.append(rng.uniform(-0.5, 0.5, 5), rng.uniform(0.015, 0.037))
         step = np.append(0.01 * rng.uniform(-1.0, 1.0, 5) * rng.integers(0, 2), 0.0)
         step[5] = rng.uniform(0.015, 0.037) - x[5]
-        here, there = around.at(x), around.at(x + step)
-        change = np.abs(distances(there, pairs) - distances(here, pairs))
-        apart = distances(here, pairs) > 0.0
-        travel = around.travel(here, x, x + step)
+        placed, moved = around.at(x), around.at(x + step)
+        change = np.abs(distances(moved, pairs) - distances(placed, pairs))
+        apart = distances(placed, pairs) > 0.0
+        travel = around.travel(placed, x, x + step)
         assert (change <= travel + 2e-6)[apart].all()
         tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
     assert tightest > 0.5
-
-
-def run(session: Session, state: State, *commands: cmd.Command) -> State:
-    """Tick until the arm rests."""
-    state = session.step(state, commands, state.t + 0.01)
-    for _ in range(300):
-        state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        if not state.moving:
-            return state
-        state = session.step(state, (), state.t + 0.01)
-    raise AssertionError(f"still on its way: {state.findings}")
 
 
 def test_they_hold_and_release_an_object(
@@ -116,10 +105,10 @@ def test_they_hold_and_release_an_object(
     scene_object = SceneObject("block", Shape.BOX, (0.02, width, 0.02), T, can_be_held=True)
     session = Session(arm, ready, world, hand=hand_of(robot, world), objects=(scene_object,))
     state = session.begin(ready, arm.gripper.upper, 0.0)
-    state = run(session, state, cmd.Gripper(arm.gripper.lower))
+    state = rested(session, state, cmd.Gripper(arm.gripper.lower))
     (held,) = state.objects
     assert held.held
     inside = 0.5 * (width + THICK)
     assert state.gripper_setpoint == pytest.approx(inside, abs=1e-3)
-    left = run(session, state, cmd.Gripper(state.gripper_setpoint + 2e-3))
+    left = rested(session, state, cmd.Gripper(state.gripper_setpoint + 2e-3))
     assert not left.objects[0].held

@@ -16,7 +16,8 @@ from katana450.assembly.robot_session import DescribedRobot, describe_robot
 from katana450.extensions.touch.touch_model import TouchModel
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-from tests.control.test_grip import AT, BEFORE, OPEN, before_cup, run
+from tests.control.test_grip import AT, BEFORE, OPEN, before_cup
+from tests.ticks import rested
 from tests.view.conftest import server
 
 __all__ = ["server"]
@@ -50,11 +51,11 @@ def around(session: Session, arm: MountedArm) -> State:
     """The state with open fingers around the cup, on the table."""
     state = session.begin(session.ready, 0.0, 0.0)
     commands: tuple[Any, ...] = (cmd.Gripper(OPEN), cmd.Tool("grasp"))
-    state = run(session, state, *commands)
+    state = rested(session, state, *commands)
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back)
         plan = plan_to(arm, session.world_at(state), state, q)
-        state = run(session, state, cmd.Follow(plan))
+        state = rested(session, state, cmd.Follow(plan))
     assert np.isclose(state.gripper, OPEN)
     return state
 
@@ -62,4 +63,4 @@ def around(session: Session, arm: MountedArm) -> State:
 @pytest.fixture(scope="session")
 def holding(session: Session, around: State) -> State:
     """The state after the fingers were closed with all their force."""
-    return run(session, around, cmd.Gripper(-0.44))
+    return rested(session, around, cmd.Gripper(-0.44))
