@@ -53,25 +53,25 @@ def fine_force(body: SolidBody, R: FloatArray, middle: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("depth", [0.5e-3, 0.7e-3, 1e-3, 1.5e-3, 2e-3])
-@pytest.mark.parametrize("beside", [0.0, 0.31e-3, 1.4e-3])
+@pytest.mark.parametrize("aside", [0.0, 0.31e-3, 1.4e-3])
 def test_cylinder_on_plane_is_within_two_percent_of_the_closed_form(
-    flat: Pad, depth: float, beside: float
+    flat: Pad, depth: float, aside: float
 ) -> None:
     body = body_of(thing(Shape.CYLINDER, RADIUS, 0.09))
-    middle = np.array((0.5 * LENGTH + beside, depth - RADIUS, 0.0))
-    found = pressed(flat, body.depth(flat.points - middle))
+    middle = np.array((0.5 * LENGTH + aside, depth - RADIUS, 0.0))
+    pressure = pressed(flat, body.depth(flat.points - middle))
     # The integral of the distance to the surface over the width of the contact, and its limit for
     # shallow contacts (Johnson, section 4.3).
     h = RADIUS - depth
     half_width = math.sqrt(RADIUS**2 - h**2)
     exact = STIFFNESS * WIDTH * (RADIUS * half_width - h**2 * math.asinh(half_width / h))
     shallow = STIFFNESS * WIDTH * 4.0 / 3.0 * depth * math.sqrt(2.0 * RADIUS * depth)
-    assert found.force == pytest.approx(exact, rel=0.005)
-    assert found.force == pytest.approx(shallow, rel=0.02 if depth < 1.8e-3 else 0.025)
-    assert found.centre is not None
-    np.testing.assert_allclose(found.centre, (0.5 * LENGTH + beside, 0.0), rtol=0, atol=2e-4)
-    assert found.pressure.shape == (ROWS, COLUMNS)
-    assert (found.pressure * flat.taxel_areas).sum() == pytest.approx(found.force)
+    assert pressure.force == pytest.approx(exact, rel=0.005)
+    assert pressure.force == pytest.approx(shallow, rel=0.02 if depth < 1.8e-3 else 0.025)
+    assert pressure.centre is not None
+    np.testing.assert_allclose(pressure.centre, (0.5 * LENGTH + aside, 0.0), rtol=0, atol=2e-4)
+    assert pressure.pressure.shape == (ROWS, COLUMNS)
+    assert (pressure.pressure * flat.taxel_areas).sum() == pytest.approx(pressure.force)
 
 
 @pytest.mark.parametrize("depth", [0.5e-3, 1.1e-3])
@@ -91,19 +91,19 @@ def test_other_shapes_agree_with_a_fine_integration(
     c, s = math.cos(angle), math.sin(angle)
     R = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
     middle = np.array((13.3e-3, depth - half, 0.7e-3))
-    found = pressed(flat, body.depth((flat.points - middle) @ R)).force
-    assert found == pytest.approx(fine_force(body, R, middle), rel=0.02)
-    assert found > 0.05
+    force = pressed(flat, body.depth((flat.points - middle) @ R)).force
+    assert force == pytest.approx(fine_force(body, R, middle), rel=0.02)
+    assert force > 0.05
 
 
 def test_depth_stops_at_the_thickness_of_the_pad(flat: Pad) -> None:
-    found = pressed(flat, np.full(len(flat.points), 1.0))
-    assert found.force == pytest.approx(STIFFNESS * THICKNESS * LENGTH * WIDTH)
+    pressure = pressed(flat, np.full(len(flat.points), 1.0))
+    assert pressure.force == pytest.approx(STIFFNESS * THICKNESS * LENGTH * WIDTH)
 
 
 def test_untouched_pad_has_no_force_and_no_centre(flat: Pad) -> None:
-    found = pressed(flat, np.full(len(flat.points), -1e-3))
-    assert (found.force, found.centre) == (0.0, None)
+    pressure = pressed(flat, np.full(len(flat.points), -1e-3))
+    assert (pressure.force, pressure.centre) == (0.0, None)
 
 
 def test_bodies_have_their_volume_and_depth() -> None:
@@ -113,5 +113,5 @@ def test_bodies_have_their_volume_and_depth() -> None:
     prism = body_of(thing(Shape.MESH))
     assert prism.volume == pytest.approx(8 * 9e-3**2 * math.tan(math.pi / 8) * 14e-3)
     assert len(prism.normals) == 10
-    at = np.array(((0.0, 0.0, -6e-3), (8e-3, 0.0, 0.0), (0.0, 10e-3, 0.0)))
-    np.testing.assert_allclose(prism.depth(at), (1e-3, 1e-3, -1e-3), rtol=0, atol=1e-8)
+    places = np.array(((0.0, 0.0, -6e-3), (8e-3, 0.0, 0.0), (0.0, 10e-3, 0.0)))
+    np.testing.assert_allclose(prism.depth(places), (1e-3, 1e-3, -1e-3), rtol=0, atol=1e-8)

@@ -44,9 +44,9 @@ def test_patches_show_what_is_pressed_and_vanish(
     assert patches._pads == []
     shown.append(holding)
     patches.follow()
-    found = model.squeeze(holding)
-    assert found is not None
-    pressures = found.pads
+    squeeze = model.squeeze(holding)
+    assert squeeze is not None
+    pressures = squeeze.pads
     for pad in patches._pads:
         node = pad._node
         assert node.visible
@@ -56,18 +56,18 @@ def test_patches_show_what_is_pressed_and_vanish(
         assert 16 <= drawn[:128].sum() < 64
         assert drawn[128:144].sum() == drawn[144:].sum() > 0
         # The rims are white at the centre of pressure; the force stands behind the finger there.
-        (touch,) = (each for each in pressures if each.finger in node.name)
+        (touch,) = (pressure for pressure in pressures if pressure.finger in node.name)
         assert touch.centre is not None
-        at = 16 * touch.centre[0] / pad._pad.length
+        place = 16 * touch.centre[0] / pad._pad.length
         colours = np.asarray(node.batched_colors)
         white = np.flatnonzero(
             (colours == colours.max(axis=0)).all(axis=1) & (np.ptp(colours, axis=1) == 0)
         )
-        assert white.tolist() == [128 + int(at), 144 + int(at)]
+        assert white.tolist() == [128 + int(place), 144 + int(place)]
         assert pad._label.visible
         assert pad._label.text == f"{touch.force:.1f} N"
         away = np.linalg.norm(
-            np.asarray(pad._label.position) - pad._pad.middles[int(at)].mean(axis=0)
+            np.asarray(pad._label.position) - pad._pad.middles[int(place)].mean(axis=0)
         )
         assert away == pytest.approx(0.03)
         assert len(np.unique(np.asarray(node.batched_colors)[drawn], axis=0)) > 1

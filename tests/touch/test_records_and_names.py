@@ -27,10 +27,10 @@ ROD = SceneObject(
 
 
 def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -> None:
-    seen: list[State] = []
+    states: list[State] = []
 
     def commands(tick: int, state: State) -> Iterator[cmd.Command]:
-        seen.append(state)
+        states.append(state)
         if tick == 0:
             yield cmd.Gripper(OPEN)
         elif tick == 60:
@@ -44,8 +44,8 @@ def test_grip_and_slip_are_identical_to_the_bit_in_a_recording(tmp_path: Path) -
             yield cmd.Joint(2, state.q[1] - 0.1)
 
     path = record_session(tmp_path / "slip.mcap", 320, commands)
-    assert len({state.squeeze for state in seen}) == 3
-    sliding = [s for s in seen if any(each.reason is Reason.SLIDING for each in s.findings)]
+    assert len({state.squeeze for state in states}) == 3
+    sliding = [s for s in states if any(finding.reason is Reason.SLIDING for finding in s.findings)]
     places = {s.held.T.tobytes() for s in sliding if s.held is not None}
     assert len(places) == len(sliding) > 20, "it slides in each tick"
     with RecordingFile.open(path) as file:
