@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from katana450.arm.control.session.session import Session
 from katana450.assembly.robot_session import DescribedRobot, find_robot
 from katana450.client import Client
 from katana450.resources import URDF_PATH
@@ -14,6 +15,7 @@ from katana450.server.web.access_links import AccessFile
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.browser.shared_server import SharedServer
+from tests.gateway.test_hub import Table
 from tests.gateway.virtual import VirtualServer
 
 
@@ -41,6 +43,12 @@ def guarded(described: DescribedRobot, file: AccessFile) -> Iterator[VirtualServ
     """Return a new server in this process that requires links."""
     with VirtualServer(described, access=file) as server:
         yield server
+
+
+@pytest.fixture
+def table(session: Session) -> Table:
+    """Return a hub with its arm at rest, without a server."""
+    return Table(session.begin(session.ready, 0.0, 0.0))
 
 
 @pytest.fixture

@@ -348,8 +348,6 @@ def test_admin_and_driver_get_in_while_viewers_hold_all_websockets(
         assert await welcome(driver)
         await driving.say("stop")
         await driving.wait(stop="confirmed")
-        for each in (driving, *crowd):
-            await each.close()
 
     guarded.run(act(guarded))
 

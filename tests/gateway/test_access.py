@@ -14,6 +14,7 @@ import time
 import urllib.request
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -55,8 +56,13 @@ def test_roles_grant_exactly_their_rights(guarded: VirtualServer, file: AccessFi
     async def act() -> None:
         cookies = [await guarded.enter(give(file, role)) for role in Role]
         watcher, driver, boss = [await guarded.control(cookie) for cookie in cookies]
-        for request in ("acquire", "take", "ask", "home"):
-            await watcher.say(request)
+        acts: list[tuple[str, dict[str, Any]]] = [
+            *((act, {}) for act in ("acquire", "take", "ask", "home")),
+            ("speed", {"value": 1.0}),
+            ("jog", {"rates": [0.1, 0.0, 0.0, 0.0, 0.0]}),
+        ]
+        for act, fields in acts:
+            await watcher.say(act, **fields)
             assert "only watch" in (await watcher.notice("refused"))["why"]
         await driver.say("joint", axis=1, value=0.2)
         assert (await watcher.wait(holder="Operator"))["role"] == "viewer"
@@ -77,8 +83,6 @@ def test_roles_grant_exactly_their_rights(guarded: VirtualServer, file: AccessFi
         assert watcher.status["stopped"] is not None
         await driver.clear_stop()
         await watcher.wait(stopped=None)
-        for each in (watcher, driver, boss):
-            await each.close()
 
     guarded.run(act())
 

@@ -21,7 +21,6 @@ from katana450.arm.control.actor import SERVER, Actor, Grounds
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Role
 from katana450.arm.control.session.outcome import DROPPED
-from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import ACCEPTED, Finding, Outcome, Reason
 from katana450.errors import LeaseError
 from katana450.extensions.undo import UndoRequests
@@ -37,11 +36,6 @@ from tests.gateway.test_hub import PAGES, FakeArm, Table
 from tests.viser_bridge import internals
 
 CLIENT = 7
-
-
-@pytest.fixture
-def table(session: Session) -> Table:
-    return Table(session.begin(session.ready, 0.0, 0.0))
 
 
 def test_actor_travels_with_its_grounds(table: Table) -> None:

@@ -167,11 +167,6 @@ def moves(table: Table) -> bool:
     return table.arm.moves
 
 
-@pytest.fixture
-def table(session: Session) -> Table:
-    return Table(session.begin(session.ready, 0.0, 0.0))
-
-
 def test_first_window_to_use_a_control_gets_the_lease(table: Table) -> None:
     first, second = (table.join(page) for page in PAGES)
     assert [first.person.name, second.person.name] == ["Window 1", "Window 2"]
@@ -188,29 +183,6 @@ def test_window_without_control_socket_cannot_drive(table: Table) -> None:
     table.hub.leave(participant)
     with pytest.raises(LeaseError, match="start page"):
         table.touch(participant.person.key)
-
-
-def test_viewer_role_can_only_stop(table: Table) -> None:
-    watcher = table.join(PAGES[0], Role.VIEWER, "Vera")
-    acts: list[Callable[[], object]] = [
-        lambda: table.touch(watcher.person.key),
-        lambda: table.hub.acquire(watcher),
-        lambda: table.hub.take(watcher),
-        lambda: table.hub.request(watcher),
-        lambda: table.hub.move(
-            watcher, cmd.Jog(np.array((0.1, 0.0, 0.0, 0.0, 0.0)), JogFrame.BASE)
-        ),
-        lambda: table.hub.move(watcher, cmd.Speed(1.0)),
-    ]
-    for act in acts:
-        with pytest.raises(LeaseError):
-            act()
-    assert (table.arm.holds, table.arm.stops, table.arm.fraction) == (0, 0, 1.0)
-    table.stop("Vera")
-    assert table.arm.stops == 1
-    with pytest.raises(LeaseError):
-        table.hub.move(watcher, cmd.ClearStop())
-    assert table.hub.stopped is not None
 
 
 def test_stopped_arm_moves_only_after_clear_stop(table: Table) -> None:

@@ -144,38 +144,17 @@ VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")
 ODA = Identity("oda", "Oda", Role.OPERATOR, "Oda")
 
 
-class Room:
-    """A hub with a viewer, an operator, an arm and a clock that tests set."""
-
-    def __init__(self, session: Session) -> None:
-        self.t = 100.0
-        self.hub = Hub(lambda: self.t)
-        self.arm = FakeArm(session.begin(session.ready, 0.0, 0.0))
-        self.hub.gate.arm = cast(Any, self.arm)
-        self.vera, self.oda = (self.join(each) for each in (VERA, ODA))
-
-    def join(self, identity: Identity) -> Participant:
-        return self.hub.join(identity, "a-page-of-this-person", lambda _: None)
-
-    def clear(self) -> None:
-        self.hub.move(self.oda, cmd.ClearStop())
-
-
-@pytest.fixture
-def room(session: Session) -> Room:
-    return Room(session)
-
-
-def test_every_press_of_an_absent_person_stops_the_arm(room: Room) -> None:
-    room.hub.people.kick(VERA, 60.0)
+def test_every_press_of_an_absent_person_stops_the_arm(table: Table) -> None:
+    driver = table.join(PAGES[0])
+    table.hub.people.kick(VERA, 60.0)
     for _ in range(2):
-        room.hub.stop(actor_of(VERA, CommandChannel.PAGE))
-        assert room.hub.stopped is not None
-        room.clear()
+        table.hub.stop(actor_of(VERA, CommandChannel.PAGE))
+        assert table.hub.stopped is not None
+        table.hub.move(driver, cmd.ClearStop())
 
 
-def test_people_are_shown_while_they_are_connected_or_kept_out(room: Room) -> None:
-    people = room.hub.people
+def test_people_are_shown_while_they_are_connected_or_kept_out(table: Table) -> None:
+    people = table.hub.people
     connection = Connection(VERA, "127.0.0.1")
 
     def shown() -> list[Identity]:
@@ -186,9 +165,9 @@ def test_people_are_shown_while_they_are_connected_or_kept_out(room: Room) -> No
         assert people.kick(VERA, 60.0) == 1
         assert connection.kicked.is_set()
     assert shown() == [VERA]
-    room.t += 59.0
+    table.t += 59.0
     assert (people.kept_out("vera"), shown()) == (1.0, [VERA])
-    room.t += 1.0
+    table.t += 1.0
     assert (people.kept_out("vera"), shown()) == (0.0, [])
     people.kick(VERA, math.inf)
     assert shown() == []
@@ -199,10 +178,10 @@ def test_people_are_shown_while_they_are_connected_or_kept_out(room: Room) -> No
 
 
 def test_connected_and_absent_people_are_never_forgotten(
-    room: Room, monkeypatch: pytest.MonkeyPatch
+    table: Table, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(people_module, "MAX_REMEMBERED", 3)
-    people = room.hub.people
+    people = table.hub.people
     kept = [Identity(name, name, Role.VIEWER) for name in ("present", "absent")]
     connections = [Connection(each, "127.0.0.1") for each in kept]
     for connection in connections:
@@ -217,11 +196,6 @@ def test_connected_and_absent_people_are_never_forgotten(
             assert visitor in people.shown.values()
         assert list(people.shown.values()) == kept
     assert len(people._known) <= 4
-
-
-@pytest.fixture
-def table(session: Session) -> Table:
-    return Table(session.begin(session.ready, 0.0, 0.0))
 
 
 def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) -> None:

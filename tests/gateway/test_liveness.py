@@ -47,11 +47,6 @@ class Received(LastHeartbeat):
         return self.received
 
 
-@pytest.fixture
-def table(session: Session) -> Table:
-    return Table(session.begin(session.ready, 0.0, 0.0))
-
-
 def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) -> None:
     driver = table.join(PAGES[0])
     table.touch(driver.person.key)

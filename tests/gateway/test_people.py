@@ -84,9 +84,6 @@ def test_admin_sees_everybody_with_all_connections(
             assert (await asked(nobody, "kick", person=1))["why"] == "Only an admin may do this."
         await other.close()
         assert len((await listed(admin))["Oda"]["connections"]) == 2
-        for each in (admin, watcher, driver):
-            await each.close()
-        await program.close()
 
     guarded.run(act())
 
@@ -126,7 +123,6 @@ def test_kicked_person_is_disconnected_and_comes_back_later(
         assert (await asked(admin, "kick", person=kai, seconds=0.5))["is"] == "done"
         await asyncio.sleep(0.6)
         assert await guarded.enter(token)
-        await admin.close()
 
     guarded.run(act())
 
@@ -151,7 +147,6 @@ def test_revoked_link_is_gone_from_the_access_file(
         assert "Rita" not in await listed(admin)
         bearer = f"Bearer {token}"
         assert (await guarded.request("/api/v1/stop", b"", Authorization=bearer))[0] == 401
-        await admin.close()
 
     guarded.run(act())
 

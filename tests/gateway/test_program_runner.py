@@ -39,9 +39,9 @@ NOBODY = Person("nobody", "Nobody", Role.ADMIN)
 SCRIPT = "name: Wave\nsteps:\n  - wait: 30\n  - joints: [20, -60, 80, 8, 0]\n"
 
 
-def made(hub: Hub) -> ProgramRunner:
+def made(hub: Hub, *, no_unattended: bool = False) -> ProgramRunner:
     """Make the runner as ``katana450 serve`` does."""
-    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=False)
+    options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=no_unattended)
     return ProgramRunner(hub, options)
 
 
@@ -319,12 +319,8 @@ def test_window_of_the_absent_owner_or_an_admin_ends_it(table: Staged) -> None:
 
 
 def test_server_option_forbids_unattended_programs(session: Session) -> None:
-    def made(hub: Hub) -> ProgramRunner:
-        options = Namespace(owner_silence=OWNER_SILENCE, no_unattended=True)
-        return ProgramRunner(hub, options)
-
     table = Staged(session)
-    table.programs = made(table.hub)
+    table.programs = made(table.hub, no_unattended=True)
     owner = table.join(PAGES[0])
     table.plan(owner)
     with pytest.raises(LeaseError, match="not allowed"):

@@ -6,8 +6,7 @@ import asyncio
 import json
 import secrets
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -248,14 +247,6 @@ steps:
 """
 
 
-@asynccontextmanager
-async def closed(*controls: Control) -> AsyncIterator[None]:
-    """Close ``controls`` after the block."""
-    yield
-    for each in controls:
-        await each.close()
-
-
 async def until_program(owner: Control, status: str) -> None:
     async with asyncio.timeout(30.0):
         while True:
@@ -276,27 +267,26 @@ async def run_program(owner: Control) -> None:
 def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
     async def act() -> None:
         owner, other = await local.control(), await local.control()
-        async with closed(owner, other):
-            await run_program(owner)
-            await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
-            assert not other.status["own_program"]
-            await other.say("ask")
-            await other.wait(asked=True)
-            (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
-            # No other participant may decide.
-            await other.say("decline", to=asking["number"])
-            assert "do not hold" in (await other.notice("refused"))["why"]
-            await owner.say("decline", to=asking["number"])
-            refused = await other.notice("refused")
-            assert refused["why"] == f"{owner.status['name']} declined your request."
-            await other.wait(asked=False)
-            await owner.wait(asking=[], holder="Wave")
-            await other.say("ask")
-            await owner.wait(asking=[asking])
-            await owner.say("give", to=asking["number"])
-            await other.wait(mine=True)
-            await until_program(owner, "stopped")
-            await owner.wait(mine=False, orders=[], holder=other.status["name"])
+        await run_program(owner)
+        await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
+        assert not other.status["own_program"]
+        await other.say("ask")
+        await other.wait(asked=True)
+        (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
+        # No other participant may decide.
+        await other.say("decline", to=asking["number"])
+        assert "do not hold" in (await other.notice("refused"))["why"]
+        await owner.say("decline", to=asking["number"])
+        refused = await other.notice("refused")
+        assert refused["why"] == f"{owner.status['name']} declined your request."
+        await other.wait(asked=False)
+        await owner.wait(asking=[], holder="Wave")
+        await other.say("ask")
+        await owner.wait(asking=[asking])
+        await owner.say("give", to=asking["number"])
+        await other.wait(mine=True)
+        await until_program(owner, "stopped")
+        await owner.wait(mine=False, orders=[], holder=other.status["name"])
 
     local.run(act())
 
@@ -315,19 +305,18 @@ async def numbered(owner: Control, other: Control) -> dict[str, Any]:
 def test_former_driver_gets_the_name_of_the_new_one(local: VirtualServer, by_program: bool) -> None:
     async def act() -> None:
         driver, other = await local.control(), await local.control()
-        async with closed(driver, other):
-            if by_program:
-                await run_program(driver)
-            else:
-                await driver.say("acquire")
-                await driver.wait(mine=True)
-            assert driver.status["taken"] == ""
-            await other.say("take")
-            await other.wait(mine=True, taken="")
-            await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
-            await other.say("release_lease")
-            await driver.wait(holder=None, taken="")
+        if by_program:
+            await run_program(driver)
+        else:
             await driver.say("acquire")
-            await driver.wait(mine=True, taken="")
+            await driver.wait(mine=True)
+        assert driver.status["taken"] == ""
+        await other.say("take")
+        await other.wait(mine=True, taken="")
+        await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
+        await other.say("release_lease")
+        await driver.wait(holder=None, taken="")
+        await driver.say("acquire")
+        await driver.wait(mine=True, taken="")
 
     local.run(act())

@@ -299,8 +299,6 @@ def test_state_line_never_contradicts_the_state(local: VirtualServer, actions: i
             if one.status["stopped"] and not one.status["wait"] and chance.random() < 0.5:
                 driver = one if one.status["may_clear_stop"] else other
                 await driver.say("clear_stop")
-        for each in (one, other):
-            await each.close()
         return moods
 
     moods = local.run(played())

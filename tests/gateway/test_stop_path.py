@@ -111,18 +111,6 @@ def test_press_on_two_paths_counts_once_even_if_a_copy_is_late(
         program.go(requests.Home())
 
 
-def test_stop_voids_commands_of_before_and_names_the_presser(
-    server: AppServer, program: Client
-) -> None:
-    before = under_way(program)
-    assert stop(server.stop_url, X_Name="Vera")[0] == 200
-    state = program.query(answers.State)
-    until(lambda: program.query(answers.State).stopped is not None)
-    state = program.query(answers.State)
-    assert (state.stopped, state.revocations) == ("Vera pressed STOP.", before.revocations + 1)
-    assert state.stopped_at is not None
-
-
 def test_unknown_senders_and_other_paths_are_refused(server: AppServer) -> None:
     cookie, url = enter(server.url), server.stop_url
     foreign = "http://127.0.0.1:1"

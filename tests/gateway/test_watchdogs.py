@@ -61,18 +61,6 @@ def look(server: AppServer) -> dict[str, Any]:
     return state
 
 
-def clear_stop(arm: Client) -> None:
-    """Clear the stop as soon as the server allows it."""
-
-    def cleared() -> bool:
-        with suppress(RefusedError):
-            arm.ask(requests.ClearStop())
-            return True
-        return False
-
-    until(cleared, 5.0)
-
-
 def strike(server: AppServer, process: str, number: signal.Signals) -> None:
     """Send ``number`` to ``process`` during a motion, and check what follows."""
     victim = server.child(f"katana450 {process}")
@@ -83,7 +71,7 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
         return False
 
     with lost_connection(), connect(server.url, "Driver") as arm:
-        clear_stop(arm)
+        arm.clear_stop()
         start = arm.query(answers.State).q[0]
         goal = NEAR if start > 0.0 else FAR
         arm.ask(requests.Joints(q=goal))
@@ -107,7 +95,7 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
     with connect(server.url, "Driver") as arm:
         with pytest.raises(RefusedError, match="stop"):
             arm.ask(requests.Joints(q=goal))
-        clear_stop(arm)
+        arm.clear_stop()
         time.sleep(0.3)
         assert arm.query(answers.State).q == q
         there = q[0] + (0.1 if q[0] < 0.0 else -0.1)
@@ -131,7 +119,7 @@ def test_lost_process_is_started_again_with_a_stopped_arm(
 def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServer) -> None:
     front, killed = server.front, server.arm
     with connect(server.url, "Driver") as arm:
-        clear_stop(arm)
+        arm.clear_stop()
         arm.ask(requests.Place(name="block", shape=Shape.BOX, size=[0.05, 0.05, 0.05]))
         arm.joints(np.deg2rad((30.0, -68.0, 85.0, 8.0, 0.0)))
         before = arm.query(answers.State)
@@ -149,7 +137,7 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         assert server.front == front
         assert server.arm != killed
         assert "restarted" in [finding.reason for finding in after.findings]
-        clear_stop(arm)
+        arm.clear_stop()
         arm.ask(requests.ReleaseLease())
 
 
@@ -170,7 +158,7 @@ def test_uploaded_mesh_outlasts_the_front_end(server: AppServer, tmp_path: Path)
     with connect(server.url, "Driver") as arm:
         # Only a mesh with its triangles can be saved.
         assert mesh.key.encode() in arm.save_scene() or b".wrl" in arm.save_scene()
-        clear_stop(arm)
+        arm.clear_stop()
         arm.ask(requests.Remove(name="post"))
         arm.ask(requests.ReleaseLease())
 
@@ -182,7 +170,7 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
         status, _, body = ask(f"{server.url}/health")
         assert (status, b"supervisor" in body) == (503, True)
         with connect(server.url, "Driver") as arm:
-            clear_stop(arm)
+            arm.clear_stop()
             q = arm.query(answers.State).q
             arm.joints([q[0], *q[1:4], q[4] + 0.1])
     finally:
@@ -255,7 +243,7 @@ def may_have_real_time() -> bool:
 def test_threads_of_control_and_stop_preempt_everything(server: AppServer) -> None:
     # Once somebody drives, everything has started.
     with connect(server.url, "Driver") as arm:
-        clear_stop(arm)
+        arm.clear_stop()
         arm.go(requests.Home())
         arm.ask(requests.ReleaseLease())
     threads = [int(task.name) for task in Path(f"/proc/{server.arm}/task").iterdir()]
