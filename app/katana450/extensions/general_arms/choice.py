@@ -45,7 +45,7 @@ def kinematics_of(chain: Chain) -> Kinematics:
         else:
             return FiveAxisKinematics(chain)
     elif chain.n in (4, 6, 7):
-        closed = (SevenAxes if chain.n == 7 else ClosedForm).of(chain, links)
+        closed = SevenAxes.of(chain) if chain.n == 7 else ClosedForm.of(chain, links)
         if not isinstance(closed, str):
             return closed
         why = closed

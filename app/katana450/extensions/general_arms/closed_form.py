@@ -213,7 +213,8 @@ class ClosedForm(GeneralKinematics):
             )
 
         poses = np.repeat(T[None], len(q), axis=0)
-        return list(map(tuple, self.rounding.corrected(np.array(q), poses, again).tolist()))
+        solve_again = again if self.chain.n == 4 else None
+        return list(map(tuple, self.rounding.corrected(np.array(q), poses, solve_again).tolist()))
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
@@ -250,7 +251,8 @@ class ClosedForm(GeneralKinematics):
         q = self._exact_batch(poses)
         if self.rounding.is_corrected:
             for k in range(q.shape[1]):
-                q[:, k] = self.rounding.corrected(q[:, k], poses, partial(self._exact_on, k))
+                solve = partial(self._exact_on, k) if self.chain.n == 4 else None
+                q[:, k] = self.rounding.corrected(q[:, k], poses, solve)
         return q
 
     def _exact_on(self, branch: int, poses: FloatArray) -> FloatArray:

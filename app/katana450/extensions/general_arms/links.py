@@ -127,15 +127,15 @@ def _link(a: float, d: float, t: float) -> FloatArray:
     return np.array([[1.0, 0.0, 0.0, a], [0.0, c, -s, 0.0], [0.0, s, c, d], [0.0, 0.0, 0.0, 1.0]])
 
 
-def links_of(chain: Chain, *, exact: bool = True) -> DHLinks:
+def links_of(chain: Chain, *, exact: bool = True, gap: float = tolerances.FAMILY_LENGTH) -> DHLinks:
     """Return the dimensions of `chain`.
 
     With ``exact``, rounding in its file is removed: twists within FAMILY_ANGLE of a quarter turn
-    and lengths within FAMILY_LENGTH of 0 are exactly that. The tool's home pose stays. A right
+    and lengths within ``gap`` [m] of 0 are exactly that. The tool's home pose stays. A right
     angle that is rounded by at most FINE stays too, because every closed form takes any twist of
     axes that are not parallel.
     """
-    angle, gap, almost = tolerances.FAMILY_ANGLE, tolerances.FAMILY_LENGTH, 0.0
+    angle, almost = tolerances.FAMILY_ANGLE, 0.0
     if not exact:
         angle, gap, almost = DOUBLE, tolerances.ROUNDING, ALMOST_PARALLEL
     n = chain.n

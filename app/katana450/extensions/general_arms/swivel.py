@@ -65,6 +65,10 @@ BOUNDED: Final = ARRAYS._replace(
 )
 """Operations whose angles are not numbers where no posture takes the pose, beyond rounding."""
 
+NEAR_MISS: Final = 1e-3
+"""[m] Distance of axes up to which the postures of an arm whose axes meet lead to those of the arm.
+The wrist of a Kinova Gen3 misses by 0.35 mm."""
+
 CONTINUITY: Final = 10.0
 """Weight of the distance to a given posture [1/rad] beside the room to the limits."""
 
@@ -116,13 +120,18 @@ class SevenAxes(GeneralKinematics):
     is_reversed: bool
 
     @staticmethod
-    def of(chain: Chain, links: DHLinks) -> SevenAxes | str:
-        """Return the closed form of `chain`, or the conditions that it misses."""
-        views = ((links, False), (links_of(reversed_chain(chain)), True))
-        for locked, can_lock in ((2, _locks_third), (0, _locks_first)):
-            for view, is_reversed in views:
-                if can_lock(view):
-                    return SevenAxes(chain, view, locked, is_reversed)
+    def of(chain: Chain) -> SevenAxes | str:
+        """Return the closed form of `chain`, or the conditions that it misses.
+
+        Axes that pass each other within NEAR_MISS count as meeting if those that meet are too few.
+        """
+        mirrored = reversed_chain(chain)
+        for gap in (tolerances.FAMILY_LENGTH, NEAR_MISS):
+            views = ((links_of(chain, gap=gap), False), (links_of(mirrored, gap=gap), True))
+            for locked, can_lock in ((2, _locks_third), (0, _locks_first)):
+                for view, is_reversed in views:
+                    if can_lock(view):
+                        return SevenAxes(chain, view, locked, is_reversed)
         return (
             "whichever joint is locked, the other six do not have three axes at one end that meet "
             "in one point, and beside these two that meet or are parallel"
@@ -207,8 +216,13 @@ class SevenAxes(GeneralKinematics):
         return np.array([*self.best(T, near)])
 
     def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray:
-        """Return `at_swivels` with the swivel of ``near`` for each of the poses."""
-        return self.at_swivels(T, np.full(len(T), near[self.swivel]))
+        """Return `at_swivels` with the swivel of ``near`` for each of the poses, refined."""
+        q = self.at_swivels(T, np.full(len(T), near[self.swivel]))
+        return self._refined(q.reshape(-1, 7), np.repeat(T, 8, axis=0)).reshape(q.shape)
+
+    def _refined(self, q: FloatArray, T: FloatArray) -> FloatArray:
+        """Return postures `q` (N, 7) [rad] as those of the arm in the file, at their swivels."""
+        return self.rounding.corrected(q, T, locked=(self.swivel,))
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
@@ -243,12 +257,7 @@ class SevenAxes(GeneralKinematics):
                 position, rotation = errors_of(self.chain, nearest[:, branch, None], targets)
                 q = nearest[int((position + rotation).argmin()), branch]
             elif self.rounding.is_corrected:
-
-                def again(aimed: FloatArray, q: FloatArray = q, branch: int = branch) -> FloatArray:
-                    return self.at_swivels(aimed, q[[self.swivel]])[:, branch]
-
-                q = self.rounding.corrected(q[None], T[None], again).T
-                q = self._turned(q, hint)[:, 0]
+                q = self._turned(self._refined(q[None], T[None]).T, hint)[:, 0]
             yield tuple(q.tolist())
 
     @cached_property
