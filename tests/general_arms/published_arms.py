@@ -229,6 +229,119 @@ SLANTED_PARALLEL = craig(
     [math.pi] * 6,
 )
 
+# UFACTORY, kinematic parameters of the 850: a spherical wrist.
+UF_850 = craig(
+    [
+        (0.0, 0.0, 0.364, 0.0),
+        (QUARTER, 0.0, 0.0, QUARTER),
+        (math.pi, 0.39, 0.0, QUARTER),
+        (-QUARTER, 0.15, 0.426, 0.0),
+        (-QUARTER, 0.0, 0.0, 0.0),
+        (QUARTER, 0.0, 0.09, 0.0),
+    ],
+    degrees(-360.0, -132.0, -242.0, -360.0, -124.0, -360.0),
+    degrees(360.0, 132.0, 3.5, 360.0, 124.0, 360.0),
+)
+
+# ABB, CRB 15000-5/0.95 (GoFa): joints and limits of the description by ROS-Industrial.
+GOFA_5 = craig(
+    [
+        (0.0, 0.0, 0.265, 0.0),
+        (-QUARTER, 0.0, 0.0, -QUARTER),
+        (0.0, 0.444, 0.0, 0.0),
+        (-QUARTER, 0.110, 0.470, 0.0),
+        (QUARTER, 0.0, 0.0, 0.0),
+        (-QUARTER, 0.080, 0.101, 0.0),
+    ],
+    degrees(-180.0, -180.0, -225.0, -180.0, -180.0, -180.0),
+    degrees(180.0, 180.0, 85.0, 180.0, 180.0, 180.0),
+)
+
+# FANUC, CRX-10iA: Abbes & Poisson, Geometric approach for inverse kinematics of the FANUC CRX
+# collaborative robot, Robotics 13 (2024), which also shows poses with 12 and 16 postures.
+CRX_10IA = craig(
+    [
+        (0.0, 0.0, 0.0, 0.0),
+        (-QUARTER, 0.0, 0.0, -QUARTER),
+        (math.pi, 0.540, 0.0, 0.0),
+        (-QUARTER, 0.0, -0.540, 0.0),
+        (QUARTER, 0.0, 0.150, 0.0),
+        (-QUARTER, 0.0, -0.160, 0.0),
+    ],
+    [-math.pi] * 6,
+    [math.pi] * 6,
+)
+
+
+def kinova(upper: float, fore: float, beside: float, bend: float) -> Chain:
+    """Return a Jaco or Mico of Kinova's user guides (DH parameters of the curved wrist).
+
+    Lengths [m] of upper arm and forearm, their offset, and the angle [rad] of the wrist's bends.
+    """
+    part = 0.0741 * math.sin(0.5 * bend) / math.sin(bend)
+    return craig(
+        [
+            (0.0, 0.0, 0.2755, 0.0),
+            (QUARTER, 0.0, 0.0, 0.0),
+            (math.pi, upper, -beside, 0.0),
+            (QUARTER, 0.0, -fore - part, 0.0),
+            (bend, 0.0, -2.0 * part, 0.0),
+            (bend, 0.0, -part - 0.16, 0.0),
+        ],
+        degrees(-360.0, 47.0, 19.0, -360.0, -360.0, -360.0),
+        degrees(360.0, 313.0, 341.0, 360.0, 360.0, 360.0),
+    )
+
+
+JACO_2 = kinova(0.41, 0.2073, 0.0098, math.radians(55.0))
+MICO = kinova(0.29, 0.1233, 0.007, math.radians(60.0))
+
+
+def irb_140(between_4_and_5: float, between_5_and_6: float) -> Chain:
+    """Return an ABB IRB 140 (data sheet) whose wrist has offsets [m] that the real one lacks."""
+    return craig(
+        [
+            (0.0, 0.0, 0.352, 0.0),
+            (-QUARTER, 0.07, 0.0, -QUARTER),
+            (0.0, 0.36, 0.0, 0.0),
+            (-QUARTER, 0.0, 0.38, 0.0),
+            (QUARTER, between_4_and_5, 0.0, 0.0),
+            (-QUARTER, between_5_and_6, 0.065, 0.0),
+        ],
+        degrees(-180.0, -90.0, -230.0, -200.0, -115.0, -400.0),
+        degrees(180.0, 110.0, 50.0, 200.0, 115.0, 400.0),
+    )
+
+
+# Kinova, Gen3 with seven axes: joints of its description. The wrist misses by 0.35 mm.
+GEN3_7 = craig(
+    [
+        (0.0, 0.0, 0.28481, 0.0),
+        (QUARTER, 0.0, -0.01175, 0.0),
+        (-QUARTER, 0.0, 0.42076, 0.0),
+        (QUARTER, 0.0, -0.01275, 0.0),
+        (-QUARTER, 0.0, 0.31436, 0.0),
+        (QUARTER, 0.0, -0.00035, 0.0),
+        (-QUARTER, 0.0, 0.0, 0.0),
+    ],
+    [-math.pi, -2.41, -math.pi, -2.66, -math.pi, -2.23, -math.pi],
+    [math.pi, 2.41, math.pi, 2.66, math.pi, 2.23, math.pi],
+)
+
+# Kinova, Gen3 lite: joints and limits of its description.
+GEN3_LITE = craig(
+    [
+        (0.0, 0.0, 0.2433, 0.0),
+        (QUARTER, 0.0, 0.03, QUARTER),
+        (math.pi, 0.28, 0.02, QUARTER),
+        (QUARTER, 0.0, 0.245, QUARTER),
+        (QUARTER, 0.0, 0.057, 0.0),
+        (-QUARTER, 0.0, 0.235, -QUARTER),
+    ],
+    [-2.76] * 6,
+    [2.76] * 6,
+)
+
 FOUR = {"PincherX-100": PINCHERX_100, "OpenMANIPULATOR-X": OPENMANIPULATOR_X}
 SIX = {
     "UR5e": UR5E,
@@ -239,6 +352,7 @@ SIX = {
     "slanted parallel axes": SLANTED_PARALLEL,
 }
 SEVEN = {"Panda": PANDA, "iiwa": IIWA_7}
+NEAR_MISS = {"Gen3": GEN3_7}
 SKEWED = {"skewed 6": SKEWED_6, "skewed 7": SKEWED_7}
 
 # UFACTORY, xArm6 and xArm7: joints of their descriptions. Axes 1, 4 and 6, or every second axis,
@@ -269,3 +383,16 @@ XARM_7 = craig(
     [-math.tau, -2.059, -math.tau, -0.19198, -math.tau, -1.69297, -math.tau],
     [math.tau, 2.0944, math.tau, 3.927, math.tau, math.pi, math.tau],
 )
+
+OFFSET = {
+    "xArm 6": XARM_6,
+    "GoFa": GOFA_5,
+    "CRX-10iA": CRX_10IA,
+    "Jaco": JACO_2,
+    "Mico": MICO,
+    "Gen3 lite": GEN3_LITE,
+    "IRB 140, 20 mm between 4 and 5": irb_140(0.02, 0.0),
+    "IRB 140, 20 mm between 5 and 6": irb_140(0.0, 0.02),
+    "IRB 140, 0.3 mm between 5 and 6": irb_140(0.0, 3e-4),
+}
+"""Six axes whose wrists have an offset."""

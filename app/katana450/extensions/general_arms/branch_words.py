@@ -7,6 +7,9 @@ points P on them is zero, and its sign gives one word:
     elbow      z3 . ((P3 - P2) x (W - P3))  W: axis 4 if it is parallel to axis 3
     wrist      z4 . (z5 x z6)
 
+If axis 4 or 6 moves the wrist's centre, the wrist's product is that of the rates of axes 4 to 6
+while the first three hold the centre. It is zero where the arm is singular.
+
 An arm that is solved as seen from the tool has the first and the last with the ends exchanged. The
 joint that is the swivel of seven axes is left out. Which sign has which word follows from the arm
 at zero and from up (z) and front (x) of the base, not from the directions that a file gives its
@@ -55,6 +58,9 @@ BRANCH_NAMES: Final = tuple(
 SECOND: Final = ("right", "back", "down", "flip")
 """The second word of each pair."""
 
+ORDINALS: Final = ("second", "third", "fourth")
+"""Last words of further postures of a pose on the same branch, of an arm with an offset wrist."""
+
 SAMPLES: Final = 200
 """Maximum number of postures at which the order of the names is looked for."""
 
@@ -99,6 +105,12 @@ class _Look:
         """Return the triple product of the axes i, i + 1 and i + 2."""
         return float(self.z[i] @ np.cross(self.z[i + 1], self.z[i + 2]))
 
+    def held_twist(self, point: FloatArray) -> float:
+        """Return `twist` of the last three axes while the first three hold ``point`` (3,)."""
+        moves = np.cross(self.z, point - self.p)
+        J = np.concatenate((moves, self.z), axis=1)
+        return float(np.linalg.det(J) / np.linalg.det(moves[:3]))
+
 
 @dataclass(frozen=True, eq=False)
 class BranchWords:
@@ -108,11 +120,14 @@ class BranchWords:
         chain: the arm.
         joints: indices of its four or six joints that decide the branch, from the base.
         is_reversed: whether it is solved as seen from the tool.
+        offset: index of the joint that moves the wrist's centre, 3 or 5; None if the last three
+            axes meet there, or axes 2 to 4 are parallel.
     """
 
     chain: Chain
     joints: tuple[int, ...]
     is_reversed: bool = False
+    offset: int | None = None
 
     def of(self, q: FloatArray) -> str:
         """Return the name of the branch of the joint angles `q` (n,) [rad]."""
@@ -181,7 +196,9 @@ class BranchWords:
 
     def _from_base(self, look: _Look) -> tuple[str, ...]:
         has_wrist = len(self.joints) > 4
-        wrist = look.foot(4, 5) if has_wrist else look.tool
+        wrist = look.tool
+        if has_wrist:
+            wrist = look.foot(3, 4) if self.offset == 5 else look.foot(4, 5)
         faces = self._front * look.ahead(0, 1, wrist)
         aside = self._up * self._front * self._beside(look, wrist)
         if aside:
@@ -197,7 +214,8 @@ class BranchWords:
         else:
             side *= self._lowers(3) * self._from_foot(look, 4, 3, wrist)
         hand = self._outward(look, 5, wrist, look.tool)
-        return shoulder, elbow, _wrist(side * hand * look.twist(3))
+        twist = look.twist(3) if self.offset is None else look.held_twist(wrist)
+        return shoulder, elbow, _wrist(side * hand * twist)
 
     def _beside(self, look: _Look, wrist: FloatArray) -> float:
         """Return the distance along axis 2 of the arm's plane from axis 1 [m].

@@ -12,6 +12,7 @@ from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import FINE, exact_chain, links_of
 from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.offset_wrist import OffsetWrist
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
@@ -48,17 +49,21 @@ def kinematics_of(chain: Chain) -> Kinematics:
         closed = SevenAxes.of(chain) if chain.n == 7 else ClosedForm.of(chain, links)
         if not isinstance(closed, str):
             return closed
-        why = closed
+        offset = OffsetWrist.of(chain, links) if chain.n == 6 else ""
+        if not isinstance(offset, str):
+            return offset
+        why = f"{closed}, and {offset}" if offset else closed
     return Numerical(chain, links_of(chain, exact=False), why)
 
 
 def exact_arm(described: Chain) -> ExactArm:
     """Return the chain with exact axes for which the closed form of `described` holds.
 
-    An arm that is solved numerically stays as it is. So does one whose file rounds by at most
-    FINE, if that moves the tool by more than FAMILY_EXACT.
+    An arm that is solved numerically stays as it is, and so does one with an offset wrist, whose
+    postures are refined. So does one whose file rounds by at most FINE, if that moves the tool by
+    more than FAMILY_EXACT.
     """
-    if isinstance(kinematics_of(described), Numerical | FiveAxisKinematics):
+    if isinstance(kinematics_of(described), Numerical | OffsetWrist | FiveAxisKinematics):
         return ExactArm(described, ())
     links = links_of(described)
     angle, length = links.rounding

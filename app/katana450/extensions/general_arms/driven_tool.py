@@ -201,7 +201,8 @@ class DrivenTool(ToolKinematics):
         branch = str(state.branch)
 
         def projected(q: FloatArray) -> Projection:
-            return self._projected(q, target, branch, state.priority)
+            name = branch if self.solver.are_separate else self.solver.branch_of(q)
+            return self._projected(q, target, name, state.priority)
 
         return self._tracker.track(state.goal, target, since, branch, state.priority, projected)
 

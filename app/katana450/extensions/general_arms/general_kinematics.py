@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from katana450 import tolerances
-from katana450.extensions.general_arms.branch_words import SECOND
+from katana450.extensions.general_arms.branch_words import ORDINALS, SECOND
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -34,6 +34,11 @@ class GeneralKinematics(Kinematics):
     def is_exact(self) -> bool:
         """True if each branch has one posture for every pose, in closed form."""
         return False
+
+    @property
+    def are_separate(self) -> bool:
+        """True if no motion leads from one branch to another without a singularity."""
+        return True
 
     def postures(self, T: FloatArray, near: FloatArray) -> FloatArray | None:  # noqa: ARG002
         """Return the posture (k, n) [rad] of each branch for the pose `T` (4, 4), near ``near``.
@@ -71,9 +76,13 @@ class GeneralKinematics(Kinematics):
 
 
 def in_order_for_people(branches: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names of branches with those of usual postures first."""
-    second = {name: [word in SECOND for word in name.split("-")] for name in branches}
-    return tuple(sorted(branches, key=second.__getitem__))
+    """Return the names of branches with those of usual postures first, without ordinals."""
+    second = {
+        name: [word in SECOND for word in name.split("-")]
+        for name in branches
+        if not name.endswith(ORDINALS)
+    }
+    return tuple(sorted(second, key=second.__getitem__))
 
 
 def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:

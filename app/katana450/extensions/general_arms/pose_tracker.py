@@ -159,7 +159,7 @@ class PoseTracker:
         return now.least >= WALL and float(np.abs(now.error).max()) <= EXACT
 
     def _leaves(self, q: Angles, branch: str) -> bool:
-        return self.branches.branch_of(np.array(q)) != branch
+        return self.branches.are_separate and self.branches.branch_of(np.array(q)) != branch
 
     def _exact(self, place: ToolTarget, branch: str, q: Angles) -> Angles | None:
         """Return the posture of ``branch`` at ``place`` inside the limits; None without one."""

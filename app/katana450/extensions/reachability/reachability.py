@@ -33,7 +33,7 @@ from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.links import DHLinks, links_of
-from katana450.extensions.general_arms.numerical import Numerical, search_of
+from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
@@ -359,7 +359,7 @@ class Reachability:
         solver = PoseSolver(kinematics, self.clear)
         if isinstance(kinematics, FiveAxisKinematics):
             return PitchesAndRolls(solver, self.pitches, self.rolls)
-        if isinstance(kinematics, Numerical) or self.chain.n < FREE_AXES:
+        if not isinstance(kinematics, ClosedForm | SevenAxes) or self.chain.n < FREE_AXES:
             return PointSearch(self.chain, self.clear)
         R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
         return Rotations(solver, R)
@@ -538,5 +538,5 @@ def _fineness(kinematics: Kinematics) -> Fineness:
         return FAMILY
     if isinstance(kinematics, SevenAxes):
         return SWIVEL
-    is_closed = not isinstance(kinematics, Numerical) and kinematics.chain.n >= FREE_AXES
+    is_closed = isinstance(kinematics, ClosedForm) and kinematics.chain.n >= FREE_AXES
     return CLOSED if is_closed else POINTS

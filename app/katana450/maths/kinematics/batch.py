@@ -33,9 +33,14 @@ def forward_batch(chain: Chain, q: npt.ArrayLike) -> FloatArray:
 
 
 def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the errors (N, k) [m], [rad] of joint angles `q` (N, k, n) for poses `T` (N, 4, 4)."""
+    """Return the errors (N, k) [m], [rad] of joint angles `q` (N, k, n) for poses `T` (N, 4, 4).
+
+    Angles that are not numbers, of a branch without a posture, have infinite errors.
+    """
     count, k, n = q.shape
-    reached = forward_batch(chain, q.reshape(-1, n)).reshape(count, k, 4, 4)
+    is_missing = np.asarray(np.isnan(q).any(axis=-1))
+    postures = np.where(is_missing[..., None], 0.0, q).reshape(-1, n)
+    reached = forward_batch(chain, postures).reshape(count, k, 4, 4)
     x, y, z = np.moveaxis(reached[..., :3, 3] - T[:, None, :3, 3], -1, 0)
     distance = np.hypot(np.hypot(x, y), z)
     R = reached[..., :3, :3].swapaxes(-1, -2) @ T[:, None, :3, :3]
@@ -43,7 +48,9 @@ def errors_of(chain: Chain, q: FloatArray, T: FloatArray) -> tuple[FloatArray, F
         [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]],
         axis=0,
     )
-    return distance, np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
+    turn = np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0))
+    distance[is_missing] = turn[is_missing] = np.inf
+    return distance, turn
 
 
 def chunks(n: int) -> Iterator[slice]:

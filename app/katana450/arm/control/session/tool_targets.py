@@ -160,8 +160,11 @@ def branch_options(
 
 def branch_refusal(branch: AnyBranch, best: Projection) -> str:
     """Return why the arm cannot take ``branch``, of which ``best`` is the option; else empty."""
-    is_possible = best.branch == branch or not best.limits
-    return "" if is_possible else excluded(branch, best.limits)
+    if best.branch == branch:
+        return ""
+    if not best.limits:
+        return f"No posture of branch {branch} has the tool at its target"
+    return excluded(branch, best.limits)
 
 
 def contact_at(world: CollisionWorld | None, q: FloatArray, gripper: float) -> Contact | None:
@@ -212,6 +215,7 @@ def tracked(arm: ArmModel, state: State, tracking: Tracking) -> State:
     """Return ``state`` with its goal moved towards the dragged target, as far as a tick allows."""
     kinematics = arm.kinematics_to(state.tool)
     progress = kinematics.track(state, tracking.target, tracking.since)
+    state = replace(state, branch=progress.best.branch)
     if progress.since is not None:
         return with_mode(
             replace(state, goal=progress.best.q), replace(tracking, since=progress.since)
