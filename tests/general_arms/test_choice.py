@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.extensions.general_arms.links import exact_chain, links_of, reversed_chain
+from katana450.extensions.general_arms.nearest import nearest_pose
+from katana450.maths.geometry import screws
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.kinematics import FiveAxisKinematics
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.solver import inverse
 from tests.general_arms.published_arms import (
     FOUR,
@@ -188,3 +194,46 @@ def test_deviation_beyond_rounding_is_no_closed_form() -> None:
     assert len(found) == 8
     assert max(each.position_error for each in found) < 1e-12
     assert min(float(np.abs(each.q - q).max()) for each in found) < 1e-9
+
+
+def test_arm_solves_poses_of_its_own() -> None:
+    wrong = {name: notes for name in ARMS if (notes := kinematics_of(ARMS[name]).self_check)}
+    assert not wrong
+
+    class Still(Kinematics):
+        method, branches = "no motion", ("zero",)
+
+        def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:  # noqa: ARG002
+            return Solutions(self.chain, T, [(0.0,) * self.chain.n], self.branches)
+
+    (note,) = Still(UR5E).self_check
+    assert note.startswith("8 of 8 poses of the arm itself are not solved")
+
+
+def test_reach_is_a_close_bound() -> None:
+    wrong = []
+    for name, chain in ARMS.items():
+        turning = dataclasses.replace(
+            chain, lower=np.full(chain.n, -math.pi), upper=np.full(chain.n, math.pi)
+        )
+        q = np.random.default_rng(1).uniform(turning.lower, turning.upper, (20_000, chain.n))
+        tips = forward_batch(turning, q)[:, :3, 3] - screws.point_on(chain.S[:, 0])
+        farthest = float(np.linalg.norm(tips, axis=1).max())
+        if not farthest <= chain.reach <= 1.03 * farthest:
+            wrong.append(f"{name}: {chain.reach} beside {farthest}")
+    assert not wrong
+
+
+def test_search_alone_calls_nothing_out_of_reach() -> None:
+    rng = np.random.default_rng(4)
+    kinematics = kinematics_of(SKEWED_6)
+    start = screws.point_on(SKEWED_6.S[:, 0])
+    reasons = []
+    for q in rng.uniform(SKEWED_6.lower, SKEWED_6.upper, (4, 6)):
+        T = forward(SKEWED_6, q)
+        way = rng.normal(size=3)
+        for ratio in (0.97, 1.03):
+            T[:3, 3] = start + ratio * SKEWED_6.reach * way / np.linalg.norm(way)
+            reasons.append((ratio > 1.0, nearest_pose(kinematics, T).reason))
+    wrong = [reason for is_beyond, reason in reasons if ("its links" in reason) != is_beyond]
+    assert not wrong

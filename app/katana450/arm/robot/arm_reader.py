@@ -21,6 +21,7 @@ from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.exact_member import exact_member
+from katana450.maths.kinematics.kinematics import FiveAxisKinematics
 
 SLIDING = "prismatic"
 
@@ -195,6 +196,7 @@ def arm_in(
         T_shoulder_base = se3.inverse(T_base_shoulder)
         up = T_shoulder_base[:3, 2]
         chain, notes = exact_member(described, up)
+        notes = [*notes, *FiveAxisKinematics(chain).self_check]
         tools = {
             link: exact_member(described.with_tool(T_shoulder_base @ frames[link]), up)[0].M
             for link in structure.tools

@@ -404,5 +404,6 @@ def _structure(urdf: Urdf, path: Path, tool: str | None) -> Structure | None:
 def _arm(urdf: Urdf, structure: Structure) -> OtherArm:
     described, T_base_shoulder = described_chain(urdf.frames(), structure)
     chain, notes = exact_arm(described)
-    method = f"The kinematics are {kinematics_of(chain).method}."
-    return OtherArm(structure, T_base_shoulder, chain, DrivenTool, (*notes, method))
+    kinematics = kinematics_of(chain)
+    notes = (*notes, f"The kinematics are {kinematics.method}.", *kinematics.self_check)
+    return OtherArm(structure, T_base_shoulder, chain, DrivenTool, notes)

@@ -14,6 +14,7 @@ from katana450.arm.control.state.findings import causes_of, of_projection
 from katana450.arm.control.state.messages import REASONS
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.errors import InputError
+from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.maths.geometry import screws, se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -203,8 +204,10 @@ def projected(
         rotation_error=rotation,
         limits=limits,
         reach=position > POSITION_WORTH_TELLING
-        and not limits
-        and is_out_of_reach(chain, np.asarray(q), reached, T),
+        and (
+            is_beyond_links(chain, T)
+            or (not limits and is_complete(chain) and is_stuck(chain, np.asarray(q), reached, T))
+        ),
     )
 
 
@@ -220,14 +223,18 @@ def held_by(
     return tuple(np.flatnonzero((high & (pull > 0.0)) | (low & (pull < 0.0))).tolist())
 
 
-def is_out_of_reach(chain: Chain, q: FloatArray, reached: FloatArray, target: FloatArray) -> bool:
-    """Return whether it is shown that the links keep the tool point from the target (4, 4).
+def is_beyond_links(chain: Chain, target: FloatArray) -> bool:
+    """Return whether the tool point of the target (4, 4) is farther away than the links reach."""
+    return math.dist(screws.point_on(chain.S[:, 0]), target[:3, 3]) > chain.reach
 
-    The target is farther away than their lengths, or no small motion from `q` (n,) [rad] inside the
-    limits brings the tool point clearly nearer.
-    """
-    if math.dist(screws.point_on(chain.S[:, 0]), target[:3, 3]) > chain.reach:
-        return True
+
+def is_complete(chain: Chain) -> bool:
+    """Return whether all postures of a pose are known; a search may end where it is not nearest."""
+    return len(kinematics_of(chain).branches) > 1
+
+
+def is_stuck(chain: Chain, q: FloatArray, reached: FloatArray, target: FloatArray) -> bool:
+    """Return whether no small motion from `q` (n,) [rad] inside the limits leads clearly nearer."""
     J = jacobian_space(chain, q)
     v = J[3:] + np.cross(J[:3], reached[:3, 3], axis=0)
     gap = target[:3, 3] - reached[:3, 3]
@@ -261,7 +268,8 @@ def losses_of(
     if off:
         gives_way = priority is Priority.ORIENTATION and not turned
         # It is out of reach only if that is shown: by the links, or by a limit.
-        gives_way = gives_way or gap is not None or not (best.reach or best.limits)
+        is_shown = best.reach or (best.limits and is_complete(chain))
+        gives_way = gives_way or gap is not None or not is_shown
         reason = Reason.POSITION_CHANGED if gives_way else Reason.OUT_OF_REACH
         yield Finding(reason, best.position_error)
     if turned:

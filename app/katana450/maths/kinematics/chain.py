@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,9 @@ from katana450.caching import cached_property
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
 from katana450.maths.geometry.arrays import FloatArray, finite_array, real_array
+
+_SWEEPS: Final = 50
+"""Number of times that the points on all axes are moved for `Chain.reach`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +98,22 @@ class Chain:
 
     @cached_property
     def reach(self) -> float:
-        """An upper bound [m] on the distance of the tool point from the start of axis 1."""
-        point, length = screws.point_on(self.S[:, 0]), 0.0
-        for S in self.S.T[1:]:
-            before, on_axis = point, screws.point_on(S)
-            point = on_axis + S[:3] * float(S[:3] @ (before - on_axis))
-            length += math.dist(before, point)
-        return length + math.dist(point, self.M[:3, 3])
+        """An upper bound [m] on the distance of the tool point from the start of axis 1.
+
+        A point on each axis keeps its distances from those on the axes beside it. The sum of these
+        distances is a bound, and the points are those with the least sum: each lies where a string
+        between its neighbours would pass the axis.
+        """
+        axes = self.S[:3].T
+        points = [screws.point_on(S) for S in self.S.T] + [self.M[:3, 3]]
+        for _ in range(_SWEEPS):
+            for i in range(1, self.n):
+                sides = np.array((points[i - 1], points[i + 1])) - points[i]
+                along = sides @ axes[i]
+                away = np.linalg.norm(sides - along[:, None] * axes[i], axis=1)
+                weights = away[::-1] if away.any() else np.ones(2)
+                points[i] = points[i] + axes[i] * float(along @ weights / weights.sum())
+        return sum(map(math.dist, points, points[1:]))
 
     def with_tool(self, M: npt.ArrayLike) -> Chain:
         """Return the same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from katana450.caching import cached_property
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import BRANCHES, AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse_batch import inverse_batch, validated_poses
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.solver import inverse
+
+CHECKED: Final = 8
+"""Number of postures whose poses an arm solves when it is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +49,21 @@ class Kinematics(ABC):
         `q_hint` (n,) [rad] decides what the pose leaves free. Raises InputError for an invalid `T`
         or `q_hint`.
         """
+
+    @cached_property
+    def self_check(self) -> tuple[str, ...]:
+        """Sentences on poses of the arm itself that are not solved; none if all are.
+
+        The poses are those of CHECKED postures inside the limits.
+        """
+        chain, rng = self.chain, np.random.default_rng(CHECKED)
+        q = rng.uniform(chain.lower, chain.upper, (CHECKED, chain.n))
+        solved = [any(x.exact for x in self.inverse(T)) for T in forward_batch(chain, q)]
+        note = (
+            f"{CHECKED - sum(solved)} of {CHECKED} poses of the arm itself are not solved: a pose "
+            "that is missed may be one that the arm can take."
+        )
+        return () if all(solved) else (note,)
 
     def inverse_batch(self, T: npt.ArrayLike) -> FloatArray:
         """Return the joint angles (N, branches, n) [rad] of poses `T` (N, 4, 4) [m], as `inverse`.
