@@ -41,6 +41,7 @@ class Operations(NamedTuple):
         is_scalar: whether the numbers are floats. A formula may then take a shorter way where a
             condition holds, and has further ways for rare poses. Arrays take the way that is right
             for all poses but the rare ones.
+        is_regular: whether no pose is at a singularity, so that arrays take the shorter way too.
     """
 
     atan2: Callable[[Number, Number], Number]
@@ -51,6 +52,7 @@ class Operations(NamedTuple):
     select: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
     is_scalar: bool
+    is_regular: bool = False
 
 
 def _root(x: float) -> float:
@@ -98,11 +100,11 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
     nearest. A point on axis 1 leaves the turn to ``free`` [rad], if d is 0.
     """
     hypot, root, select, bounded, cos, sin = f.hypot, f.root, f.select, f.bounded, f.cos, f.sin
-    is_scalar = f.is_scalar
+    is_scalar, is_regular = f.is_scalar, f.is_regular
 
     def turns(x: Number, y: Number, d: Number, free: Number) -> Facing:
         rho = hypot(x, y)
-        if is_scalar and rho > FREE:
+        if is_regular or (is_scalar and rho > FREE):
             cx, cy, sine = x / rho, y / rho, bounded(d / rho)
         else:
             on_axis = rho <= FREE
@@ -162,7 +164,7 @@ def three_turns(
         return _square_turns(f, s, s2, frees_last=frees_last)
     atan2, hypot, root, select, cos, sin = f.atan2, f.hypot, f.root, f.select, f.cos, f.sin
     total, rest, sign = 0.5 * (t + t2), 0.5 * (t - t2), math.copysign(1.0, s * s2)
-    is_scalar, cosines, sines = f.is_scalar, c * c2, s * s2
+    is_scalar, is_regular, cosines, sines = f.is_scalar, f.is_regular, c * c2, s * s2
     bound = abs(sines) * math.sqrt(1.0 - BENT * BENT)
 
     def distinct(q13: float, q23: float, q31: float, q32: float, q33: float) -> tuple[Turns, Turns]:
@@ -182,7 +184,7 @@ def three_turns(
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
         (q11, _, q13), (q21, _, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-        if is_scalar and radius > DISTINCT and abs(q33 - cosines) < bound:
+        if is_regular or (is_scalar and radius > DISTINCT and abs(q33 - cosines) < bound):
             return *distinct(q13, q23, q31, q32, q33), radius
         half = 0.5 * atan2(radius, q33)
         sine = root(sign * sin(total + half) * sin(total - half))
@@ -222,12 +224,12 @@ def _square_turns(
     Q: its second row is -s s2 (sin c, cos c, 0).
     """
     atan2, hypot, select, cos, sin = f.atan2, f.hypot, f.select, f.cos, f.sin
-    sign, pi, is_scalar = -s * s2, math.pi, f.is_scalar
+    sign, pi, is_scalar, is_regular = -s * s2, math.pi, f.is_scalar, f.is_regular
 
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
         (q11, q12, q13), (q21, q22, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-        if is_scalar and radius > DISTINCT:
+        if is_regular or (is_scalar and radius > DISTINCT):
             a, c = atan2(s2 * q23, s2 * q13), atan2(-s * q32, s * q31)
             ca, sa = s2 * q13 / radius, s2 * q23 / radius
         else:

@@ -113,6 +113,7 @@ def crossing_shoulder(
     s3, c3 = sine_and_cosine(links.t[2])
     cx, cy, cz = wrist_centre(links)
     d1 = links.d[0]
+    placed, turned = _maps(links, between, cz)
     if between is None:
         between = tuple(links.link(1)[:3].ravel().tolist())
     g11, g12, g13, gx, g21, g22, g23, gy, g31, g32, g33, gz = between
@@ -138,18 +139,14 @@ def crossing_shoulder(
         for three in (middle + opening, middle - opening):
             ct, st = cos(three), sin(three)
             px, py = cx * ct - cy * st, cx * st + cy * ct
-            vx = g11 * px + g12 * py + g13 * cz + gx
-            vy = g21 * px + g22 * py + g23 * cz + gy
-            vz = g31 * px + g32 * py + g33 * cz + gz
+            vx, vy, vz = placed(px, py)
             rho = hypot(vx, vy)
             level = (z - c1 * vz) / s1
             offset = c1 * level - s1 * vz
-            # Both are the same number; the smaller radius keeps more of its digits.
-            length = select(
-                rho < radius,
-                root((rho - level) * (rho + level)),
-                root((radius - offset) * (radius + offset)),
-            )
+            length = root((radius - offset) * (radius + offset))
+            if not f.is_regular:
+                # Both are the same number; the smaller radius keeps more of its digits.
+                length = select(rho < radius, root((rho - level) * (rho + level)), length)
             bearing, is_above = atan2(vy, vx), rho <= FREE
             for side in (length, -length):
                 two = select(is_above, free2, atan2(level, side) - bearing)
@@ -161,9 +158,7 @@ def crossing_shoulder(
                     m1, m2 = c * r1 + s * r2, c * r2 - s * r1
                     m2, m3 = c1 * m2 + s1 * r3, c1 * r3 - s1 * m2
                     m1, m2 = cb * m1 + sb * m2, cb * m2 - sb * m1
-                    n1 = g11 * m1 + g21 * m2 + g31 * m3
-                    n2 = g12 * m1 + g22 * m2 + g32 * m3
-                    n3 = g13 * m1 + g23 * m2 + g33 * m3
+                    n1, n2, n3 = turned(m1, m2, m3)
                     n1, n2 = ct * n1 + st * n2, ct * n2 - st * n1
                     q.append((n1, c3 * n2 + s3 * n3, c3 * n3 - s3 * n2))
                 (q11, q21, q31), (q12, q22, q32), (q13, q23, q33) = (
@@ -174,6 +169,33 @@ def crossing_shoulder(
                     yield one, two, three, a, b, c6
 
     return solve
+
+
+Map = Callable[..., tuple[Number, Number, Number]]
+
+
+def _maps(links: DHLinks, between: tuple[Number, ...] | None, cz: float) -> tuple[Map, Map]:
+    """Return two functions of the pose ``between`` of `crossing_shoulder`.
+
+    The first one places a point (x, y, cz), the second one turns a direction back.
+    """
+    if between is None:
+        s, c = sine_and_cosine(links.t[1])
+        gx, gy, gz = links.a[1], -s * cz, links.d[1] + c * cz
+        return (
+            lambda x, y: (x + gx, c * y + gy, s * y + gz),
+            lambda x, y, z: (x, c * y + s * z, c * z - s * y),
+        )
+    g11, g12, g13, gx, g21, g22, g23, gy, g31, g32, g33, gz = between
+    gx, gy, gz = g13 * cz + gx, g23 * cz + gy, g33 * cz + gz
+    return (
+        lambda x, y: (g11 * x + g12 * y + gx, g21 * x + g22 * y + gy, g31 * x + g32 * y + gz),
+        lambda x, y, z: (
+            g11 * x + g21 * y + g31 * z,
+            g12 * x + g22 * y + g32 * z,
+            g13 * x + g23 * y + g33 * z,
+        ),
+    )
 
 
 def why_not_spherical(links: DHLinks) -> str:

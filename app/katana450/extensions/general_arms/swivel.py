@@ -49,11 +49,13 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.solution import Angles, Solutions
 from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
-SWIVELS: Final = 192
+_TURNS: Final = 1.0 / math.tau  # [1/rad]
+
+SWIVELS: Final = 128
 """Number of swivels on the grid."""
 
 REACHED: Final = ARRAYS._replace(
-    root=np.sqrt, bounded=lambda x: x, select=lambda _condition, _a, b: b
+    root=np.sqrt, bounded=lambda x: x, select=lambda _condition, _a, b: b, is_regular=True
 )
 """Operations whose angles are not numbers where no posture takes the pose, nor at a singularity."""
 
@@ -174,7 +176,8 @@ class SevenAxes(GeneralKinematics):
         """Return poses (..., 4, 4) as the formulas read them."""
         if self.is_reversed:
             T = se3.inverse(T) if T.ndim == 2 else inverses(T)
-        return self.links.T_1_S @ T @ self.links.T_tool_n
+        before, after = self.links.T_1_S, self.links.T_tool_n
+        return np.asarray(before.dot(T).dot(after) if T.ndim == 2 else before @ T @ after)
 
     @cached_property
     def _first_link(self) -> FloatArray:
@@ -190,19 +193,22 @@ class SevenAxes(GeneralKinematics):
         """
         links, locked, order = self.links, self.locked, -1 if self.is_reversed else 1
         alpha = swivels + links.shift[locked]
-        before = None
+        before, columns_before = None, np.empty(0)
         if locked == 2:
             solve, places = _around_third(links, f, alpha), (0, 1, 3, 4, 5, 6)
         else:
             solve, places = _after_first(links, f), (1, 2, 3, 4, 5, 6)
             before = self._first_link @ _turned_back(alpha)
+            columns_before = np.moveaxis(before, 0, -1).copy()
         shifts = [links.shift[place] for place in places]
 
         def branches(rows: FloatArray) -> Iterator[FloatArray]:
-            if before is not None:
-                rows = before @ rows
-            several = rows if rows.ndim == 3 else rows[None]
-            for angles in solve(np.moveaxis(several, 0, -1).copy(), shifts):
+            if rows.ndim == 2:
+                # The same pose at all swivels: one product without a copy.
+                columns = rows[..., None] if before is None else rows.T @ columns_before
+            else:
+                columns = np.moveaxis(rows if before is None else before @ rows, 0, -1).copy()
+            for angles in solve(columns, shifts):
                 q = np.empty((7, len(swivels)))
                 q[locked] = swivels
                 for place, angle, shift in zip(places, angles, shifts, strict=True):
@@ -289,7 +295,7 @@ class SevenAxes(GeneralKinematics):
     def _turned(self, q: FloatArray, hint: FloatArray | None) -> FloatArray:
         """Return `q` (7, N) [rad] in the turns amid the limits, or nearest to a hint."""
         middle, _ = self._limits
-        q = q - math.tau * np.rint((q - middle) * (1.0 / math.tau))
+        q = q - math.tau * np.rint((q - middle) * _TURNS)
         return q if hint is None else nearest_turn(self.chain, q.T, hint).T
 
     def _cost(self, q: FloatArray, hint: FloatArray | None) -> FloatArray:
