@@ -1,8 +1,9 @@
-"""The page of an arm outside the five-axis family: a UR5e with gizmo, jog and branches."""
+"""The page of arms outside the five-axis family: a UR5e with gizmo, jog and branches; a Panda."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ from tests.browser.conftest import OpenPage
 from tests.browser.instruments import show
 from tests.browser.page import ViserPage
 from tests.browser.server import APP, AppServer
+from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.links_of_arms import ur5e
+from tests.general_arms.published_arms import PANDA
 
 pytestmark = pytest.mark.long
 
@@ -34,9 +37,14 @@ def six(other: AppServer, open_page: OpenPage) -> ViserPage:
     return open_page(other.url)
 
 
-def tool(page: ViserPage) -> Any:
+def link(page: ViserPage, name: str) -> Any:
+    """Return the pose (4, 4) at which a link is drawn."""
     names = page.frame.evaluate("() => Object.keys(__viserMutable.nodeRefFromName)")
-    return page.node_pose(next(each for each in names if each.endswith("/tool0")))
+    return page.node_pose(next(each for each in names if each.endswith(f"/{name}")))
+
+
+def tool(page: ViserPage) -> Any:
+    return link(page, "tool0")
 
 
 def test_a_held_key_turns_the_tool_about_the_vertical(six: ViserPage) -> None:
@@ -84,3 +92,20 @@ def test_gizmo_has_arrows_and_rings_and_branches_have_names(six: ViserPage) -> N
     assert rows.count() == 8
     assert "left-up-noflip" in {rows.nth(k).get_attribute("data-branch") for k in range(8)}
     assert not six.errors
+
+
+def test_ring_at_the_elbow_moves_it_while_the_tool_rests(
+    tmp_path: Path, open_page: OpenPage
+) -> None:
+    path = tmp_path / "panda.urdf"
+    path.write_text(chain_urdf("panda", PANDA), encoding="utf-8")
+    with AppServer((*APP, "--urdf", str(path))) as server:
+        page = open_page(server.url, nodes=("/target/elbow",), own_camera=True)
+        start, elbow = tool(page), link(page, "link4")
+        page.drag_ring("/target/elbow", "x", 0.4)
+        page.wait_until(
+            lambda: np.linalg.norm((link(page, "link4") - elbow)[:3, 3]) > 0.05, "the elbow"
+        )
+        page.settled(lambda: link(page, "link4").tolist(), "the elbow")
+        np.testing.assert_allclose(tool(page), start, atol=2e-6)
+        assert not page.errors

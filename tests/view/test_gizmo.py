@@ -11,19 +11,23 @@ import numpy as np
 import pytest
 import viser
 
-from katana450.arm.control.commands.commands import EndDrag, Orient, Turn
+from katana450.arm.control.commands.commands import EndDrag, Orient, Turn, TurnElbow
 from katana450.assembly.robot_session import find_robot
 from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.motion.arm_angle import elbow_points
 from katana450.resources import URDF_PATH
 from katana450.server.view.gizmo import Gizmo
 from katana450.settings import Settings
 from tests.general_arms.chain_urdf import chain_urdf
-from tests.general_arms.published_arms import PINCHERX_100, UR5E
+from tests.general_arms.published_arms import PANDA, PINCHERX_100, UR5E
 from tests.view.gestures import RecordedGestures
 
-OTHERS = {"UR5e": UR5E, "PincherX-100": PINCHERX_100}
-RINGS = {"katana": ("pitch", "roll"), "UR5e": ("turn",), "PincherX-100": ("turn",)}
+OTHERS = {"UR5e": UR5E, "PincherX-100": PINCHERX_100, "Panda": PANDA}
+RINGS = {
+    **{"katana": ("pitch", "roll"), "UR5e": ("turn",), "PincherX-100": ("turn",)},
+    "Panda": ("turn", "elbow"),
+}
 
 
 @dataclass
@@ -52,11 +56,25 @@ def test_rings_turn_the_tool_of_their_arm(
     gizmo.follow()
     assert tuple(gizmo._rings) == RINGS[name]
     for ring, handle in gizmo._rings.items():
-        turned = {"pitch": gizmo._pitched, "roll": gizmo._rolled, "turn": gizmo._turned}[ring]
-        start, axis = np.array(handle.wxyz), (1.0, 0.0, 0.0) if ring == "roll" else (0.0, 1.0, 0.0)
+        turned = {
+            **{"pitch": gizmo._pitched, "roll": gizmo._rolled},
+            **{"turn": gizmo._turned, "elbow": gizmo._elbow_turned},
+        }[ring]
+        about_x = ring in ("roll", "elbow")
+        start, axis = np.array(handle.wxyz), (1.0, 0.0, 0.0) if about_x else (0.0, 1.0, 0.0)
         asyncio.run(turned(Drag(handle, "start")))  # type: ignore[arg-type]
         handle.wxyz = so3.to_quaternion(so3.from_quaternion(start) @ so3.exp(0.1 * np.array(axis)))
         asyncio.run(turned(Drag(handle, "end")))  # type: ignore[arg-type]
+        if ring == "elbow":
+            # Its arc passes the elbow, on the side of the line from shoulder to wrist where it is.
+            points = np.array(elbow_points(chain, state.goal)) @ arm.T_base_shoulder[:3, :3].T
+            _, elbow, wrist = points - points[0]
+            out = so3.from_quaternion(start) @ np.array((0.0, 1.0, 1.0))
+            assert out @ elbow > 0.0
+            assert abs(out @ wrist) < 1e-9
+            (turn,) = (each for each in gestures.commands if isinstance(each, TurnElbow))
+            assert turn.by == pytest.approx(0.1, abs=1e-9)
+            continue
         command, end = gestures.commands[-2:]
         assert isinstance(end, EndDrag)
         assert isinstance(command, Turn if gizmo.is_five_axis else Orient)

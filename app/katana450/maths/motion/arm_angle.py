@@ -1,8 +1,8 @@
 """The arm angle of seven axes: the place of the elbow about the line from shoulder to wrist.
 
 With the tool at rest such an arm still has one motion. It turns the upper arm, and the elbow with
-it, about that line. The shoulder is where axis 2 passes axis 1, the wrist where axis 6 passes axis
-5, and the upper arm the link that carries axis 4.
+it, about that line. The shoulder is where axis 2 passes axis 1, the elbow where axis 4 passes axis
+3, the wrist where axis 6 passes axis 5, and the upper arm the link that carries axis 4.
 
 Source: Kreutz-Delgado, Long and Seraji, Kinematic analysis of 7-DOF manipulators, The International
 Journal of Robotics Research 11 (1992).
@@ -142,12 +142,12 @@ def elbow_turn(chain: Chain, q: FloatArray, to: FloatArray) -> float:
     return float(_shoulder_to_wrist(chain, middle) @ J[:3, :3] @ (to - q)[:3])
 
 
-def elbow_line(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the shoulder (3,) and the wrist (3,) [m] in {S} at `q` (7,) [rad]."""
-    frames = joint_frames(chain, q)
-    ends = zip(frames[[0, 4]], _ends(chain), strict=True)
-    shoulder, wrist = (T[:3, :3] @ point + T[:3, 3] for T, point in ends)
-    return shoulder, wrist
+def elbow_points(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the shoulder, the elbow and the wrist, each (3,) [m] in {S}, at `q` (7,) [rad]."""
+    frames = joint_frames(chain, q)[[0, 2, 4]]
+    points = zip(frames, _points(chain), strict=True)
+    shoulder, elbow, wrist = (T[:3, :3] @ point + T[:3, 3] for T, point in points)
+    return shoulder, elbow, wrist
 
 
 def elbow_postures(chain: Chain, q: FloatArray, by: float) -> Iterator[FloatArray]:
@@ -173,16 +173,17 @@ def elbow_postures(chain: Chain, q: FloatArray, by: float) -> Iterator[FloatArra
 
 def _shoulder_to_wrist(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the direction (3,) in {S} from the shoulder to the wrist; 0 where they coincide."""
-    shoulder, wrist = elbow_line(chain, q)
+    shoulder, _, wrist = elbow_points(chain, q)
     line = wrist - shoulder
     length = float(np.linalg.norm(line))
     return line / length if length > 0.0 else line
 
 
 @lru_cache(maxsize=16)
-def _ends(chain: Chain) -> tuple[FloatArray, FloatArray]:
-    """Return the shoulder and the wrist at q = 0, in {S} [m]."""
-    return _nearest(chain.S[:, 1], chain.S[:, 0]), _nearest(chain.S[:, 5], chain.S[:, 4])
+def _points(chain: Chain) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the shoulder, the elbow and the wrist at q = 0, in {S} [m]."""
+    shoulder, elbow, wrist = (_nearest(chain.S[:, k], chain.S[:, k - 1]) for k in (1, 3, 5))
+    return shoulder, elbow, wrist
 
 
 def _nearest(axis: FloatArray, other: FloatArray) -> FloatArray:

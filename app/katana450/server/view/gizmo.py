@@ -3,7 +3,8 @@
 Arrows move the tool point, and rings turn the tool. Those of five axes are pitch about the
 horizontal that is square to the arm's plane, and roll about the tool's own axis. There is no third
 ring, because the position determines the sideways direction of the tool. Other arms have three
-rings in the frame of the tool, and an arm of four axes has one, which pitches its tool.
+rings in the frame of the tool, and an arm of four axes has one, which pitches its tool. A ring at
+the elbow of seven axes turns it about the line from shoulder to wrist, while the tool rests.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ import numpy as np
 import viser
 
 from katana450.arm.control.actor import Actor
-from katana450.arm.control.commands.commands import Command, EndDrag, Orient, Position, Turn
+from katana450.arm.control.commands.commands import (
+    Command,
+    EndDrag,
+    Orient,
+    Position,
+    Turn,
+    TurnElbow,
+)
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import KatanaError
@@ -25,6 +33,7 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward, joint_frames
 from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll, pitched_frame
+from katana450.maths.motion.arm_angle import elbow_points
 from katana450.server.view.controls import GestureGate
 from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
@@ -34,6 +43,15 @@ SIZE = 0.13
 
 RINGS = 1.6
 """Ratio of ring size to arrow size: the arcs end just outside the arrow heads."""
+
+RADIUS = 0.65
+"""Ratio of the radius of a ring to its size."""
+
+ELBOW_CLEARANCE = 0.06
+"""[m] Distance of the ring from the elbow, outside of its link."""
+
+ELBOW_STEP = 0.02
+"""[m] Change of the size of that ring that is sent."""
 
 PITCHING = 4
 """Number of axes of an arm that can only pitch its tool."""
@@ -47,20 +65,28 @@ TURN_WORTH_SENDING = 1e-7
 
 @dataclass
 class _Turn:
-    """A drag of a ring: rotation, pitch and roll [rad] at its start, and the angle so far [rad]."""
+    """A drag of a ring: rotation, pitch and roll [rad] at its start, and angles so far [rad]."""
 
     R_start: FloatArray
-    pitch: float
-    roll: float
+    pitch: float = 0.0
+    roll: float = 0.0
     turned: float = 0.0
+    sent: float = 0.0
 
 
 @dataclass(frozen=True)
 class Aim:
-    """The poses of the gizmo's parts while they are not held, in the types of viser."""
+    """The poses of the gizmo's parts while they are not held, in the types of viser.
+
+    Attributes:
+        point: the tool point.
+        rings: the rotation of each ring.
+        elbow: centre and size [m] of the ring at the elbow; None without one.
+    """
 
     point: Point
     rings: Mapping[str, Quaternion]
+    elbow: tuple[Point, float] | None = None
 
 
 class Gizmo:
@@ -113,6 +139,9 @@ class Gizmo:
             several = arm.chain.n != PITCHING
             self._rings = {"turn": self._ring(server, "/target/move/turn", (True, several, True))}
             self._rings["turn"].on_update(self._turned)
+        if arm.kinematics.turns_elbow:
+            self._rings["elbow"] = self._ring(server, "/target/elbow", (False, True, True))
+            self._rings["elbow"].on_update(self._elbow_turned)
 
     @property
     def is_five_axis(self) -> bool:
@@ -142,6 +171,26 @@ class Gizmo:
             _, roll = pitch_and_roll(self._arm.chain_to(state.tool), state.goal)
             rings = {"pitch": rings["turn"], "roll": quaternion(frame @ so3.rotation_x(roll))}
         self._aim = Aim((x, y, z), rings)
+        if "elbow" in self._rings:
+            rings["elbow"], elbow = self._elbow_ring(state)
+            self._aim = Aim((x, y, z), rings, elbow)
+
+    def _elbow_ring(self, state: State) -> tuple[Quaternion, tuple[Point, float]]:
+        """Return rotation, centre and size [m] of the ring whose arc passes outside the elbow."""
+        T = self._arm.T_base_shoulder
+        chain = self._arm.chain_to(state.tool)
+        points = np.array(elbow_points(chain, state.goal)) @ T[:3, :3].T + T[:3, 3]
+        shoulder, elbow, wrist = points
+        u = (wrist - shoulder) / max(float(np.linalg.norm(wrist - shoulder)), ELBOW_STEP)
+        centre = shoulder + float((elbow - shoulder) @ u) * u
+        # The axis of a bent elbow is square to the plane of the arm.
+        axis = T[:3, :3] @ joint_frames(chain, state.goal)[3][:3, :3] @ chain.S[:3, 3]
+        out = np.cross(u, axis) * np.sign(np.cross(u, axis) @ (elbow - centre) or 1.0)
+        out /= max(float(np.linalg.norm(out)), ELBOW_STEP)
+        y, z = (math.sqrt(0.5) * (out + side * np.cross(u, out)) for side in (-1.0, 1.0))
+        size = (float(np.linalg.norm(elbow - centre)) + ELBOW_CLEARANCE) / RADIUS
+        a, b, c = centre.tolist()
+        return quaternion(np.column_stack((u, y, z))), ((a, b, c), size)
 
     def _ring_frame(self, state: State) -> FloatArray:
         """Return the frame of the rings (3, 3) in the base frame.
@@ -168,6 +217,12 @@ class Gizmo:
         for name, wxyz in aim.rings.items():
             if not self._holds(name):
                 turn_ring(self._rings[name], wxyz)
+        if aim.elbow is not None and not self._holds("elbow"):
+            ring, (centre, size) = self._rings["elbow"], aim.elbow
+            if _apart(ring.position, centre) > DISTANCE_WORTH_SENDING:
+                place(ring, centre)
+            if abs(ring.scale - size) > ELBOW_STEP:
+                ring.scale = size
 
     async def _moved(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
@@ -218,6 +273,14 @@ class Gizmo:
             command = Turn(turn.pitch, turn.roll + turn.turned)
             self._submit(event, actor, command, (command.pitch, command.roll))
 
+    async def _elbow_turned(self, event: viser.TransformControlsEvent) -> None:
+        actor = self._gestures.actor(event.client_id)
+        turn = self._turning(event, actor, "elbow")
+        if turn is not None and turn.turned != turn.sent:
+            with suppress(KatanaError):
+                self._gestures.submit(TurnElbow(turn.turned - turn.sent), actor)
+                turn.sent = turn.turned
+
     async def _turned(self, event: viser.TransformControlsEvent) -> None:
         actor = self._gestures.actor(event.client_id)
         if event.phase == "start":
@@ -246,7 +309,9 @@ class Gizmo:
         if event.phase == "start":
             state = self._current()
             target = state.target
-            if isinstance(target, ToolTarget) and target.is_pitched:
+            if not self.is_five_axis:
+                pitch = roll = 0.0
+            elif isinstance(target, ToolTarget) and target.is_pitched:
                 pitch, roll = target.pitch, target.roll
             else:
                 chain = self._arm.chain_to(state.tool)
