@@ -9,6 +9,9 @@ import time
 import numpy as np
 import pytest
 
+from katana450.arm.control.commands import commands as cmd
+from katana450.arm.control.session.tool_targets import branch_options, with_branch
+from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.descent import Descent, Regularity
@@ -22,6 +25,7 @@ from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from tests.general_arms import singular_postures as singular
+from tests.general_arms.driven import pose, ready, settled
 from tests.general_arms.published_arms import (
     CRX_10IA,
     NEAR_MISS,
@@ -31,7 +35,7 @@ from tests.general_arms.published_arms import (
 )
 
 LONG = "KATANA450_LONG" in os.environ
-POSES = 200 if LONG else 3
+POSES = 200 if LONG else 1
 STARTS = 200 if LONG else 40
 NEWTON_STEPS = 40
 
@@ -127,6 +131,7 @@ def test_pose_has_sixteen_postures() -> None:
     assert counts.min() >= 4
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["xArm 6", "CRX-10iA", "IRB 140, 20 mm between 4 and 5"])
 def test_singular_postures_are_found_again(name: str) -> None:
     """Where two postures meet, the polynomial has a double root.
@@ -149,28 +154,29 @@ def test_singular_postures_are_found_again(name: str) -> None:
 def test_home_and_other_special_postures_are_found_again() -> None:
     rng = np.random.default_rng(4)
     for name, chain in OFFSET.items():
-        for q in rng.choice((0.0, 0.5, 1.0, -0.5), (20, 6)) * (0.5 * math.pi):
+        for q in rng.choice((0.0, 0.5, 1.0, -0.5), (20 if LONG else 4, 6)) * (0.5 * math.pi):
             solutions = kinematics_of(chain).inverse(forward(chain, q), q)
             errors = [max(s.position_error, s.rotation_error) for s in solutions]
             assert min(errors) <= EXACT, f"{name} at {q}"
             assert apart(q, np.array([s.q for s in solutions])).min() <= 1e-4, f"{name} at {q}"
 
 
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("name", OFFSET)
 def test_batch_and_branches_agree_with_single_poses(name: str) -> None:
     chain = OFFSET[name]
     solver = offset_wrist(chain)
     q = np.random.default_rng(5).uniform(-math.pi, math.pi, (6, 6))
     T = forward_batch(chain, q)
-    for posture, pose, row in zip(q, T, solver.inverse_batch(T), strict=True):
-        solutions = solver.inverse(pose)
+    for posture, target, row in zip(q, T, solver.inverse_batch(T), strict=True):
+        solutions = solver.inverse(target)
         places = [solver.branches.index(str(solution.branch)) for solution in solutions]
         np.testing.assert_allclose(row[places], [s.q for s in solutions], atol=1e-9)
         assert np.isnan(np.delete(row, places, axis=0)).all()
         for solution in solutions:
             first = "-".join(str(solution.branch).split("-")[:3])
             assert solver.branch_of(solution.q) == first
-        found = solver.on_branch(pose, solver.branch_of(posture), posture)
+        found = solver.on_branch(target, solver.branch_of(posture), posture)
         assert found is not None
         assert apart(found, posture[None]) <= 1e-7
     distance, _ = errors_of(chain, solver.inverse_batch(T), T)
@@ -194,6 +200,23 @@ def test_turns_are_those_of_the_limits_and_the_hint() -> None:
         T = forward(XARM_6, q)
         assert any(s.within_limits and s.exact for s in solver.inverse(T))
         assert min(np.abs(s.q - q).max() for s in solver.inverse(T, q)) <= 1e-6
+
+
+def test_every_branch_is_taken_or_refused() -> None:
+    session, state, T = ready(CRX_10IA)
+    arm = session.require_arm()
+    refused = []
+    for option in branch_options(arm, state):
+        name = option.metrics.branch
+        if option.refusal:
+            refused.append(name)
+            with pytest.raises(InputError, match=f"No posture of branch {name} has the tool at"):
+                with_branch(arm, state, name)
+            continue
+        end = settled(session, state, [cmd.Branch(name=str(name))])
+        assert end.branch == name
+        np.testing.assert_allclose(pose(session, end), T, atol=1e-12)
+    assert refused == ["front-down-flip", "back-up-flip"]
 
 
 def test_other_arms_of_these_makers() -> None:

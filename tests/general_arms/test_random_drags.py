@@ -17,12 +17,13 @@ from katana450.extensions.general_arms.swivel import SevenAxes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.forward import jacobian_space
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from tests.conftest import MANY_DRAGS
-from tests.general_arms.published_arms import FOUR, SEVEN, SIX, SKEWED
+from tests.general_arms.published_arms import FOUR, NEAR_MISS, OFFSET, SEVEN, SIX, SKEWED
 
-ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED}
+ARMS = {**FOUR, **SIX, **SEVEN, **SKEWED, **OFFSET, **NEAR_MISS}
 DRAGS_OF_A_TRIP = 10
 MAX_CALLS = 400
 """Number of ticks of a drag after which it must have ended if its way is clear."""
@@ -39,6 +40,11 @@ PLACES = 64
 
 CLEAR_STEP = 0.05
 """[rad] Turn of a joint from place to place up to which the way is clear."""
+
+
+def side(chain: Chain, q: FloatArray) -> float:
+    """Return the sign of the determinant, which no motion changes without a singularity."""
+    return float(np.sign(np.linalg.det(jacobian_space(chain, q))))
 
 
 class Dragged(NamedTuple):
@@ -81,7 +87,8 @@ def is_clear(
     """Return whether ``branch`` has postures inside the limits all the way, without a leap.
 
     Only arms with a closed form can tell. The arm stands at the beginning of the way. Four and
-    seven axes are led by steps, which end at the edge of a branch: their way keeps away from it.
+    seven axes, and those with an offset wrist, are led by steps, which end at the edge of a branch:
+    their way keeps away from it.
     """
     start, target = way
     descent = tool._tracker.descent
@@ -94,7 +101,7 @@ def is_clear(
             return False
         if max(tool.target_at(found).apart(place)) > 1e-9:
             return False
-        if tool.chain.n != 6:
+        if not tool.solver.is_exact:
             look = descent.look(descent.goal(place), tuple(found.tolist()))
             if look.least < NEAR:
                 return False
@@ -135,8 +142,12 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
             goal = found.best.q
             assert ((goal >= chain.lower) & (goal <= chain.upper)).all()
             assert np.abs(goal - state.goal).max() <= MAX_MOVE
-            assert tool.branch_of(goal) == state.branch
-            state = replace(state, goal=goal)
+            assert tool.branch_of(goal) == found.best.branch
+            if tool.solver.are_separate:
+                assert found.best.branch == state.branch
+            elif chain.n == 6:
+                assert side(chain, goal) == side(chain, state.goal)
+            state = replace(state, goal=goal, branch=found.best.branch)
             if found.since is None:
                 break
             assert found.since is not None
@@ -153,8 +164,8 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
     return Dragged(arrived, held, clear, beside, calls, seconds)
 
 
-@pytest.mark.cases(2)
-@pytest.mark.parametrize("name", ["UR5e", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("name", ["UR5e", "xArm 6", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
     found = drags(ARMS[name], 20)
     assert found.arrived + found.held == 20

@@ -166,8 +166,8 @@ class OffsetWrist(GeneralKinematics):
         words = BranchWords(self.chain, tuple(range(6)), offset=self.locked)
         rng = np.random.default_rng(450)
         q = rng.uniform(-math.pi, math.pi, (512, 6))
-        names = dict(zip(self._numbers(q).tolist(), map(words.of, q), strict=True))
-        first = tuple(names[number] for number in range(8))
+        _, places = np.unique(self._numbers(q), return_index=True)
+        first = tuple(map(words.of, q[places]))
         return first + tuple(f"{name}-{word}" for word in ORDINALS for name in first)
 
     def branch_of(self, q: FloatArray) -> str:
@@ -182,12 +182,17 @@ class OffsetWrist(GeneralKinematics):
     def on_branch(self, T: FloatArray, branch: str, near: FloatArray) -> FloatArray | None:
         """Return the posture (n,) [rad] of ``branch`` for the pose `T` (4, 4), nearest to ``near``.
 
-        Each angle is in the turn nearest to ``near`` inside its limits. None without a posture.
+        Those inside the limits come first. Each angle is in the turn nearest to ``near`` inside its
+        limits. None without a posture.
         """
         number = self.branches.index(branch)
         rows = self.postures(T, near)[number :: len(self.branches) if number >= 8 else 8]
         candidates = [near_turns(self.chain, q, near) for q in rows if np.isfinite(q[0])]
-        return min(candidates, key=lambda q: float(np.abs(q - near).max()), default=None)
+        return min(
+            candidates,
+            key=lambda q: (not self.chain.within_limits(q), float(np.abs(q - near).max())),
+            default=None,
+        )
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return every posture of the pose; see `Kinematics.inverse`.
