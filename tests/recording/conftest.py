@@ -7,8 +7,28 @@ from pathlib import Path
 
 import pytest
 
+from katana450.arm.runtime.tick import TickRecord
 from katana450.extensions.recording.episodes import running_episode
 from tests.recording.episode_bench import Bench
+from tests.recording.recorded import record
+
+
+@pytest.fixture(scope="session")
+def recorded_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[TickRecord]]:
+    path = tmp_path_factory.mktemp("recorded") / "run.mcap"
+    return path, record(path, 250, 5)
+
+
+@pytest.fixture(scope="session")
+def run(recorded_run: tuple[Path, list[TickRecord]]) -> Path:
+    """Return the recording of a random session, which no test changes."""
+    return recorded_run[0]
+
+
+@pytest.fixture(scope="session")
+def records(recorded_run: tuple[Path, list[TickRecord]]) -> list[TickRecord]:
+    """Return the records of that session."""
+    return recorded_run[1]
 
 
 @pytest.fixture

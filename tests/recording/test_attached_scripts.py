@@ -33,7 +33,7 @@ from katana450.extensions.recording.live.running_scripts import (
 from katana450.extensions.recording.playback.run import PlaybackRun
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.recording.recorded import header, run, swinging
-from tests.recording.test_recorder import waited_for
+from tests.waiting import until
 
 TURN = "name: {name}\nsteps:\n  - joints: [{angle}, -60, 80, 20, 0]\n"
 NOD = "name: Nod\nsteps:\n  - wait: 0.2\n  - joints: [5, -55, 80, 20, 0]\n"
@@ -87,7 +87,7 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
             return [each.end is None for each in script_runs([file])] == [False] * 4
         return False
 
-    waited_for(has_all, "four runs in the recording")
+    until(has_all)
     path = kept(folder).rename(folder / "all.mcap")
     return path, folder / "episodes" / f"episode-{episode:04d}.mcap"
 

@@ -22,20 +22,10 @@ from katana450.extensions.recording.folders import new_folder
 from katana450.maths.geometry.arrays import FloatArray
 from tests.recording.dataset_files import episode, episode_folder, write_copy
 from tests.recording.lerobot_check import check_dataset, episodes_of, rows_of
-from tests.recording.recorded import described, record
+from tests.recording.recorded import described
 
 FPS = 25
 OUTCOMES = {"success": 3, "failure": 4, "unjudged": 6, "unfinished": 8}
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("recorded") / "run.mcap"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def records(run: Path) -> list[TickRecord]:
-    return record(run, 250, 5)
 
 
 @pytest.fixture(scope="module")

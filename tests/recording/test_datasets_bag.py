@@ -21,23 +21,12 @@ from katana450.extensions.recording.files.recording_file import RecordingFile
 from katana450.extensions.recording.messages import EVENTS, STATE
 from katana450.maths.geometry import so3
 from katana450.resources import URDF_PATH
-from tests.recording.recorded import described, record
+from tests.recording.recorded import described
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("recorded") / "run.mcap"
-
-
-@pytest.fixture(scope="module")
-def records(run: Path) -> list[TickRecord]:
-    return record(run, 220, 5)
-
-
-@pytest.fixture(scope="module")
-def bag(run: Path, records: list[TickRecord]) -> Path:
+def bag(run: Path) -> Path:
     out = run.with_name("bag")
-    assert records
     assert main(["record", "export", str(run), "--format", "rosbag2", "--out", str(out)]) == 0
     return out
 

@@ -30,7 +30,7 @@ from katana450.server.viser_bridge.presets import Preset
 from tests.media.test_files import HEIGHT, WIDTH, frames
 from tests.recording.dataset_files import episode_folder
 from tests.recording.lerobot_check import check_dataset, episodes_of
-from tests.recording.recorded import described, record, swinging
+from tests.recording.recorded import described, swinging
 
 SIZE = (64, 48)
 FPS = 5
@@ -97,13 +97,6 @@ def test_statistics_of_pictures_are_those_of_all_pixels() -> None:
     }.items():
         np.testing.assert_allclose(np.array(found[name]).reshape(3), value, atol=1e-12)
     assert found["count"] == [5]
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recorded") / "run.mcap"
-    record(path, 150, 5)
-    return path
 
 
 @pytest.mark.long

@@ -17,7 +17,7 @@ from katana450.extensions.recording.folders import (
 )
 from katana450.platform_support import cache_folder
 from tests.browser.server import RECORDING_APP, AppServer
-from tests.recording.test_recorder import waited_for
+from tests.waiting import until
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="XDG_STATE_HOME")
@@ -40,7 +40,7 @@ def test_server_records_where_its_start_says(tmp_path: Path, named: bool) -> Non
         with katana450.connect(server.url, name="Ada") as client:
             client.joints((0.2, -1.0, 1.4, 0.3, 0.0))
             client.joints((0.0, -1.0, 1.4, 0.3, 0.0))
-            waited_for(partial(recordings_in, folder), "a recording")
+            until(partial(recordings_in, folder))
     (path,) = recordings_in(folder)
     assert katana450.open(path).verify().ticks > 50
     assert folder.stat().st_mode & 0o077 == 0

@@ -21,7 +21,8 @@ from katana450.extensions.recording.episodes.episode import EpisodeOutcome
 from katana450.extensions.recording.episodes.episode_folder import EpisodeFolder
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.gateway.client import ask, enter
-from tests.recording.test_recorder import POSTURES, RECORDER, waited_for
+from tests.recording.test_recorder import POSTURES, RECORDER
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -126,7 +127,7 @@ def test_killed_server_leaves_an_episode_that_is_recovered(
         with suppress(ServerError):
             server.stop()
     capsys.readouterr()
-    waited_for(partial(_recovered, folder), "the claim of the folder to end")
+    until(partial(_recovered, folder))
     assert "Episode 1 was interrupted and is kept as unfinished" in capsys.readouterr().out
     (kept,) = EpisodeFolder(folder).kept()
     assert kept.episode.task == "cut off"

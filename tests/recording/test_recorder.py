@@ -9,7 +9,7 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 from multiprocessing import Pipe
@@ -40,6 +40,7 @@ from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.conftest import LONG
 from tests.gateway.client import ask, enter
 from tests.recording.recorded import header, run
+from tests.waiting import until
 
 KILLS = 5 if LONG else 1
 RECORDER = "katana450 rec"
@@ -47,14 +48,6 @@ MAX_LOSS = 1.1
 """[s] Maximum time at the end of a recording that a kill can lose."""
 
 POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
-
-
-def waited_for(condition: Callable[[], object], what: str, seconds: float = 20.0) -> None:
-    """Wait until the function ``condition`` returns something true."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, f"waited {seconds:g} s for {what}"
-        time.sleep(0.05)
 
 
 def verified(path: Path) -> int:
@@ -94,10 +87,10 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
             state = client.joints(posture)
         client.stop()
         kept = tmp_path / "kept.mcap"
-        waited_for(lambda: list(folder.glob("*")), "the first file")
+        until(lambda: list(folder.glob("*")))
         # After the delay of its start, and then a second for the disk.
-        waited_for(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0, "motion")
-        waited_for(lambda: _keeps(folder, kept, "stop"), "the stop in the recording")
+        until(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0)
+        until(lambda: _keeps(folder, kept, "stop"))
         address, cookie = f"{server.url}/api/v1/recording", enter(server.url)
         for query, status in (("?last=0", 400), ("?last=x", 400), ("", 200)):
             answer = ask(address + query, Cookie=cookie)
@@ -122,7 +115,7 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
 
 def _pids(server: AppServer) -> tuple[int, int]:
     """Return the ids of the arm's process and of the one that records."""
-    waited_for(partial(_other_child, server, 0), "the process that records")
+    until(partial(_other_child, server, 0))
     return server.arm, server.child(RECORDER)
 
 
@@ -158,7 +151,7 @@ def test_killed_recorder_loses_a_second_and_the_arm_nothing(
     chance = random.Random(450)
     with katana450.connect(server.url, name="test") as client:
         client.joints(POSTURES[1])
-        waited_for(lambda: recordings_in(folder), "the first file")
+        until(lambda: recordings_in(folder))
         for kill in range(KILLS):
             before = recordings_in(folder)[-1]
             for posture in POSTURES:
@@ -170,9 +163,9 @@ def test_killed_recorder_loses_a_second_and_the_arm_nothing(
             os.kill(recorder, signal.SIGKILL)
             # The arm still follows commands while nothing records it.
             client.joints(POSTURES[kill % 2])
-            waited_for(partial(_other_child, server, recorder), "another recorder")
+            until(partial(_other_child, server, recorder))
             client.joints(POSTURES[1 - kill % 2])
-            waited_for(partial(_has_newer, folder, before), "a file")
+            until(partial(_has_newer, folder, before))
             broken = recordings_in(folder)[-2]
             # Made whole by the next process. What was synced a second before is there.
             assert verified(broken) > 0

@@ -27,7 +27,8 @@ from katana450.extensions.recording.messages import COMMANDS
 from katana450.server.api import answers, requests
 from tests.browser.server import RECORDING_APP, AppServer, ServerError
 from tests.recording.recorded import PERIOD
-from tests.recording.test_recorder import POSTURES, RECORDER, tick_times, waited_for
+from tests.recording.test_recorder import POSTURES, RECORDER, tick_times
+from tests.waiting import until
 
 SMALL_DISK = 'mount -t tmpfs -o size=1m none {folder} && exec "$@"'
 """Command of a shell that begins with a disk of 1 MB at a folder."""
@@ -117,14 +118,14 @@ def test_full_disk_delays_and_loses_no_tick_and_is_reported(
         line = found
     with AppServer(line) as server, swinging(server):
         there = Path(f"/proc/{server.pid}/root/{folder}")
-        waited_for(lambda: recordings_in(there), "the first file", 60.0)
+        until(lambda: recordings_in(there), 60.0)
         first, copy = recordings_in(there)[0], tmp_path / "copy.mcap"
-        waited_for(lambda: whole_times(first, copy), "its first ticks", 60.0)
+        until(lambda: whole_times(first, copy), 60.0)
         process = recorder(server)
         assert process is not None
         fill, free = actions(disk, process, there)
         fill()
-        waited_for(lambda: "is interrupted" in server.output, "the report", 60.0)
+        until(lambda: "is interrupted" in server.output, 60.0)
         with connect(server.url, "Look") as look:
             time.sleep(1.0)
             begin = look.query(answers.State)
@@ -139,7 +140,7 @@ def test_full_disk_delays_and_loses_no_tick_and_is_reported(
             last = recordings_in(there)[-1]
             return last.name > newest and bool(whole_times(last, copy))
 
-        waited_for(again, "a file after it", 60.0)
+        until(again, 60.0)
         kept = tmp_path / "kept.mcap"
         assert main(["record", "keep", str(there), "--out", str(kept)]) == 0
         reason = {"full": "No space left on device", "limited": "File too large"}[disk]

@@ -23,7 +23,7 @@ from katana450.extensions.recording.live.running_scripts import RunningScripts
 from katana450.platform_support import pipe_address
 from katana450.server.api.episode_requests import StartEpisode, StopEpisode
 from tests.recording.episode_bench import ADA, Bench
-from tests.recording.test_recorder import waited_for
+from tests.waiting import until
 
 
 class Page:
@@ -83,12 +83,12 @@ def test_requests_are_answered_and_the_state_is_shown(
     listen()
     # It waits for the process that records.
     begun = link.ask(StartEpisode(task="pour"), ADA, 5.0)
-    waited_for(lambda: page.shown.get(ENTRY), "the state")
+    until(lambda: page.shown.get(ENTRY))
     assert caplog.text.count("Too many open files") == 1
     assert begun["number"] == 1
     # People are named by pseudonyms in a recording.
     assert begun["by"]["key"] not in ("", ADA.key)
-    waited_for(lambda: page.shown[ENTRY]["running"], "the running episode")
+    until(lambda: page.shown[ENTRY]["running"])
     with pytest.raises(InputError, match="runs already"):
         link.ask(StartEpisode(), ADA)
     bench.move(40)
@@ -101,11 +101,11 @@ def test_without_a_folder_of_episodes_the_reason_is_the_answer(
     page = Page()
     scripts = listen(InputError("Another server uses it."))
     link = linked(page, recorder_file(tmp_path, 8080))
-    waited_for(lambda: link._connection, "the connection")
+    until(lambda: link._connection)
     with pytest.raises(InputError, match="Another server uses it"):
         link.ask(StartEpisode(), ADA)
     link.note("turn", "name: turn", 1.0, None)
-    waited_for(lambda: scripts._runs, "the note")
+    until(lambda: scripts._runs)
 
 
 def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
@@ -117,7 +117,7 @@ def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
     link.note("early", "name: early", 1.0, 2.0)
     link.note("long", "name: long", 3.0, None)
     scripts = listen()
-    waited_for(lambda: len(scripts._runs) == 2, "both notes")
+    until(lambda: len(scripts._runs) == 2)
     early, running = scripts.read()
     assert (early.ended, running.ended) == (2.0, None)
     # One that has ended is returned once.
@@ -126,12 +126,12 @@ def test_scripts_are_noted_again_and_end_with_the_process_that_runs_them(
     newest = link._connection
     scripts = listen()
     disconnect(newest)
-    waited_for(lambda: 3.0 in scripts._runs, "the note for the new process")
-    waited_for(lambda: link._connection not in (None, newest), "the connection")
+    until(lambda: 3.0 in scripts._runs)
+    until(lambda: link._connection not in (None, newest))
     # The page's server ends.
     link._file.unlink()
     disconnect(link._connection)
-    waited_for(lambda: scripts._runs[3.0].ended is not None, "the end of the script")
+    until(lambda: scripts._runs[3.0].ended is not None)
 
 
 def test_process_that_hangs_is_not_waited_for(
@@ -143,6 +143,6 @@ def test_process_that_hangs_is_not_waited_for(
     with Listener(address):
         file.write_text(json.dumps({"address": address, "key": "00" * 32}))
         link = linked(page, file)
-        waited_for(lambda: ENTRY in page.shown, "the first attempt")
+        until(lambda: ENTRY in page.shown)
         with pytest.raises(InputError, match="is not ready"):
             link.ask(StartEpisode(), ADA)

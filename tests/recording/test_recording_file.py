@@ -56,37 +56,23 @@ from katana450.settings import Settings
 from tests.recording.recorded import (
     described,
     header,
-    record,
     run,
     swinging,
 )
 
-TICKS = 250
-
-
-@pytest.fixture(scope="module")
-def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("recorded") / "run.mcap"
-
-
-@pytest.fixture(scope="module")
-def records(path: Path) -> list[TickRecord]:
-    return record(path, TICKS, 5)
-
 
 @pytest.fixture
-def file(path: Path, records: list[TickRecord]) -> Iterator[RecordingFile]:
-    del records
-    with RecordingFile.open(path) as file:
+def file(run: Path) -> Iterator[RecordingFile]:
+    with RecordingFile.open(run) as file:
         yield file
 
 
 def test_stock_reader_finds_every_message_valid_by_its_schema(
-    path: Path, records: list[TickRecord]
+    run: Path, records: list[TickRecord]
 ) -> None:
     checks = {}
     counts: dict[str, int] = {}
-    with path.open("rb") as opened:
+    with run.open("rb") as opened:
         for schema, channel, message in make_reader(opened, validate_crcs=True).iter_messages():
             assert schema is not None
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
@@ -155,11 +141,11 @@ def test_all_topics_have_channels(file: RecordingFile) -> None:
 
 
 def test_states_are_the_changed_ones_to_the_bit(
-    path: Path, file: RecordingFile, records: list[TickRecord]
+    run: Path, file: RecordingFile, records: list[TickRecord]
 ) -> None:
     by_time = {each.state.t: each.state for each in records}
     messages = [json.loads(each.data) for each in file.messages(STATE)]
-    assert 0.3 * TICKS < len(messages) <= TICKS
+    assert 0.3 * len(records) < len(messages) <= len(records)
     robot = described().robot
     arm = robot.require_arm()
     for each in messages:
@@ -170,7 +156,7 @@ def test_states_are_the_changed_ones_to_the_bit(
         T = arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q)
         np.testing.assert_allclose(each["position"], T[:3, 3], atol=2e-5)
     # The orientation is not in the file; it follows from the joints.
-    found_orientations = katana450.open(path).orientation
+    found_orientations = katana450.open(run).orientation
     assert found_orientations.shape == (len(messages), 4)
     for each, (x, y, z, w) in zip(messages[::10], found_orientations[::10], strict=True):
         state = by_time[each["t"]]
@@ -184,10 +170,10 @@ def test_states_are_the_changed_ones_to_the_bit(
 
 
 def test_state_at_any_moment_has_all_objects(
-    file: RecordingFile, records: list[TickRecord], path: Path, tmp_path: Path
+    file: RecordingFile, records: list[TickRecord], run: Path, tmp_path: Path
 ) -> None:
     part = tmp_path / "part.mcap"
-    trim([path], part, records[150].t, records[200].t)
+    trim([run], part, records[150].t, records[200].t)
     with RecordingFile.open(part) as cut:
         for number in (0, 3, 149, 150, 175, 200, 210):
             state = records[number].state
@@ -267,13 +253,13 @@ def test_files_of_a_ring_are_joined(records: list[TickRecord], tmp_path: Path) -
 
 
 def test_csv_is_a_motion_that_export_plays(
-    path: Path, records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    run: Path, records: list[TickRecord], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run.csv"
-    assert main(["record", "export", str(path), "--out", str(out), "--from", "0.5"]) == 0
+    assert main(["record", "export", str(run), "--out", str(out), "--from", "0.5"]) == 0
     assert "rows" in capsys.readouterr().out
     motion = load_motion(out, described().robot)
-    with RecordingFile.open(path) as file:
+    with RecordingFile.open(run) as file:
         table = columns(file, file.start + 0.5)
     assert len(motion.t) == len(table["t"])
     chain = described().robot.require_arm().chain
@@ -300,12 +286,12 @@ def test_file_that_is_being_written_is_not_replaced(
 
 
 def test_recording_of_another_robot_is_refused(
-    path: Path, records: list[TickRecord], capsys: pytest.CaptureFixture[str], tmp_path: Path
+    run: Path, records: list[TickRecord], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     del records
     other = tmp_path / "other.urdf"
     other.write_text(URDF_PATH.read_text() + "<!-- changed -->")
-    assert main(["record", "verify", str(path), "--urdf", str(other)]) == 1
+    assert main(["record", "verify", str(run), "--urdf", str(other)]) == 1
     assert "not of" in capsys.readouterr().err
 
 

@@ -32,7 +32,7 @@ from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask, enter
 from tests.recording.recorded import record, swinging
-from tests.recording.test_recorder import waited_for
+from tests.waiting import until
 
 POSTURES = ((0.3, -1.0, 1.4, 0.3, 0.0), (-0.3, -1.0, 1.4, 0.3, 0.5))
 
@@ -54,9 +54,7 @@ def server(tmp_path_factory: pytest.TempPathFactory, temporary: Path) -> Iterato
             for posture in POSTURES:
                 client.joints(posture)
         cookie = enter(running.url)
-        waited_for(
-            lambda: ask(f"{running.url}/api/v1/recording", Cookie=cookie)[0] == 200, "a recording"
-        )
+        until(lambda: ask(f"{running.url}/api/v1/recording", Cookie=cookie)[0] == 200)
         time.sleep(1.0)
         yield running
 
@@ -178,7 +176,7 @@ def folders(temporary: Path) -> list[Path]:
 def test_job_that_is_cancelled_leaves_nothing(page: Page, temporary: Path) -> None:
     others = {each.name for each in temporary.iterdir()}
     name = page.begun("do=html")
-    waited_for(lambda: len(list(folders(temporary)[-1].iterdir())) > 0, "a file of the job")
+    until(lambda: len(list(folders(temporary)[-1].iterdir())) > 0)
     # One at a time.
     status, answer = page.ask("/jobs?do=csv", post=True)
     assert status == 429
@@ -236,7 +234,7 @@ def test_job_ends_with_a_server_that_is_killed(
         with katana450.connect(server.url, name="Ada") as client:
             client.joints(POSTURES[0])
         page = Page(server)
-        waited_for(lambda: page.ask("")[0] == 200, "a recording")
+        until(lambda: page.ask("")[0] == 200)
         others = {each.name for each in temporary.iterdir()}
         page.begun("do=html")
 
@@ -249,10 +247,10 @@ def test_job_ends_with_a_server_that_is_killed(
                 and "job_process" in _command(each)
             ]
 
-        waited_for(working, "the process of the job")
+        until(working)
         assert folders(temporary)
         os.killpg(server.pid, signal.SIGKILL)
-        waited_for(lambda: not working(), "the end of the process")
+        until(lambda: not working())
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     RecordingStore(None)
     assert not folders(temporary)

@@ -28,7 +28,7 @@ from katana450.server.web.http_api import RouteContext
 from tests.browser.server import RECORDING_APP, AppServer
 from tests.gateway.client import ask, enter
 from tests.recording.recorded import described
-from tests.recording.test_recorder import waited_for
+from tests.waiting import until
 
 TARGETS = ((0.33, 0.05, 0.08), (0.28, -0.04, 0.03), (0.3, 0.0, 0.06))
 
@@ -56,7 +56,7 @@ def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Pat
                 return False
             return bool(np.abs(katana450.open(path).setpoint[-1] - end).max() < 1e-9)
 
-        waited_for(kept, "the drag in the recording")
+        until(kept)
     return path
 
 
