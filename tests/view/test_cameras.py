@@ -43,8 +43,8 @@ def points_on(robot: Robot, q: FloatArray) -> FloatArray:
 def test_no_posture_is_cut_off(robot: Robot, postures: FloatArray, preset: Preset) -> None:
     look = CAMERA_POSES[preset]
     position, target = np.array(look.position), np.array(look.target)
-    ahead = (target - position) / np.linalg.norm(target - position)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    axis = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(axis, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
     top = math.tan(0.5 * FOV)
     greatest = 0.0
@@ -52,10 +52,10 @@ def test_no_posture_is_cut_off(robot: Robot, postures: FloatArray, preset: Prese
         points = points_on(robot, q)
         if points[:, 2].min() < -0.02:
             continue  # through the table
-        seen = points - position
-        depth = seen @ ahead
-        across = np.abs(seen @ right / depth).max() / (ASPECT * top)
-        up = np.abs(seen @ np.cross(right, ahead) / depth).max() / top
+        rays = points - position
+        depth = rays @ axis
+        across = np.abs(rays @ right / depth).max() / (ASPECT * top)
+        up = np.abs(rays @ np.cross(right, axis) / depth).max() / top
         greatest = max(greatest, across, up)
     # The arm also fills the picture.
     assert 0.9 < greatest < 1.0

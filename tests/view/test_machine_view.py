@@ -160,7 +160,7 @@ def machine_view(
 def test_extensions_add_what_needs_no_tool(server: viser.ViserServer, robot: Robot) -> None:
     hub = Hub(lambda: 0.0)
     machine_view(server, robot, hub, Namespace())
-    labels = [each.label for each in internals.controls(server)]
+    labels = [control.label for control in internals.controls(server)]
     assert labels.count("Opacity") == labels.count("Turn") == 1
     assert not {"Script", "Program"} & set(labels)
     # Windows of this server can play back.

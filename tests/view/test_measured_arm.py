@@ -86,10 +86,10 @@ def test_simulated_arm_has_no_such_layer() -> None:
 def test_links_of_an_arm_are_drawn_while_it_is_connected(
     robot: Robot, server: viser.ViserServer, session: Session, mode: ArmMode
 ) -> None:
-    found = layer("tcp://arm:5566")
-    assert found is not None
+    measured = layer("tcp://arm:5566")
+    assert measured is not None
     gestures: Any = SimpleNamespace(listen=lambda *_: None)
-    scenery = Scenery(server, robot, session, load_props(), gestures, Meshes(), (found,))
+    scenery = Scenery(server, robot, session, load_props(), gestures, Meshes(), (measured,))
     rest = session.begin(session.ready, 0.0, 0.0)
     still, unknown = np.zeros(6), mode is ArmMode.DISCONNECTED
     for shown, hidden in ((ArmMode.HOLDING, False), (mode, unknown), (ArmMode.MOVING, False)):

@@ -50,9 +50,9 @@ def shown(server: viser.ViserServer, robot: Robot, session: Session) -> Shown:
 
 
 def test_link_is_painted_hidden_and_restored(shown: Shown) -> None:
-    made = [shape.visible for shape in shown.arm.shapes["pan_link"]]
-    assert made
-    assert all(made)
+    visible = [shape.visible for shape in shown.arm.shapes["pan_link"]]
+    assert visible
+    assert all(visible)
     red = Appearance().having("pan_link", AppearanceTrait.COLOUR, (1.0, 0.0, 0.2))
     shown.show(appearance=red)
     painted = shown.painted()
@@ -72,7 +72,7 @@ def test_link_is_painted_hidden_and_restored(shown: Shown) -> None:
     assert shown.painted() == {}
     assert not any(shape.visible for shape in shown.arm.shapes["pan_link"])
     shown.show(appearance=Appearance())
-    assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == made
+    assert [shape.visible for shape in shown.arm.shapes["pan_link"]] == visible
     assert shown.painted() == {}
 
 
@@ -121,11 +121,11 @@ def test_both_parts_are_coated_until_they_are_apart(robot: Robot, state: State) 
     assert sum("finger_left" in name for name in scene.coats) == len(body.collisions)
     tint.follow(touching(state, "finger_left_link", "bench"))
     assert scene.coated() == {"finger_left_link"}
-    made = len(scene.coats)
+    number = len(scene.coats)
     tint.follow(state)
     assert scene.coated() == set()
     tint.follow(touching(state, "finger_left_link", "upper_arm_link"))
-    assert len(scene.coats) == made
+    assert len(scene.coats) == number
     assert scene.coated() == {"finger_left_link", "upper_arm_link"}
 
 

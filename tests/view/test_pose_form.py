@@ -25,8 +25,8 @@ def form(server: viser.ViserServer, arm: MountedArm, session: Session) -> PoseFo
 
 
 def control(server: viser.ViserServer, label: str) -> Any:
-    (found,) = (each for each in internals.controls(server) if each.label == label)
-    return found
+    (match,) = (handle for handle in internals.controls(server) if handle.label == label)
+    return match
 
 
 def choose_frame(server: viser.ViserServer, frame: str) -> None:

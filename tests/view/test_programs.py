@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
 
@@ -32,7 +31,6 @@ from katana450.resources import URDF_PATH
 from katana450.server.api.answers import Progress
 from katana450.server.api.program_requests import ProgramOrder
 from katana450.settings import Settings
-from tests.browser.server import free_port
 from tests.view.gestures import ANNA, RecordedGestures
 from tests.viser_bridge.internals import nodes
 
@@ -54,13 +52,6 @@ class ProgramRunner:
         self.requests.append(("", order))
 
 
-@pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(port=free_port(), verbose=False)
-    yield server
-    server.stop()
-
-
 def test_texts_are_escaped_in_markup() -> None:
     page = _page(Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"))
     assert "&lt;b&gt;x" in page
@@ -73,34 +64,45 @@ def test_texts_are_escaped_in_markup() -> None:
     assert _page(None) == ""
 
 
-def panel_of(
-    server: viser.ViserServer,
-    robot: Robot,
-    runner: ProgramRunner,
-    scripts: Scripts,
-    session: Session,
-    state: State,
-) -> ProgramsPanel:
-    """Return the panel of an arm that keeps its state."""
-    gestures = RecordedGestures()
-    access = cast(PanelAccess, runner)
-    return ProgramsPanel(server, robot, access, scripts, gestures, lambda: state, lambda: session)
+class Stage:
+    """The panel of an arm at rest, on a viser server, with a recording runner."""
+
+    def __init__(
+        self, server: viser.ViserServer, robot: Robot, session: Session, scripts: Scripts
+    ) -> None:
+        self.session, self.state = session, session.begin(session.ready, 0.0, 0.0)
+        self.runner = ProgramRunner()
+        gestures, access = RecordedGestures(), cast(PanelAccess, self.runner)
+        state = self.state
+        self.panel = ProgramsPanel(
+            server, robot, access, scripts, gestures, lambda: state, lambda: session
+        )
+        self._T_base_shoulder = robot.require_arm().T_base_shoulder
+
+    def compiled(self, text: str) -> Program:
+        """Return the program of the script ``text`` for the arm at rest."""
+        context = PlanContext(self.session, self._T_base_shoulder)
+        return compiled(parse(text), context, self.state)
 
 
-def test_panel_previews_and_steers(
-    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
-) -> None:
-    program_runner = ProgramRunner()
-    state = session.begin(session.ready, 0.0, 0.0)
-    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
+@pytest.fixture
+def scripts(tmp_path: Path) -> Scripts:
+    return Scripts(tmp_path)
+
+
+@pytest.fixture
+def stage(server: viser.ViserServer, robot: Robot, session: Session, scripts: Scripts) -> Stage:
+    return Stage(server, robot, session, scripts)
+
+
+def test_panel_previews_and_steers(stage: Stage) -> None:
+    panel, program_runner = stage.panel, stage.runner
     # The first choice is for an arm without its gripper.
     assert panel._choice.value == "Circle with gripper"
     panel.follow()
     way = panel._preview._path_line
     assert not way.visible
-    plan_context = PlanContext(session, arm.T_base_shoulder)
-    text = "tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n"
-    program_runner.program = compiled(parse(text), plan_context, state)
+    program_runner.program = stage.compiled("tool: tcp\nsteps:\n  - line: {by: {z: 40}}\n")
     panel.follow()
     points = np.asarray(way.points).reshape(-1, 3)
     assert np.abs(points[-1] - points[0] - (0.0, 0.0, 0.04)).max() < 1e-6
@@ -139,14 +141,11 @@ def test_names_of_steps_are_escaped_in_markup() -> None:
 
 
 def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
-    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
+    stage: Stage, robot: Robot, arm: MountedArm
 ) -> None:
-    program_runner = ProgramRunner()
-    state = session.begin(session.ready, 0.0, 0.0)
-    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
-    plan_context = PlanContext(session, arm.T_base_shoulder)
+    panel, program_runner = stage.panel, stage.runner
     text = "tool: tcp\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n  - line: {by: {z: 40}}\n"
-    program = compiled(parse(text), plan_context, state)
+    program = stage.compiled(text)
     preview = panel._preview
 
     def looked_at() -> bool:
@@ -156,7 +155,7 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
     panel.follow()
     panel._orders.value = "Preview"  # type: ignore[misc]  # viser declares it read-only
     panel._order(ANNA)
-    program_runner.program = compiled(parse(text), plan_context, state)
+    program_runner.program = stage.compiled(text)
     program_runner.progress = Progress(name="x", by="me", status="ready")
     panel.follow()
     timeline = Timeline.of(program)
@@ -189,18 +188,16 @@ def test_preview_shows_the_arm_along_the_path_until_the_program_runs(
 
 
 def test_preview_shows_cup_and_water_at_the_time_in_words(
-    server: viser.ViserServer, robot: Robot, arm: MountedArm, tmp_path: Path
+    server: viser.ViserServer, robot: Robot, scripts: Scripts
 ) -> None:
-    program_runner = ProgramRunner()
     session = describe_robot(Settings(), URDF_PATH, None).session
-    state = session.begin(session.ready, 0.0, 0.0)
-    panel = panel_of(server, robot, program_runner, Scripts(tmp_path), session, state)
-    plan_context = PlanContext(session, arm.T_base_shoulder)
-    program = compiled(parse(script_text(library_file("pour"))), plan_context, state)
+    stage = Stage(server, robot, session, scripts)
+    panel, program_runner = stage.panel, stage.runner
+    program = stage.compiled(script_text(library_file("pour")))
     program_runner.program = program
     panel.follow()
     panel._preview.look(0.1)
-    for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+    for thread in [running for running in threading.enumerate() if running.name == "preview"]:
         thread.join(60.0)
     panel._preview.look(0.0)
     assert panel._seek_time.visible
@@ -211,14 +208,14 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
         panel._seek()
         shown = panel._preview._shown
         assert shown is not None
-        seen = shown.at(t)
-        assert seen is not None
-        return seen
+        moment = shown.at(t)
+        assert moment is not None
+        return moment
 
     def ghosts() -> tuple[bool, bool]:
         """Return whether ghosts of the cup and of the water are shown."""
-        found = nodes(server)
-        cup, water = found["/path/objects/0"], found.get("/path/water")
+        ghost_nodes = nodes(server)
+        cup, water = ghost_nodes["/path/objects/0"], ghost_nodes.get("/path/water")
         return cup.visible, water is not None and water.visible
 
     assert ghosts() == (False, False)
@@ -229,18 +226,18 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
 
     def filled() -> tuple[bool, ...]:
         """Return whether water is shown in the cup and in the basin."""
-        found = [nodes(server).get(f"/path/water/{part}") for part in ("vessel0", "basin")]
-        return tuple(part is not None and part.visible for part in found)
+        parts = [nodes(server).get(f"/path/water/{part}") for part in ("vessel0", "basin")]
+        return tuple(part is not None and part.visible for part in parts)
 
     for t in (carried, emptied):
-        seen = look(t)
+        shown_state = look(t)
         assert f"{t:.1f} s of" in panel._seek_time.content
         assert ghosts() == (True, True)
-        (cup,) = (each for each in seen.objects if each.held)
-        T = session.environment.pose(cup, seen.x)
+        (cup,) = (scene_object for scene_object in shown_state.objects if scene_object.held)
+        T = session.environment.pose(cup, shown_state.x)
         assert nodes(server)["/path/objects/0"].position == pytest.approx(T[:3, 3])
-        assert seen.poured is not None
-        water = seen.poured.water
+        assert shown_state.poured is not None
+        water = shown_state.poured.water
         assert filled() == (water.cup.volume >= WORTH_SHOWING, water.basin >= WORTH_SHOWING)
     assert filled() == (False, True)
     look(carried)
@@ -254,17 +251,13 @@ def test_preview_shows_cup_and_water_at_the_time_in_words(
     assert not panel._seek_time.visible
 
 
-def test_list_and_drop_down_are_one_program(
-    server: viser.ViserServer, robot: Robot, arm: MountedArm, session: Session, tmp_path: Path
-) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
-    runner = ProgramRunner()
-    panel = panel_of(server, robot, runner, Scripts(tmp_path), session, state)
+def test_list_and_drop_down_are_one_program(stage: Stage, scripts: Scripts) -> None:
+    panel, runner = stage.panel, stage.runner
     own = panel._choice.value
     # Another person sends a script that is in no folder.
     text = "name: Wave\nsteps:\n  - joints: [40, -60, 80, 10, 0]\n"
     runner.text = text
-    runner.program = compiled(parse(text), PlanContext(session, arm.T_base_shoulder), state)
+    runner.program = stage.compiled(text)
     runner.progress = Progress(name="Wave", by="Vera", status="running", step=1, steps=1)
     panel.follow()
     assert (panel._choice.value, panel._choice.disabled) == ("Wave of Vera", True)
@@ -283,17 +276,13 @@ def test_list_and_drop_down_are_one_program(
     panel._order(ANNA)
     assert runner.requests == [(text, ProgramOrder.RUN)]
     # A script of the library is shown by its own name.
-    runner.text = Scripts(tmp_path).text("Pour")
+    runner.text = scripts.text("Pour")
     panel.follow()
     assert panel._choice.value == "Pour"
 
 
-def test_list_follows_the_folder(
-    server: viser.ViserServer, robot: Robot, session: Session, tmp_path: Path
-) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
-    scripts = Scripts(tmp_path)
-    panel = panel_of(server, robot, ProgramRunner(), scripts, session, state)
+def test_list_follows_the_folder(stage: Stage, scripts: Scripts) -> None:
+    panel = stage.panel
     chosen = panel._choice.value
     scripts.save("Mine", "steps: [home]")
     panel.follow()

@@ -48,8 +48,8 @@ def mesh() -> Mesh:
 
 
 def seen(state: State, *objects: SceneObject, near: str = "") -> State:
-    found = (Finding(Reason.CONTACT, 0.005, parts=(near, "finger")),) if near else ()
-    return replace(state, objects=objects, findings=found)
+    findings = (Finding(Reason.CONTACT, 0.005, parts=(near, "finger")),) if near else ()
+    return replace(state, objects=objects, findings=findings)
 
 
 def test_mesh_is_drawn_again_only_when_necessary(
@@ -102,7 +102,7 @@ def test_mesh_is_drawn_again_only_when_necessary(
     )
     assert not shown(f"{PATH}/contact")
     nodes.follow(seen(state))
-    assert not [each for each in internals.nodes(server) if each.startswith(PATH)]
+    assert not [node for node in internals.nodes(server) if node.startswith(PATH)]
 
 
 def test_mesh_without_triangles_is_drawn_as_its_convex_body(
@@ -161,7 +161,9 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
     drag("start", 0.7)
     drag("update", 0.74)
     drag("update", 1.5)
-    assert [each.scene_object.T[0, 3] for each in put if isinstance(each, cmd.PlaceObject)] == [
+    assert [
+        command.scene_object.T[0, 3] for command in put if isinstance(command, cmd.PlaceObject)
+    ] == [
         0.7,
         0.74,
     ]

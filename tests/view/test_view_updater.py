@@ -94,7 +94,9 @@ def test_command_is_shown_at_once_and_leaves_the_panel_its_turn(
 
 def texts(server: viser.ViserServer) -> str:
     elements = internals.panel(server)
-    return "".join(each.content for each in elements if isinstance(each, viser.GuiHtmlHandle))
+    return "".join(
+        element.content for element in elements if isinstance(element, viser.GuiHtmlHandle)
+    )
 
 
 def test_numbers_follow_state_and_frame_and_cost_nothing_at_rest(
@@ -121,7 +123,7 @@ def test_numbers_follow_state_and_frame_and_cost_nothing_at_rest(
     assert computed == [state, moved]
     assert texts(server) != shown
 
-    (frame,) = (each for each in internals.controls(server) if each.label == "Frame")
+    (frame,) = (handle for handle in internals.controls(server) if handle.label == "Frame")
     frame.value = readout.BASE
     end = time.monotonic() + 10.0
     later = 6.0
