@@ -123,8 +123,8 @@ def test_arm_that_has_just_ended_is_not_young(ends: Ends) -> None:
 
 
 def test_arm_that_moves_at_once_was_at_rest(ends: Ends, monkeypatch: pytest.MonkeyPatch) -> None:
-    front, told, flush = ends.front, [], ends.front._flush
-    front.on_command_at_rest = lambda: told.append(True)
+    front, calls, flush = ends.front, [], ends.front._flush
+    front.on_command_at_rest = lambda: calls.append(True)
 
     def moves() -> bool:
         # An arm that hears nothing while it waits for the processor would stop.
@@ -137,7 +137,7 @@ def test_arm_that_moves_at_once_was_at_rest(ends: Ends, monkeypatch: pytest.Monk
 
     monkeypatch.setattr(front, "_flush", slow)
     front.deliver(cmd.Joint(1, 1.0))
-    assert told
+    assert calls
 
 
 def test_command_crosses_the_pipe_and_its_ticket_returns(ends: Ends) -> None:
@@ -202,7 +202,7 @@ def test_silent_front_end_pauses_a_simulated_arm(
     # Longer silence latches the stop.
     front.deliver(cmd.Joint(1, -2.0))
     until(lambda: publisher.snapshot.state.stopped is not None)
-    assert Reason.SERVER_SILENT in {each.reason for each in publisher.snapshot.state.findings}
+    assert Reason.SERVER_SILENT in {finding.reason for finding in publisher.snapshot.state.findings}
     ends.arm_end.close()
     ends.loop.stop()
 
@@ -252,7 +252,7 @@ def test_outcomes_return_with_the_tickets_of_the_front_end(ends: Ends) -> None:
     assert outcomes.of(fine).result(wait).verdict is Verdict.ACCEPTED
     limited = outcomes.of(far).result(wait)
     assert limited.verdict is Verdict.LIMITED
-    assert [found.axis for found in limited.findings] == [1]
+    assert [finding.axis for finding in limited.findings] == [1]
     # The front end has not seen this stop yet, as when the arm's end lost contact.
     ends.mailbox.put(cmd.Stop())
     late = outcomes.of(front.deliver(cmd.Joint(1, 0.2))).result(wait)
@@ -343,9 +343,9 @@ def test_front_end_connects_to_a_new_process_of_the_arm(arm: ArmModel, session: 
     # Another front end replaces this one.
     later.close()
     assert front.cut.wait(2.0)
-    for each in (old, new):
-        each.arm_end.close()
-        each.loop.stop()
+    for both in (old, new):
+        both.arm_end.close()
+        both.loop.stop()
 
 
 OUTCOME = Outcome(Verdict.ACCEPTED)

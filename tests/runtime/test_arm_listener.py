@@ -31,16 +31,16 @@ def address(tmp_path: Path) -> ArmAddress:
 
 @pytest.fixture
 def greetings(address: ArmAddress) -> Iterator[SimpleQueue[Greeting]]:
-    found: SimpleQueue[Greeting] = SimpleQueue()
-    kept: list[Connection] = []
+    received: SimpleQueue[Greeting] = SimpleQueue()
+    connections: list[Connection] = []
 
     def attach(connection: Connection, greeting: Greeting) -> None:
-        kept.append(connection)
-        found.put(greeting)
+        connections.append(connection)
+        received.put(greeting)
 
     listener = ArmListener(address, {"front": attach})
     listener.start()
-    yield found
+    yield received
     listener.close()
 
 

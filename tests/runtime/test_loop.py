@@ -17,7 +17,7 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.lease import Person, Role
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.silence import SilenceProfile
-from katana450.arm.control.state.state import Finding, Reason, Status
+from katana450.arm.control.state.state import Finding, Reason, State, Status
 from katana450.arm.control.state.stop_cause import pressed
 from katana450.arm.drivers.driver import DriverAnswer
 from katana450.arm.drivers.simulated import SimulatedDriver
@@ -51,16 +51,22 @@ class SteppedClock:
 class LoopParts:
     """A control loop and its parts."""
 
-    def __init__(self, arm: ArmModel, session: Session) -> None:
+    def __init__(
+        self, arm: ArmModel, session: Session, driver: type[SimulatedDriver] = SimulatedDriver
+    ) -> None:
         self.clock = SteppedClock()
         self.mailbox = Mailbox(session.check)
-        self.driver = SimulatedDriver(arm, session.ready, 0.0)
+        self.driver = driver(arm, session.ready, 0.0)
         self.loop = ControlLoop(session, self.driver, self.mailbox, self.clock, RATE)
 
     def tick(self, times: int = 1) -> None:
         for _ in range(times):
             self.clock.t += 1.0 / RATE
             self.loop.tick()
+
+    @property
+    def state(self) -> State:
+        return self.loop.state_publisher.snapshot.state
 
 
 @pytest.fixture
@@ -73,9 +79,9 @@ def test_command_moves_the_arm_to_its_goal(arm: ArmModel, parts: LoopParts) -> N
     parts.tick()
     assert parts.loop.state_publisher.snapshot.ticket == ticket
     jerk = float(arm.limits.jerk[0])
-    assert parts.loop.state_publisher.snapshot.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
+    assert parts.state.q[0] == pytest.approx(jerk / RATE**3 / 6.0)
     parts.tick(150)
-    assert parts.loop.state_publisher.snapshot.state.q[0] == 0.5
+    assert parts.state.q[0] == 0.5
 
 
 def test_arm_at_rest_publishes_nothing(parts: LoopParts) -> None:
@@ -90,10 +96,10 @@ def test_arm_at_rest_publishes_nothing(parts: LoopParts) -> None:
 
 def test_first_step_after_rest_is_one_period_long(arm: ArmModel, parts: LoopParts) -> None:
     parts.tick(500)
-    before = parts.loop.state_publisher.snapshot.state.q
+    before = parts.state.q
     parts.mailbox.put(cmd.Joint(1, 2.0))
     parts.tick()
-    step = np.abs(parts.loop.state_publisher.snapshot.state.q - before)
+    step = np.abs(parts.state.q - before)
     assert step.max() == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)
 
 
@@ -125,57 +131,48 @@ def test_bodies_are_loaded_before_the_first_tick(
     assert threads[1:] == ["control"]
 
 
+@pytest.fixture
+def broken(arm: ArmModel, session: Session) -> LoopParts:
+    """Return a loop whose driver can fail."""
+    return LoopParts(arm, session, BrokenDriver)
+
+
 def test_failing_driver_makes_the_arm_hold_and_report_it(
-    arm: ArmModel, session: Session, caplog: pytest.LogCaptureFixture
+    broken: LoopParts, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    clock, mailbox = SteppedClock(), Mailbox(session.check)
-    driver = BrokenDriver(arm, session.ready, 0.0)
-    loop = ControlLoop(session, driver, mailbox, clock, RATE)
-    mailbox.put(cmd.Joint(1, 2.0))
-    for _ in range(5):
-        clock.t += 0.01
-        loop.tick()
-    moving = loop.state_publisher.snapshot.state
-    driver.broken = True
-    clock.t += 0.01
-    with caplog.at_level(logging.ERROR):
-        loop.tick()
-    held = loop.state_publisher.snapshot.state
+    broken.mailbox.put(cmd.Joint(1, 2.0))
+    broken.tick(5)
+    moving = broken.state
+    with caplog.at_level(logging.ERROR), monkeypatch.context() as failing:
+        failing.setattr(broken.driver, "broken", True)
+        broken.tick()
+    held = broken.state
     assert held.status is Status.FAULT
     assert (held.goal == moving.setpoint).all()
     assert "the cable came out" in caplog.text
     # With the cable back in, the arm still holds until a new command comes.
-    driver.broken = False
-    for _ in range(20):
-        clock.t += 0.01
-        loop.tick()
-    assert np.allclose(loop.state_publisher.snapshot.state.q, moving.setpoint)
-    assert loop.state_publisher.snapshot.state.findings == held.findings
-    mailbox.put(cmd.Home())
-    clock.t += 0.01
-    loop.tick()
-    assert loop.state_publisher.snapshot.state.findings == ()
+    broken.tick(20)
+    assert np.allclose(broken.state.q, moving.setpoint)
+    assert broken.state.findings == held.findings
+    broken.mailbox.put(cmd.Home())
+    broken.tick()
+    assert broken.state.findings == ()
 
 
-def test_stop_in_a_failed_tick_is_executed_in_the_next(arm: ArmModel, session: Session) -> None:
-    clock, mailbox = SteppedClock(), Mailbox(session.check)
-    driver = BrokenDriver(arm, session.ready, 0.0)
-    loop = ControlLoop(session, driver, mailbox, clock, RATE)
+def test_stop_in_a_failed_tick_is_executed_in_the_next(
+    broken: LoopParts, session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
     press = cmd.Stop(pressed("Anna", "a", "one", 1.0))
-    driver.broken = True
-    mailbox.put(press)
-    for _ in range(2):
-        clock.t += 0.01
-        loop.tick()
-    assert loop.state_publisher.snapshot.state.stopped is None
-    driver.broken = False
+    with monkeypatch.context() as failing:
+        failing.setattr(broken.driver, "broken", True)
+        broken.mailbox.put(press)
+        broken.tick(2)
+        assert broken.state.stopped is None
     # A copy of the press by another path is no second stop.
-    mailbox.put(press)
-    mailbox.put(cmd.Joint(1, 2.0))
-    for _ in range(20):
-        clock.t += 0.01
-        loop.tick()
-    state = loop.state_publisher.snapshot.state
+    broken.mailbox.put(press)
+    broken.mailbox.put(cmd.Joint(1, 2.0))
+    broken.tick(20)
+    state = broken.state
     assert state.stopped is not None
     assert (state.stopped.cause.why, state.presses) == ("Anna pressed STOP.", ("one",))
     np.testing.assert_array_equal(state.q, session.ready)
@@ -189,19 +186,19 @@ def test_copy_of_a_press_names_who_pressed_and_stops_nothing(parts: LoopParts) -
     for whose, press in (("b/page", "one"), ("a/page", "two")):
         parts.mailbox.put(cmd.Stop(pressed("Anna", whose, press, 2.0)))
         parts.tick(10)
-    first = parts.loop.state_publisher.snapshot.state.stopped
+    first = parts.state.stopped
     assert first is not None
     assert first.cause.by == "Somebody"
     parts.mailbox.put(cmd.Stop(pressed("Anna", "a/page", "one", 2.0)))
     parts.tick()
-    stopped = parts.loop.state_publisher.snapshot.state.stopped
+    stopped = parts.state.stopped
     assert stopped == replace(first, cause=pressed("Anna", "a/page", "one", 1.0))
     # The late copy of the first process does not take the name away.
     parts.mailbox.put(cmd.Stop(pressed("Somebody", "a/page", "one", 1.0)))
     parts.tick()
-    assert parts.loop.state_publisher.snapshot.state.stopped == stopped
+    assert parts.state.stopped == stopped
     events = RunEvents()
-    assert [each for record in records for each in events.of(record)][-1] == (
+    assert [event for record in records for event in events.of(record)][-1] == (
         "stop", {"why": "Anna pressed STOP.", "by": "Anna", "named": True}
     )  # fmt: skip
 
@@ -214,7 +211,7 @@ def test_only_after_a_silent_server_a_program_resumes_by_itself(parts: LoopParts
         parts.tick(30)
         parts.loop.brake(Finding(reason, 0.3), 0.3)
         parts.tick(200)
-        state = parts.loop.state_publisher.snapshot.state
+        state = parts.state
         assert not state.moving
         # A hold drops the goal; a pause keeps it until the program goes on.
         assert state.goal[0] == (state.q[0] if goal is None else goal) != 0.0
@@ -222,22 +219,22 @@ def test_only_after_a_silent_server_a_program_resumes_by_itself(parts: LoopParts
 
 def test_wait_for_change_returns_on_change_or_timeout(parts: LoopParts) -> None:
     parts.tick()
-    seen = parts.loop.state_publisher.snapshot
-    assert parts.loop.state_publisher.wait_for_change(seen, 0.01) is seen
+    before = parts.loop.state_publisher.snapshot
+    assert parts.loop.state_publisher.wait_for_change(before, 0.01) is before
     parts.mailbox.put(cmd.Home())
     thread = threading.Thread(target=parts.tick)
     thread.start()
-    assert parts.loop.state_publisher.wait_for_change(seen, 5.0) is not seen
+    assert parts.loop.state_publisher.wait_for_change(before, 5.0) is not before
     thread.join()
 
 
 def test_wake_ends_a_wait_for_change(parts: LoopParts) -> None:
     parts.tick()
     publisher = parts.loop.state_publisher
-    seen, found = publisher.snapshot, []
+    before, after = publisher.snapshot, []
     ended = threading.Event()
     thread = threading.Thread(
-        target=lambda: found.append(publisher.wait_for_change(seen, 60.0, ended.is_set))
+        target=lambda: after.append(publisher.wait_for_change(before, 60.0, ended.is_set))
     )
     thread.start()
     publisher.wake()
@@ -246,7 +243,7 @@ def test_wake_ends_a_wait_for_change(parts: LoopParts) -> None:
     ended.set()
     publisher.wake()
     thread.join(30.0)
-    assert found == [seen]
+    assert after == [before]
 
 
 class ClockOfPresses(SteppedClock):
@@ -273,19 +270,19 @@ class ClockOfPresses(SteppedClock):
 
 def test_stop_does_not_wait_for_the_next_tick(arm: ArmModel, session: Session) -> None:
     clock, mailbox = ClockOfPresses(3), Mailbox(session.check)
-    at: list[float] = []
+    times: list[float] = []
     loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
 
     def press() -> None:
-        if not at:
-            at.append(clock.t)
+        if not times:
+            times.append(clock.t)
             mailbox.put(cmd.Stop(pressed("Anna", "a", "one", 1.0)))
 
     clock.press, clock.end = press, loop._stopping.set
     loop._run()
     state = loop.state_publisher.snapshot.state
     assert state.stopped is not None
-    assert state.t == at[0]
+    assert state.t == times[0]
 
 
 def test_flood_of_stops_adds_at_most_one_tick_per_period(arm: ArmModel, session: Session) -> None:
@@ -298,31 +295,31 @@ def test_flood_of_stops_adds_at_most_one_tick_per_period(arm: ArmModel, session:
             mailbox.put(cmd.Stop(pressed("Anna", "a", f"{next(numbers)}", 1.0)))
 
     clock.press, clock.end = press, loop._stopping.set
-    begun = clock.t
+    start = clock.t
     loop._run()
     assert loop.state_publisher.snapshot.state.stopped is not None
-    assert loop.ticks <= 2 * round((clock.t - begun) * RATE)
+    assert loop.ticks <= 2 * round((clock.t - start) * RATE)
 
 
 def test_arm_at_rest_ticks_seldom_and_moves_at_once(arm: ArmModel, session: Session) -> None:
     clock, mailbox = ClockOfPresses(12), Mailbox(session.check)
     loop = ControlLoop(session, SimulatedDriver(arm, session.ready, 0.0), mailbox, clock, RATE)
-    given: list[float] = []
+    times: list[float] = []
     states = []
 
     def give() -> None:
         states.append(loop.state_publisher.snapshot.state)
         if clock.left == 6:
-            given.append(clock.t)
+            times.append(clock.t)
             mailbox.put(cmd.Joint(1, 0.4))
 
     clock.press, clock.end = give, loop._stopping.set
-    begun = clock.t
+    start = clock.t
     loop._run()
     # One period, and five rests, the last of which the command cuts short.
-    assert given[0] - begun == pytest.approx(5 * REST_PERIOD + 0.1 / RATE)
+    assert times[0] - start == pytest.approx(5 * REST_PERIOD + 0.1 / RATE)
     moving = states[6]
-    assert moving.t == given[0]
+    assert moving.t == times[0]
     # The first step is that of one period, however long the arm rested.
     step = float(np.abs(moving.setpoint - states[0].setpoint).max())
     assert step == pytest.approx(float(arm.limits.jerk[0]) / RATE**3 / 6.0)

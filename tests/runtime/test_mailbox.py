@@ -26,7 +26,7 @@ def test_commands_leave_once_and_in_order(mailbox: Mailbox) -> None:
     sent: list[cmd.Command] = [cmd.Home(), cmd.Joint(1, 1.0), cmd.Hold()]
     tickets = [mailbox.put(command) for command in sent]
     assert tickets == [1, 2, 3]
-    submissions = [Submission(each, None) for each in sent]
+    submissions = [Submission(command, None) for command in sent]
     assert mailbox.drain() == Drained(submissions, [[1], [2], [3]], [], 3)
     assert mailbox.drain() == Drained([], [], [], 3)
 
@@ -146,7 +146,7 @@ def test_unsupported_command_is_refused_by_the_session(mailbox: Mailbox) -> None
 
 
 def test_concurrent_threads_lose_no_command(mailbox: Mailbox) -> None:
-    taken: list[cmd.Command] = []
+    drained: list[cmd.Command] = []
     writers = [
         threading.Thread(target=lambda: [mailbox.put(cmd.Home()) for _ in range(60)])
         for _ in range(4)
@@ -154,6 +154,6 @@ def test_concurrent_threads_lose_no_command(mailbox: Mailbox) -> None:
     for writer in writers:
         writer.start()
     while any(writer.is_alive() for writer in writers):
-        taken += mailbox.drain().commands
-    taken += mailbox.drain().commands
-    assert len(taken) == 240
+        drained += mailbox.drain().commands
+    drained += mailbox.drain().commands
+    assert len(drained) == 240

@@ -43,10 +43,10 @@ def planned(session: Session, elbow: float) -> tuple[PlanningWorker, list[cmd.Co
     state = session.begin(np.array([0.3, -0.9, elbow, -0.6, -0.2]), 0.0, 0.0)
     sink = Sink()
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
-    here = state.branch
-    assert isinstance(here, Branch)
-    worker.deliver(cmd.Branch(here.shoulder, "down" if here.elbow == "up" else "up"), None)
-    until(lambda: not any(each.name == "planning" for each in threading.enumerate()), 30.0)
+    branch = state.branch
+    assert isinstance(branch, Branch)
+    worker.deliver(cmd.Branch(branch.shoulder, "down" if branch.elbow == "up" else "up"), None)
+    until(lambda: not any(thread.name == "planning" for thread in threading.enumerate()), 30.0)
     return worker, sink.commands
 
 
@@ -78,11 +78,11 @@ def test_unknown_branch_is_refused_before_a_path_is_planned(session: Session) ->
 def test_path_that_is_found_after_a_stop_is_not_followed(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found, stopped = threading.Event(), threading.Event()
+    free, stopped = threading.Event(), threading.Event()
 
     def plan_to(*arguments: Any) -> Plan:
         plan = plans.plan_to(*arguments)
-        found.set()
+        free.set()
         stopped.wait(30.0)
         return plan
 
@@ -91,9 +91,9 @@ def test_path_that_is_found_after_a_stop_is_not_followed(
     sink = Sink()
     worker = PlanningWorker(session, StatePublisher(Snapshot(state, 0), LoopTiming(0.01)), sink)
     worker.deliver(cmd.Branch("front", "down"), None)
-    assert found.wait(30.0)
+    assert free.wait(30.0)
     worker.deliver(cmd.Stop(), None)
-    (thread,) = (each for each in threading.enumerate() if each.name == "planning")
+    (thread,) = (running for running in threading.enumerate() if running.name == "planning")
     stopped.set()
     thread.join(30.0)
     assert sink.commands == [cmd.Stop()]

@@ -125,8 +125,8 @@ def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
             pipes = iter((pipe,))
             stop_pipe = StopPipe(lambda: _next(pipes))
             stop_pipe.press(press("one"))
-            found = await stop_pipe.executed(name, TIMEOUT if name == "one" else 0.3)
-            assert (found is not None) == (name == "one")
+            cause = await stop_pipe.executed(name, TIMEOUT if name == "one" else 0.3)
+            assert (cause is not None) == (name == "one")
         await ended(stop_pipe)
         pipe.close()
 

@@ -31,9 +31,9 @@ from tests.waiting import until
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of Linux and macOS")
 
 
-def worker(folder: Path, kept: dict[bytes, bytes] | None, supervisor: SupervisorPipe) -> None:
+def worker(folder: Path, state: dict[bytes, bytes] | None, supervisor: SupervisorPipe) -> None:
     """Write what happens to ``folder``, until the supervisor ends this process."""
-    count = 0 if kept is None else int(kept[KEPT])
+    count = 0 if state is None else int(state[KEPT])
     (folder / f"pid{count}").write_text(str(os.getpid()))
     supervisor.keep(KEPT, str(count + 1).encode())
     supervisor.report(READY)

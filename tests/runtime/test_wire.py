@@ -76,12 +76,12 @@ def test_published_state_is_complete(arm: ArmModel) -> None:
 
 def test_old_plans_are_forgotten(plan: Plan) -> None:
     names, plans = PlanNames(), PlanStore()
-    each = [pickle.loads(pickle.dumps(plan)) for _ in range(MAX_NAMED_PLANS + 1)]
-    for number, one in enumerate(each):
+    copies = [pickle.loads(pickle.dumps(plan)) for _ in range(MAX_NAMED_PLANS + 1)]
+    for number, one in enumerate(copies):
         plans.note(number, one)
         names.note(number, one)
-    assert plans.loaded(names.dumped(each[-1])) is each[-1]
-    assert plans.loaded(names.dumped(each[0])) is not each[0]
+    assert plans.loaded(names.dumped(copies[-1])) is copies[-1]
+    assert plans.loaded(names.dumped(copies[0])) is not copies[0]
 
 
 def solid(key: str) -> Solid:
@@ -92,7 +92,7 @@ def test_solid_is_sent_completely_once_and_then_as_its_key() -> None:
     names, plans = PlanNames(), PlanStore()
     one, other = solid("one"), solid("other")
     first = plans.loaded(names.dumped([one, other, one]))
-    assert [each.key for each in first] == ["one", "other", "one"]
+    assert [person.key for person in first] == ["one", "other", "one"]
     assert first[0] is first[2]
     np.testing.assert_array_equal(first[1].corners, other.corners)
     data = names.dumped([other, one])
