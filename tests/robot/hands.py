@@ -36,9 +36,9 @@ def hand(fingers: int = 4, *, pitch: float = 0.03, thumb: bool = True) -> str:
         parts.append('<link name="thumb_base"/>')
         above = "thumb_base"
         for number in range(3):
-            at = (0.0, 0.0, 0.0 if number == 0 else 0.037)
+            place = (0.0, 0.0, 0.0 if number == 0 else 0.037)
             link = f"thumb_link{number + 1}"
-            parts += _joint(f"thumb_bend{number + 1}", above, link, at, "0 1 0", 1.4)
+            parts += _joint(f"thumb_bend{number + 1}", above, link, place, "0 1 0", 1.4)
             parts.append(f'<link name="{link}">{_box("0.02 0.02 0.035", 0.0175)}</link>')
             above = link
     return "\n".join([*parts, "</robot>\n"])
@@ -110,7 +110,7 @@ def _joint(
     name: str,
     parent: str,
     child: str,
-    at: tuple[float, float, float],
+    place: tuple[float, float, float],
     axis: str,
     upper: float,
     mimic: str = "",
@@ -119,7 +119,7 @@ def _joint(
     lower = -upper if name.endswith(("spread", "turn")) else 0.0
     text = (
         f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{at[0]} {at[1]} {at[2]}"/><axis xyz="{axis}"/>'
+        f'<origin xyz="{place[0]} {place[1]} {place[2]}"/><axis xyz="{axis}"/>'
         f'<limit lower="{lower}" upper="{upper}" velocity="3" effort="1"/>{mimic}</joint>'
     )
     return [text]

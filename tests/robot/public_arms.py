@@ -239,13 +239,13 @@ SO101 = [
 def two_sided(joints: Sequence[J]) -> list[J]:
     """Return two arms on one base, with ``left_`` and ``right_`` before their names."""
     return [
-        each._replace(
-            name=f"{side}_{each.name}",
-            child=f"{side}_{each.child}",
-            parent=each.parent if each.parent == "base" else f"{side}_{each.parent}",
+        joint._replace(
+            name=f"{side}_{joint.name}",
+            child=f"{side}_{joint.child}",
+            parent=joint.parent if joint.parent == "base" else f"{side}_{joint.parent}",
         )
         for side in ("left", "right")
-        for each in joints
+        for joint in joints
     ]
 
 

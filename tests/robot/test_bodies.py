@@ -27,8 +27,8 @@ def read(tmp_path: Path, text: str) -> Robot:
 
 def pairs(world: CollisionWorld) -> set[frozenset[str]]:
     """Return the pairs of the robot's own parts, which test_table.py leaves out."""
-    found = {frozenset((world.parts[a].name, world.parts[b].name)) for a, b in world.pairs}
-    return {pair for pair in found if "table" not in pair}
+    pairs = {frozenset((world.parts[a].name, world.parts[b].name)) for a, b in world.pairs}
+    return {pair for pair in pairs if "table" not in pair}
 
 
 def own(world: CollisionWorld) -> list[Part]:
@@ -47,11 +47,11 @@ def test_bodies_of_a_tree_are_where_its_links_are(tmp_path: Path) -> None:
         frames = robot.frames(robot.joint_values(q, 0.0))
         T = world.linkage.poses(np.append(q, 0.0))
         for part in own(world):
-            (at,), (shape,) = part.T_mover_shape, part.shapes
-            here = T[part.mover] @ at @ np.append(shape.centre, 1.0)
+            (T_shape,), (shape,) = part.T_mover_shape, part.shapes
+            point = T[part.mover] @ T_shape @ np.append(shape.centre, 1.0)
             (visual,) = by_name[part.name].visuals
-            there = frames[part.name] @ visual.T_body_visual[:, 3]
-            np.testing.assert_allclose(here, there, atol=1e-9)
+            expected = frames[part.name] @ visual.T_body_visual[:, 3]
+            np.testing.assert_allclose(point, expected, atol=1e-9)
 
 
 def test_drawn_shapes_count_only_where_no_link_has_collision_shapes(tmp_path: Path) -> None:
@@ -87,13 +87,13 @@ def test_parts_that_move_together_or_touch_at_rest_are_not_checked(tmp_path: Pat
 def test_neighbours_are_found_across_links_without_shapes(tmp_path: Path) -> None:
     world, _, _ = robot_world(read(tmp_path, hand()))
     assert world is not None
-    found = pairs(world)
+    checked = pairs(world)
     for finger in ("finger1", "finger2", "finger3", "finger4", "thumb"):
         # Two joints are between them, but no body.
-        assert frozenset(("palm", f"{finger}_link1")) not in found
-        assert frozenset((f"{finger}_link1", f"{finger}_link2")) not in found
-        assert frozenset(("palm", f"{finger}_link2")) in found
-    assert frozenset(("finger1_link1", "finger2_link1")) in found
+        assert frozenset(("palm", f"{finger}_link1")) not in checked
+        assert frozenset((f"{finger}_link1", f"{finger}_link2")) not in checked
+        assert frozenset(("palm", f"{finger}_link2")) in checked
+    assert frozenset(("finger1_link1", "finger2_link1")) in checked
 
 
 def folded(height: float) -> str:
@@ -115,8 +115,8 @@ def folded(height: float) -> str:
         ("roll", "forearm", "cuff", (0.0, 0.0, 0.0), "0 0 1", 3.0),
     )
     parts = ['<robot name="folded"><link name="base"/>']
-    for name, (at, size) in links.items():
-        x, y, z = at
+    for name, (place, size) in links.items():
+        x, y, z = place
         a, b, c = size
         parts.append(
             f'<link name="{name}"><collision><origin xyz="{x} {y} {z}"/>'

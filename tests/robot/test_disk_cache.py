@@ -50,20 +50,20 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setattr(disk_cache, "_folder", disk_cache._folder.__wrapped__)
-    found = disk_cache._folder()
-    assert found is not None
-    return found
+    folder = disk_cache._folder()
+    assert folder is not None
+    return folder
 
 
 @pytest.mark.usefixtures("folder")
 def test_value_is_computed_once_for_the_same_inputs() -> None:
-    made = Made(np.arange(3.0))
+    value = Made(np.arange(3.0))
     for _ in range(3):
-        np.testing.assert_array_equal(kept(made, FloatArray, b"a", "b", np.eye(2)), np.arange(3.0))
-    assert made.times == 1
+        np.testing.assert_array_equal(kept(value, FloatArray, b"a", "b", np.eye(2)), np.arange(3.0))
+    assert value.times == 1
     for others in ((b"ab",), (b"a", "b"), (b"a", "b", np.zeros((2, 2))), (b"a", "b", np.eye(4))):
-        kept(made, FloatArray, *others)
-    assert made.times == 5
+        kept(value, FloatArray, *others)
+    assert value.times == 5
 
 
 @pytest.mark.usefixtures("folder")
@@ -71,21 +71,21 @@ def test_read_only_array_stays_read_only() -> None:
     array = np.arange(3.0)
     array.setflags(write=False)
     for _ in range(2):
-        found = kept(Made((array, np.zeros(2))), tuple[FloatArray, FloatArray], b"")
-        assert isinstance(found, tuple)
-        assert [each.flags.writeable for each in found] == [False, True]
+        arrays = kept(Made((array, np.zeros(2))), tuple[FloatArray, FloatArray], b"")
+        assert isinstance(arrays, tuple)
+        assert [values.flags.writeable for values in arrays] == [False, True]
 
 
 def test_damaged_file_is_replaced(folder: Path) -> None:
-    made = Made()
-    kept(made, float, b"a")
+    value = Made()
+    kept(value, float, b"a")
     (file,) = folder.iterdir()
     whole = file.read_bytes()
     for damaged in (b"", whole[:-1], whole[:40], whole[:-1] + b"x"):
         file.write_bytes(damaged)
-        assert kept(made, float, b"a") == 1.0
+        assert kept(value, float, b"a") == 1.0
         assert file.read_bytes() == whole
-    assert made.times == 5
+    assert value.times == 5
 
 
 class Harmful:
@@ -99,30 +99,30 @@ class Harmful:
 
 
 def test_pickle_in_the_folder_is_not_read(folder: Path, tmp_path: Path) -> None:
-    made, trace = Made(), tmp_path / "trace"
-    kept(made, float, b"a")
+    value, trace = Made(), tmp_path / "trace"
+    kept(value, float, b"a")
     (file,) = folder.iterdir()
     content = pickle.dumps(Harmful(trace))
     file.write_bytes(hashlib.sha256(content).digest() + content)
-    assert kept(made, float, b"a") == 1.0
-    assert made.times == 2
+    assert kept(value, float, b"a") == 1.0
+    assert value.times == 2
     assert not trace.exists()
 
 
 def test_change_of_the_code_makes_a_value_old(
     folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    package, made = tmp_path / "package", Made()
+    package, value = tmp_path / "package", Made()
     package.mkdir()
     (package / "code.py").write_text("X = 1\n", encoding="ascii")
     monkeypatch.setattr(disk_cache, "__file__", str(package / "disk_cache.py"))
     monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
     for _ in range(2):
-        kept(made, float, b"a")
-    assert made.times == 1
+        kept(value, float, b"a")
+    assert value.times == 1
     (package / "code.py").write_text("X = 12\n", encoding="ascii")
-    kept(made, float, b"a")
-    assert made.times == 2
+    kept(value, float, b"a")
+    assert value.times == 2
     assert len(list(folder.iterdir())) == 2
 
 
@@ -130,16 +130,16 @@ def test_change_of_the_code_makes_a_value_old(
 def test_another_version_of_a_library_makes_a_value_old(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    made = Made()
+    value = Made()
     monkeypatch.setattr(disk_cache, "_surroundings", disk_cache._surroundings.__wrapped__)
-    kept(made, float, b"a")
+    kept(value, float, b"a")
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "unrelated-1.0.dist-info").mkdir()
-    kept(made, float, b"a")
-    assert made.times == 1
+    kept(value, float, b"a")
+    assert value.times == 1
     (tmp_path / "trimesh-99.0.dist-info").mkdir()
-    kept(made, float, b"a")
-    assert made.times == 2
+    kept(value, float, b"a")
+    assert value.times == 2
 
 
 def test_error_is_raised_again_and_leaves_no_file(folder: Path) -> None:
@@ -175,16 +175,16 @@ def test_value_that_is_used_is_kept_longest(folder: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such permissions")
 def test_folder_that_others_may_write_to_or_replace_is_not_used(folder: Path) -> None:
-    made = Made()
-    kept(made, float, b"a")
+    value = Made()
+    kept(value, float, b"a")
     for open_to_others in (folder, folder.parent):
         open_to_others.chmod(0o777)
         for _ in range(2):
-            kept(made, float, b"a")
+            kept(value, float, b"a")
         open_to_others.chmod(0o700)
-    assert made.times == 5
-    kept(made, float, b"a")
-    assert made.times == 5
+    assert value.times == 5
+    kept(value, float, b"a")
+    assert value.times == 5
 
 
 @pytest.mark.skipif(
@@ -197,10 +197,10 @@ def test_home_of_another_user_stays_untouched(
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setattr(disk_cache, "_folder", disk_cache._folder.__wrapped__)
     os.chown(tmp_path, 12345, 12345)
-    made = Made()
+    value = Made()
     for _ in range(2):
-        assert kept(made, float, b"a") == 1.0
-    assert made.times == 2
+        assert kept(value, float, b"a") == 1.0
+    assert value.times == 2
     assert list(tmp_path.iterdir()) == []
 
 
@@ -235,8 +235,8 @@ def test_robot_that_was_read_before_needs_no_trimesh() -> None:
 
 @pytest.mark.usefixtures("folder")
 def test_kept_robot_is_the_robot_in_its_file() -> None:
-    fresh, found = load(), load()
-    for one, other in zip(fresh.links, found.links, strict=True):
+    fresh, cached = load(), load()
+    for one, other in zip(fresh.links, cached.links, strict=True):
         assert one.name == other.name
         assert one.T_parent_link.tobytes() == other.T_parent_link.tobytes()
         assert (one.inertial is None) == (other.inertial is None)
@@ -246,7 +246,7 @@ def test_kept_robot_is_the_robot_in_its_file() -> None:
         for a, b in zip(one.shapes, other.shapes, strict=True):
             assert (a.vertices == b.vertices).all()
             assert a.material == b.material
-    (world, _), (kept_world, _) = world_of(fresh), world_of(found)
+    (world, _), (kept_world, _) = world_of(fresh), world_of(cached)
     assert world is not None
     assert kept_world is not None
     assert world.fingerprint.differs_by(kept_world.fingerprint) == 0.0
@@ -266,7 +266,7 @@ def test_changed_file_is_read_again(tmp_path: Path) -> None:
 
 def test_every_kind_of_value_is_found_again(folder: Path) -> None:
     robot = load()
-    visual = next(each for link in robot.links for each in link.visuals if each.glb is not None)
+    visual = next(shape for link in robot.links for shape in link.visuals if shape.glb is not None)
     stretch = stretches_of(robot)[0]
     for read in (
         load,

@@ -16,11 +16,9 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.branch import branch_of
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.projection import project
-from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import pitch_and_roll, pitched_frame
+from katana450.resources import URDF_PATH
 from katana450.settings import Settings
 from tests.browser.server import APP, AppServer
 from tests.cli.lines import ask
@@ -70,36 +68,17 @@ def test_the_youbot_is_that_of_its_manual() -> None:
     assert (arm.gripper.lower, arm.gripper.upper) == (0.0, 0.0115)
 
 
-def test_the_chain_agrees_with_yourdfpy(path: Path, other: MountedArm) -> None:
-    urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
-    chain = other.chain
+@pytest.mark.parametrize("path", [URDF_PATH, PINCHER, YOUBOT], ids=lambda path: path.stem)
+def test_the_chain_agrees_with_yourdfpy(path: Path) -> None:
+    robot, urdf = load(path), yourdfpy.URDF.load(str(path), load_meshes=False)
+    arm = robot.require_arm()
     rng = np.random.default_rng(3)
-    for q in rng.uniform(chain.lower, chain.upper, size=(20, 5)):
-        held = dict.fromkeys(urdf.actuated_joint_names, 0.0)
-        urdf.update_cfg(held | dict(zip(chain.names, q.tolist(), strict=True)))
-        expected = urdf.get_transform(other.default_tool)
-        np.testing.assert_allclose(other.T_base_shoulder @ forward(chain, q), expected, atol=1e-12)
-
-
-def test_feasible_poses_are_solved_and_projected_unchanged(other: MountedArm) -> None:
-    chain = other.chain
-    rng = np.random.default_rng(4)
-    exact = 0
-    for q in rng.uniform(chain.lower, chain.upper, size=(300, 5)):
-        T = forward(chain, q)
-        solutions = inverse(chain, T)
-        assert any(np.abs(s.q - q).max() < 1e-8 for s in solutions if s.within_limits)
-        for s in solutions:
-            if s.exact:
-                exact += 1
-                assert s.position_error < 2e-15
-                assert s.rotation_error < 1e-12
-                assert branch_of(chain, s.q) == s.branch
-        p = project(chain, T, branch=branch_of(chain, q))
-        assert p.position_error < 1e-14
-        assert p.rotation_error < 1e-11
-        assert p.limits == ()
-    assert exact >= 600
+    for q in rng.uniform(arm.chain.lower, arm.chain.upper, size=(30, 5)):
+        values = robot.joint_values(q, float(rng.uniform(arm.gripper.lower, arm.gripper.upper)))
+        urdf.update_cfg({name: values[name] for name in urdf.actuated_joint_names})
+        for tool in arm.tools:
+            T = arm.T_base_shoulder @ forward(arm.chain_to(tool), q)
+            np.testing.assert_allclose(T, urdf.get_transform(tool), atol=1e-12)
 
 
 def test_ready_posture_has_room_to_move(other: MountedArm) -> None:

@@ -16,10 +16,10 @@ from katana450.extensions.bodies.robot_world import robot_world
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def box(size: tuple[float, float, float], at: tuple[float, float, float]) -> Any:
-    made = trimesh.creation.box(size)
-    made.apply_translation(at)
-    return made
+def box(size: tuple[float, float, float], place: tuple[float, float, float]) -> Any:
+    mesh = trimesh.creation.box(size)
+    mesh.apply_translation(place)
+    return mesh
 
 
 def fork() -> Any:
@@ -50,10 +50,10 @@ def test_the_notch_of_a_fork_is_free_and_its_surface_is_covered() -> None:
     bodies = divided_mesh(mesh.vertices, mesh.faces)
     assert 2 <= len(bodies) <= MAX_PIECES
     points = trimesh.sample.sample_surface(mesh, 5000, seed=1)[0]
-    covered = np.min([outside(each, points) for each in bodies], axis=0)
+    covered = np.min([outside(body, points) for body in bodies], axis=0)
     assert covered.max() <= 1e-6
     notch = np.array([(0.0, 0.0, 0.06), (0.01, 0.0, 0.08), (-0.012, 0.0, 0.03)])
-    assert np.min([outside(each, notch) for each in bodies], axis=0).min() > 5e-3
+    assert np.min([outside(body, notch) for body in bodies], axis=0).min() > 5e-3
 
 
 @pytest.mark.parametrize(

@@ -64,11 +64,11 @@ def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
     """Check that no mesh of a prop leaves its collision shape, nor the table's top face."""
     props = load_props()
     cup, basin = (
-        obstacle(each.name, each.T_collision_shape, each.collision_shape)
-        for each in scene_objects_of(props)
+        obstacle(scene_object.name, scene_object.T_collision_shape, scene_object.collision_shape)
+        for scene_object in scene_objects_of(props)
     )
-    for part, vessel, at in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
-        points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + at
+    for part, vessel, place in ((cup, props.cup, CUP_AT), (basin, props.basin, BASIN_AT)):
+        points = np.asarray(trimesh.load_scene(vessel.mesh).to_mesh().vertices) + place
         (T,) = part.T_mover_shape
         local = (points - T[:3, 3]) @ T[:3, :3]
         (shape,) = part.shapes
@@ -78,6 +78,6 @@ def test_obstacles_enclose_the_props(robot: Robot, arm: MountedArm) -> None:
     world, _ = world_of(robot)
     assert world is not None
     ready = np.append(arm.ready(Settings().ready), 0.0)
-    found = world.with_obstacles((table(), cup, basin)).nearest(ready)
-    assert found is not None
-    assert found.distance > 0.03
+    contact = world.with_obstacles((table(), cup, basin)).nearest(ready)
+    assert contact is not None
+    assert contact.distance > 0.03

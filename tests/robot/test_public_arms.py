@@ -161,21 +161,21 @@ def test_the_number_of_axes_is_the_first_reason(
     path = written(tmp_path, "arm", joints)
     with pytest.raises(RobotDescriptionError, match=message):
         load(path).require_arm()
-    found = find_robot(Settings(), path, None)
+    described = find_robot(Settings(), path, None)
     slides_or_several = any(word in message for word in ("prismatic", "has 2 arms"))
     if slides_or_several:
-        assert found.robot.arm is None
-        assert [n for n in found.notes if n.startswith("Joints only. ") and "arm.urdf" in n]
+        assert described.robot.arm is None
+        assert [n for n in described.notes if n.startswith("Joints only. ") and "arm.urdf" in n]
     else:
         # A server drives its tool with the kinematics of other arms.
-        assert found.robot.require_arm().kinematics.freedoms == 6
+        assert described.robot.require_arm().kinematics.freedoms == 6
 
 
 def test_limit_that_is_wrong_is_the_reason_not_the_number_of_axes(tmp_path: Path) -> None:
     joints = [*PX150[:5], J("sixth", "revolute", "hand", "link6", limits=(2.0, 1.0))]
-    found = find_robot(Settings(), written(tmp_path, "arm", joints), None)
-    assert found.robot.arm is None
-    assert "The limits of axis 6 (sixth) are 2 to 1 rad" in found.notes[-1]
+    described = find_robot(Settings(), written(tmp_path, "arm", joints), None)
+    assert described.robot.arm is None
+    assert "The limits of axis 6 (sixth) are 2 to 1 rad" in described.notes[-1]
 
 
 @pytest.mark.parametrize(

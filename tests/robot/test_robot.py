@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yourdfpy
 
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
 from katana450.errors import RobotDescriptionError
-from katana450.maths.kinematics.forward import forward
 from katana450.resources import URDF_PATH
 from tests.robot.urdf_files import edited
 
@@ -47,19 +45,6 @@ def test_limits_and_speeds_are_the_manufacturers(arm: MountedArm) -> None:
 def test_the_shoulder_frame_stands_where_axes_1_and_2_cross(arm: MountedArm) -> None:
     assert np.allclose(arm.T_base_shoulder[:3, :3], np.eye(3))
     assert np.allclose(arm.T_base_shoulder[:3, 3], [0.0, 0.0, 0.2745])
-
-
-def test_the_chain_agrees_with_yourdfpy_everywhere(robot: Robot, arm: MountedArm) -> None:
-    urdf = yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False, build_scene_graph=True)
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        q = rng.uniform(arm.chain.lower, arm.chain.upper)
-        gripper = rng.uniform(arm.gripper.lower, arm.gripper.upper)
-        angles = robot.joint_values(q, gripper)
-        urdf.update_cfg({name: angles[name] for name in urdf.actuated_joint_names})
-        for tool in arm.tools:
-            T = arm.T_base_shoulder @ forward(arm.chain_to(tool), q)
-            assert np.allclose(T, urdf.get_transform(tool), atol=1e-12)
 
 
 def test_both_fingers_follow_one_joint(robot: Robot, arm: MountedArm) -> None:

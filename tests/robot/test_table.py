@@ -78,8 +78,8 @@ def test_part_that_is_near_the_table_at_rest_keeps_half_of_its_distance(tmp_path
     low = column().replace('xyz="0 0 0.35"', 'xyz="0 0 0.024"').replace('"-0.4"', '"-0.01"')
     world, _ = read(tmp_path, low)
     number = [part.name for part in world.parts].index("table")
-    kept = {world.parts[a].name: d for (a, b), d in world.close.items() if b == number}
-    assert kept == {"beam": pytest.approx(2e-3, abs=1e-6)}
+    distances = {world.parts[a].name: d for (a, b), d in world.close.items() if b == number}
+    assert distances == {"beam": pytest.approx(2e-3, abs=1e-6)}
 
 
 def test_arm_has_its_table_in_its_session(tmp_path: Path) -> None:

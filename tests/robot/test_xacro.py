@@ -98,12 +98,12 @@ def test_every_command_takes_xacro(
     assert katana450.load(path).n == 5
     (pose,) = ask("fk", [{"q": [0.1, 0.2, 0.3, 0.4, 0.5]}], "--urdf", path)
     (answer,) = ask("ik", [{"T": pose["T"]}], "--urdf", path)
-    found = [solution["q"] for solution in answer["solutions"]]
-    assert np.abs(np.array(found) - [0.1, 0.2, 0.3, 0.4, 0.5]).max(axis=1).min() < 1e-9
+    postures = [solution["q"] for solution in answer["solutions"]]
+    assert np.abs(np.array(postures) - [0.1, 0.2, 0.3, 0.4, 0.5]).max(axis=1).min() < 1e-9
     assert main(["export", "urdf", "--urdf", path, "--out", str(tmp_path / "out")]) == 0
-    (made,) = (tmp_path / "out").glob("*.zip")
-    with zipfile.ZipFile(made) as archive:
-        (name,) = [each for each in archive.namelist() if each.endswith(".urdf")]
+    (file,) = (tmp_path / "out").glob("*.zip")
+    with zipfile.ZipFile(file) as archive:
+        (name,) = [entry for entry in archive.namelist() if entry.endswith(".urdf")]
         text = archive.read(name).decode()
     assert "xacro" not in text
     assert str(package) not in text
@@ -130,17 +130,17 @@ def test_arguments_without_default_are_given_by_options(
     )
     monkeypatch.chdir(path.parent)
     command = ["export", "vrml", "--urdf", path.name, "--out", str(tmp_path / "out")]
-    given = ["--xacro-arg", "model:=small", "--xacro-arg", "root:=base"]
-    assert main([*command, *given]) == 0
+    options = ["--xacro-arg", "model:=small", "--xacro-arg", "root:=base"]
+    assert main([*command, *options]) == 0
     text = (tmp_path / "out/r.wrl").read_text()
     assert "base" in text
     assert "IndexedFaceSet" in text
     capsys.readouterr()
-    assert main([*command, *given[:2]]) == 1
+    assert main([*command, *options[:2]]) == 1
     assert "--xacro-arg root:=VALUE" in capsys.readouterr().err
     plain = tmp_path / "plain.urdf"
     plain.write_text('<robot name="r"><link name="base"/></robot>')
-    assert main(["export", "vrml", "--urdf", str(plain), "--out", str(tmp_path), *given]) == 1
+    assert main(["export", "vrml", "--urdf", str(plain), "--out", str(tmp_path), *options]) == 1
     assert "is not in xacro" in capsys.readouterr().err
 
 

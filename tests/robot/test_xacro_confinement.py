@@ -97,8 +97,8 @@ def test_files_outside_the_packages_are_not_read(tmp_path: Path, line: str) -> N
     (outside / "arm" / "linked").symlink_to(outside)
     path = templated(outside / "arm", line.replace("FOLDER", str(outside)))
     expected = "no package 'linked'" if "$(find" in line else OUTSIDE
-    found = "" if "*" in line else "line 2: .*"
-    assert re.search(found + expected, refusal(path))
+    place = "" if "*" in line else "line 2: .*"
+    assert re.search(place + expected, refusal(path))
 
 
 def test_a_name_outside_the_packages_that_is_computed_is_refused(tmp_path: Path) -> None:
