@@ -17,14 +17,14 @@ from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 
 
-def check_holds(found: ConvexBody, points: FloatArray) -> None:
+def check_holds(body: ConvexBody, points: FloatArray) -> None:
     """Check with the planes of another hull: that of trimesh, which uses qhull."""
-    assert 4 <= len(found.corners) <= MAX_CORNERS
-    mesh = trimesh.Trimesh(found.corners).convex_hull
+    assert 4 <= len(body.corners) <= MAX_CORNERS
+    mesh = trimesh.Trimesh(body.corners).convex_hull
     heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
     assert (points @ mesh.face_normals.T - heights).max() <= 1e-6 * np.ptp(points, axis=0).max()
     # It has a volume.
-    hull(found.corners)
+    hull(body.corners)
 
 
 @given(
@@ -50,21 +50,21 @@ def test_points_on_a_sphere_are_contained(count: int) -> None:
     """Every point is a corner of the true hull, and there are more than the search takes."""
     points = np.random.default_rng(3).normal(size=(count, 3))
     points = 0.1 * points / np.linalg.norm(points, axis=1, keepdims=True)
-    found = convex_body(points)
-    check_holds(found, points)
-    assert found.off < 0.02
-    assert found.volume == pytest.approx(4.0 / 3.0 * np.pi * 0.1**3, rel=0.07)
+    body = convex_body(points)
+    check_holds(body, points)
+    assert body.off < 0.02
+    assert body.volume == pytest.approx(4.0 / 3.0 * np.pi * 0.1**3, rel=0.07)
 
 
 def test_a_box_of_many_triangles_is_a_box() -> None:
     box = trimesh.creation.box((0.1, 0.2, 0.3)).subdivide().subdivide()
     points = box.vertices @ so3.exp((0.3, -0.2, 0.5)).T
-    found = convex_body(points)
-    check_holds(found, points)
-    assert len(found.corners) == 8
-    assert found.off == 0.0
-    assert not found.thickened
-    assert found.volume == pytest.approx(0.006, rel=1e-9)
+    body = convex_body(points)
+    check_holds(body, points)
+    assert len(body.corners) == 8
+    assert body.off == 0.0
+    assert not body.thickened
+    assert body.volume == pytest.approx(0.006, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -77,22 +77,22 @@ def test_a_box_of_many_triangles_is_a_box() -> None:
     ids=["ball", "cylinder", "ring"],
 )
 def test_round_mesh_has_a_small_excess(mesh: trimesh.Trimesh, max_excess: float) -> None:
-    found = convex_body(mesh.vertices)
-    check_holds(found, mesh.vertices)
-    assert 0.0 < found.off < max_excess
-    assert found.volume == pytest.approx(mesh.convex_hull.volume, rel=0.02)
+    body = convex_body(mesh.vertices)
+    check_holds(body, mesh.vertices)
+    assert 0.0 < body.off < max_excess
+    assert body.volume == pytest.approx(mesh.convex_hull.volume, rel=0.02)
     # The excess is measured again with the hull of trimesh.
     true = mesh.convex_hull
     heights = np.einsum("ij,ij->i", true.face_normals, true.triangles[:, 0])
-    assert (found.corners @ true.face_normals.T - heights).max() >= found.off - 1e-9
+    assert (body.corners @ true.face_normals.T - heights).max() >= body.off - 1e-9
 
 
 @pytest.mark.parametrize("flat", [(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)], ids=["sheet", "wire"])
 def test_flat_mesh_is_thickened(flat: tuple[float, ...]) -> None:
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 3)) * flat
-    found = convex_body(points @ so3.exp((0.3, 0.4, 0.5)).T)
-    assert found.thickened
-    spread = np.linalg.svd(found.corners - found.corners.mean(axis=0))[1]
+    body = convex_body(points @ so3.exp((0.3, 0.4, 0.5)).T)
+    assert body.thickened
+    spread = np.linalg.svd(body.corners - body.corners.mean(axis=0))[1]
     assert spread[-1] > 0.1 * MIN_THICKNESS_FRACTION
 
 

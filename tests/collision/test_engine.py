@@ -114,7 +114,7 @@ def test_distances_of_the_arm_are_on_their_bounds(
     """No body reaches beyond the plane across its nearest point, so no distance is too large."""
     corners = {
         body: np.frombuffer(shape.mark).reshape(-1, 3)
-        for body, shape in enumerate(each for part in world.parts for each in part.shapes)
+        for body, shape in enumerate(solid for part in world.parts for solid in part.shapes)
         if shape.mark != half_space().mark
     }
     for x in postures[:10]:
@@ -163,17 +163,17 @@ def test_hull_of_many_points_keeps_its_corners() -> None:
 
 def test_threads_measure_at_the_same_time(world: CollisionWorld, postures: FloatArray) -> None:
     wanted = [contact.distance for x in postures if (contact := world.nearest(x))]
-    found: list[list[float]] = []
+    distances: list[list[float]] = []
 
     def measure() -> None:
-        found.append([contact.distance for x in postures if (contact := world.nearest(x))])
+        distances.append([contact.distance for x in postures if (contact := world.nearest(x))])
 
     threads = [Thread(target=measure) for _ in range(3)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert found == [wanted] * 3
+    assert distances == [wanted] * 3
 
 
 def test_a_search_keeps_the_lock_of_the_interpreter() -> None:

@@ -22,8 +22,8 @@ def names(world: CollisionWorld) -> set[tuple[str, str]]:
 
 
 def test_neighbours_and_fingers_are_excluded(bare: CollisionWorld) -> None:
-    found = names(bare)
-    assert not found & {
+    pairs = names(bare)
+    assert not pairs & {
         ("base_link", "arm_base_link"),
         ("arm_base_link", "pan_link"),
         ("base_link", "pan_link"),
@@ -84,6 +84,6 @@ def test_parts_that_overlap_by_design_are_excluded() -> None:
         Part("hand", 2, (moved,), (cube,)),
     ]
     lower, upper = np.full(2, -1.0), np.full(2, 1.0)
-    found = pairs_that_meet(linkage, parts, lower, upper)
-    assert (0, 2) not in found
-    assert (1, 3) in found
+    pairs = pairs_that_meet(linkage, parts, lower, upper)
+    assert (0, 2) not in pairs
+    assert (1, 3) in pairs

@@ -46,8 +46,8 @@ def test_no_solids_touch_where_the_bodies_are_clear(
             continue
         looked_at += 1
         T = bare.linkage.poses(x)
-        here = bare.at(x)
-        pairs, _ = here.nearer_than(1e-3 * LOOK)
+        posed = bare.at(x)
+        pairs, _ = posed.nearer_than(1e-3 * LOOK)
         parts = {
             (int(bare.part_of[bare.first[pair]]), int(bare.part_of[bare.second[pair]]))
             for pair in pairs.tolist()

@@ -66,11 +66,11 @@ def test_distance_changes_by_at_most_the_travel(
     tightest = 0.0
     for x in postures[:60]:
         step = rng.uniform(-1.0, 1.0, 6) * 0.02 * (rng.random(6) < 0.5)
-        here, there = world.at(x), world.at(x + step)
-        travel = world.travel(here, x, x + step)
+        placed, moved = world.at(x), world.at(x + step)
+        travel = world.travel(placed, x, x + step)
         pairs = np.arange(len(world.first))
-        change = np.abs(distances(there, pairs) - distances(here, pairs))
-        apart = distances(here, pairs) > 0.0
+        change = np.abs(distances(moved, pairs) - distances(placed, pairs))
+        apart = distances(placed, pairs) > 0.0
         assert (change <= travel + 2e-6)[apart].all()
         tightest = max(tightest, float((change / np.maximum(travel, 1e-6))[apart].max()))
     # The bound is tight enough to matter.
@@ -97,14 +97,14 @@ def test_joint_that_turns_about_the_normal_of_the_table_moves_nothing_towards_it
     assert on_table.size
     for x in postures[:30]:
         turned = x + np.array([0.16, 0.0, 0.0, 0.0, 0.0, 0.0])
-        here, there = world.at(x), world.at(turned)
-        assert (world.travel(here, x, turned)[on_table] == 0.0).all()
+        placed, moved = world.at(x), world.at(turned)
+        assert (world.travel(placed, x, turned)[on_table] == 0.0).all()
         np.testing.assert_allclose(
-            distances(there, on_table), distances(here, on_table), rtol=0.0, atol=2e-6
+            distances(moved, on_table), distances(placed, on_table), rtol=0.0, atol=2e-6
         )
-        bent = world.travel(here, x, x + np.array([0.0, 0.02, 0.0, 0.0, 0.0, 0.0]))[on_table]
+        bent = world.travel(placed, x, x + np.array([0.0, 0.02, 0.0, 0.0, 0.0, 0.0]))[on_table]
         # The turn of joint 1 adds nothing to that of others.
-        both = world.travel(here, x, x + np.array([0.08, 0.02, 0.0, 0.0, 0.0, 0.0]))[on_table]
+        both = world.travel(placed, x, x + np.array([0.08, 0.02, 0.0, 0.0, 0.0, 0.0]))[on_table]
         assert (both == bent).all()
         assert bent.any()
 
@@ -121,11 +121,11 @@ def test_turn_of_a_part_on_the_table_is_decided_in_few_postures() -> None:
         [obstacle("table", np.eye(4), half_space())]
     )
     start, end = np.array([0.0, 0.0]), np.array([math.pi, 0.0])
-    asked = 0
+    postures = 0
 
     def at(sigma: float) -> FloatArray:
-        nonlocal asked
-        asked += 1
+        nonlocal postures
+        postures += 1
         return np.asarray(start + sigma * (end - start))
 
     def turned(low: float, high: float) -> FloatArray:
@@ -136,7 +136,7 @@ def test_turn_of_a_part_on_the_table_is_decided_in_few_postures() -> None:
     nearest = room.nearest(at, turned)
     assert nearest is not None
     assert abs(nearest.contact.distance) < 1e-6
-    assert asked <= MAX_POSTURES
+    assert postures <= MAX_POSTURES
 
 
 def standing_box(gap: float) -> CollisionWorld:

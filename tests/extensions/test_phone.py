@@ -45,20 +45,20 @@ def in_a_network(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_address_is_one_that_a_phone_can_open(address: Address, host: str, url: str) -> None:
-    found = phone_address(address, host, 8080, requires_link=True)
-    assert found.url == url
-    assert LINK_REQUIRED in found.note
-    assert ("Without https" in found.note) == url.startswith("http:")
-    assert found.code is not None
-    assert unquote_to_bytes(found.code.partition(",")[2]).startswith(b"<svg ")
+    offer = phone_address(address, host, 8080, requires_link=True)
+    assert offer.url == url
+    assert LINK_REQUIRED in offer.note
+    assert ("Without https" in offer.note) == url.startswith("http:")
+    assert offer.code is not None
+    assert unquote_to_bytes(offer.code.partition(",")[2]).startswith(b"<svg ")
 
 
 def test_server_on_loopback_says_how_to_let_a_phone_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = phone_address(LOOPBACK, "localhost:8080", 8080, requires_link=False)
-    assert (found.url, found.code, found.note) == (None, None, LOOPBACK_ONLY)
+    offer = phone_address(LOOPBACK, "localhost:8080", 8080, requires_link=False)
+    assert (offer.url, offer.code, offer.note) == (None, None, LOOPBACK_ONLY)
     # Options of the server are no advice to a person at a page.
-    assert "access link" in found.note
-    assert "--" not in found.note
+    assert "access link" in offer.note
+    assert "--" not in offer.note
     monkeypatch.setattr(phone, "own_address", lambda: None)
     assert phone_address(OPEN, "localhost:8080", 8080, requires_link=False).url is None
 
@@ -74,8 +74,8 @@ def test_server_tells_its_address(server: AppServer) -> None:
     url = f"{server.url}/api/v1/phone"
     code, _, body = ask(url, Host=f"10.0.0.7:{server.port}")
     assert code == 200
-    found = json.loads(body)
-    assert found["url"] == f"http://10.0.0.7:{server.port}"
-    assert "Everybody who opens" in found["note"]
+    answer = json.loads(body)
+    assert answer["url"] == f"http://10.0.0.7:{server.port}"
+    assert "Everybody who opens" in answer["note"]
     codes = {ask(url)[0] for _ in range(20)}
     assert codes == {200, 429}

@@ -86,8 +86,8 @@ class EmulatedMotors:
         ids = range(1, len(MOTORS) + 1)
         data = request.parameters
         if request.code == Instruction.SYNC_READ and request.id == BROADCAST:
-            asked = [motor for motor in data[2:] if motor in ids]
-            return [Packet(motor, 0, self._memory(motor, data[0], data[1])) for motor in asked]
+            motors = [motor for motor in data[2:] if motor in ids]
+            return [Packet(motor, 0, self._memory(motor, data[0], data[1])) for motor in motors]
         if request.id not in ids:
             return []
         if request.code == Instruction.READ:

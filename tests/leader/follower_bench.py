@@ -43,18 +43,18 @@ class Bench:
             "sent": 0.0,
         }
 
-    def step(self, count: int = 1, *, asked: bool = False) -> list[Action]:
+    def step(self, count: int = 1, *, is_asked: bool = False) -> list[Action]:
         """Advance by periods; return the actions of all."""
-        found: list[Action] = []
+        actions: list[Action] = []
         for _ in range(count):
             self.t += PERIOD
             if self.server_answers:
                 self.heard = self.t
                 self.values["sent"] = self.t
-            given = posture(self.angle, self.finger) if self.answers else None
+            measured = posture(self.angle, self.finger) if self.answers else None
             state = msgspec.convert(self.values, ServerState)
-            found += self.follower.step(self.t, given, state, self.heard, confirmed=asked)  # type: ignore[arg-type]
-        return found
+            actions += self.follower.step(self.t, measured, state, self.heard, confirmed=is_asked)  # type: ignore[arg-type]
+        return actions
 
     def arrive(self, angle: float) -> None:
         """Let the program move the arm to ``angle``."""
@@ -64,7 +64,7 @@ class Bench:
     def follow(self) -> None:
         """Begin to follow."""
         self.step(5)
-        self.step(asked=True)
+        self.step(is_asked=True)
         self.arrive(self.angle)
         self.step(3)
         assert self.follower.phase is LeadPhase.FOLLOWING

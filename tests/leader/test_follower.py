@@ -21,17 +21,17 @@ from tests.leader.follower_bench import PERIOD, Bench, N, program
 
 
 def texts(actions: list[Action]) -> str:
-    return " ".join(each.text for each in actions if isinstance(each, Say))
+    return " ".join(action.text for action in actions if isinstance(action, Say))
 
 
 def samples(actions: list[Action]) -> list[Sample]:
-    return [each for each in actions if isinstance(each, Sample)]
+    return [action for action in actions if isinstance(action, Sample)]
 
 
 def test_arm_eases_to_the_leader_and_then_follows_with_rates() -> None:
     bench = Bench()
     assert not bench.step(5)
-    eases = [each for each in bench.step(asked=True) if isinstance(each, Ease)]
+    eases = [action for action in bench.step(is_asked=True) if isinstance(action, Ease)]
     assert eases[0].q == pytest.approx([0.3] * N)
     assert eases[0].revocations == 4
     # A program that ended before does not count as the present one.
@@ -39,29 +39,29 @@ def test_arm_eases_to_the_leader_and_then_follows_with_rates() -> None:
     assert not bench.step(10)
     bench.arrive(0.3)
     assert "follows" in texts(bench.step(2))
-    found: list[Sample] = []
+    passed: list[Sample] = []
     for _ in range(30):
         bench.angle += 0.5 * PERIOD
-        found += samples(bench.step())
-    assert [each.first for each in found] == [True] + 29 * [False]
-    assert found[-1].q == pytest.approx([0.45] * N)
-    assert found[-1].qd == pytest.approx([0.5] * N, abs=1e-6)
-    assert found[-1].revocations == 5
+        passed += samples(bench.step())
+    assert [sample.first for sample in passed] == [True] + 29 * [False]
+    assert passed[-1].q == pytest.approx([0.45] * N)
+    assert passed[-1].qd == pytest.approx([0.5] * N, abs=1e-6)
+    assert passed[-1].revocations == 5
 
 
 def test_leader_that_moved_meanwhile_is_approached_on_another_plan_once_it_rests() -> None:
     bench = Bench()
     bench.step(60)
-    bench.step(asked=True)
+    bench.step(is_asked=True)
     bench.angle = 0.4
     bench.step(10)
     bench.arrive(0.3)
     assert "Keep it still" in texts(bench.step())
     for i in range(100):
         bench.angle = 0.6 + 0.05 * math.sin(0.3 * i)
-        assert not any(isinstance(each, Ease | Sample) for each in bench.step())
+        assert not any(isinstance(action, Ease | Sample) for action in bench.step())
     bench.angle = 0.6
-    again = [each for each in bench.step(60) if isinstance(each, Ease)]
+    again = [action for action in bench.step(60) if isinstance(action, Ease)]
     assert len(again) == 1
     assert again[0].q == pytest.approx([0.6] * N)
     assert bench.follower.phase is LeadPhase.EASING
@@ -97,14 +97,14 @@ def test_unexpected_event_ends_following_until_a_person_asks(why: str) -> None:
     for _ in range(200):
         bench.angle += 0.001
         assert set(bench.step()) <= {ReleaseControl()}
-    assert any(isinstance(each, Ease) for each in bench.step(asked=True))
+    assert any(isinstance(action, Ease) for action in bench.step(is_asked=True))
 
 
 @pytest.mark.parametrize("status", ["stopped", "failed", "refused", "cancelled", "ready"])
 def test_program_that_does_not_arrive_ends_it(status: str) -> None:
     bench = Bench()
     bench.step(5)
-    bench.step(asked=True)
+    bench.step(is_asked=True)
     bench.arrive(0.0)
     bench.values["program"] = program(status, "Not run: the arm has moved.")
     assert "did not reach" in texts(bench.step())
@@ -114,36 +114,36 @@ def test_program_that_does_not_arrive_ends_it(status: str) -> None:
 def test_silent_leader_ends_the_planned_motion_too() -> None:
     bench = Bench()
     bench.step(5)
-    bench.step(asked=True)
+    bench.step(is_asked=True)
     bench.answers = False
-    found = bench.step(150)
-    assert EndEase() in found
-    assert "no valid posture" in texts(found)
+    actions = bench.step(150)
+    assert EndEase() in actions
+    assert "no valid posture" in texts(actions)
 
 
 def test_stopped_arm_and_silent_leader_refuse_to_begin() -> None:
     bench = Bench()
     bench.values["stopped"] = "Ada pressed STOP."
     bench.step(5)
-    assert "Clear the stop first" in texts(bench.step(asked=True))
+    assert "Clear the stop first" in texts(bench.step(is_asked=True))
     bench.answers = False
     bench.step(150)
-    assert "does not answer" in texts(bench.step(asked=True))
+    assert "does not answer" in texts(bench.step(is_asked=True))
     assert bench.follower.phase is LeadPhase.WAITING
 
 
 def test_silent_leader_does_not_count_as_one_at_rest() -> None:
     bench = Bench()
     bench.step(60)
-    bench.step(asked=True)
+    bench.step(is_asked=True)
     bench.step(60)
     bench.answers = False
     # Its last postures are equal, but 0.3 s old.
     bench.step(30)
     bench.arrive(0.0)
-    assert not any(isinstance(each, Ease) for each in bench.step(30))
+    assert not any(isinstance(action, Ease) for action in bench.step(30))
     bench.answers = True
-    assert any(isinstance(each, Ease) for each in bench.step())
+    assert any(isinstance(action, Ease) for action in bench.step())
 
 
 def test_jumps_are_refused_and_end_it_if_they_last() -> None:
@@ -154,9 +154,9 @@ def test_jumps_are_refused_and_end_it_if_they_last() -> None:
     bench.angle -= 2.0 * math.pi
     assert samples(bench.step())
     bench.angle += 2.0 * math.pi
-    found = bench.step(150)
-    assert not samples(found)
-    assert "no valid posture" in texts(found)
+    actions = bench.step(150)
+    assert not samples(actions)
+    assert "no valid posture" in texts(actions)
 
 
 @pytest.mark.parametrize("moved", [0.05, 0.2])
@@ -176,7 +176,7 @@ def test_person_ends_it() -> None:
     bench.follow()
     bench.step(3)
     bench.values["moving"] = True
-    assert "You have ended it." in texts(bench.step(asked=True))
+    assert "You have ended it." in texts(bench.step(is_asked=True))
     assert not bench.step(20)
     # Others may drive once the arm is at rest.
     bench.values["moving"] = False
@@ -187,12 +187,12 @@ def test_fingers_wait_until_the_jaw_has_met_them() -> None:
     bench = Bench()
     bench.finger = 1.0
     bench.follow()
-    assert not [each for each in bench.step(20) if isinstance(each, FingerTarget)]
+    assert not [action for action in bench.step(20) if isinstance(action, FingerTarget)]
     grips: list[FingerTarget] = []
     for _ in range(100):
         bench.finger -= 0.01
-        grips += [each for each in bench.step() if isinstance(each, FingerTarget)]
+        grips += [action for action in bench.step() if isinstance(action, FingerTarget)]
     # They move only from where the jaw met them, at most ten times a second.
     assert 3 <= len(grips) <= 10
-    assert max(each.angle for each in grips) < 0.6
+    assert max(grip.angle for grip in grips) < 0.6
     assert grips[-1].angle < 0.15

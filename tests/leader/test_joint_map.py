@@ -60,27 +60,27 @@ def arm(*, gripper: bool = True) -> answers.Arm:
 
 
 def calibrated(**changes: object) -> bytes:
-    found = calibration()
-    found["elbow_flex"] |= changes  # type: ignore[arg-type]
-    return json.dumps(found).encode()
+    motors = calibration()
+    motors["elbow_flex"] |= changes  # type: ignore[arg-type]
+    return json.dumps(motors).encode()
 
 
 def ticks(*degrees: float) -> dict[int, int]:
-    return {i: round((sum(RANGE)) / 2 + each * 4096 / 360) for i, each in enumerate(degrees, 1)}
+    return {i: round((sum(RANGE)) / 2 + angle * 4096 / 360) for i, angle in enumerate(degrees, 1)}
 
 
 def test_directions_of_the_links_are_those_of_the_leader() -> None:
     joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
-    found = joints.posture(ticks(0, 0, 0, 0, 0, 0))
+    posture = joints.posture(ticks(0, 0, 0, 0, 0, 0))
     assert joints.motors == (1, 2, 3, 4, 5, 6)
     # In the middle of all ranges the upper arm rises steeply, forearm and hand are level.
-    pitch = np.degrees(np.cumsum(found.q[1:4]))
+    pitch = np.degrees(np.cumsum(posture.q[1:4]))
     assert pitch == pytest.approx([-76.0, -2.2, 0.0], abs=0.2)
-    assert found.q[[0, 4]] == pytest.approx([0.0, 0.0], abs=1e-3)
-    assert found.finger == pytest.approx(-0.05, abs=1e-3)
+    assert posture.q[[0, 4]] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert posture.finger == pytest.approx(-0.05, abs=1e-3)
     # Each joint of the leader turns one of the arm; pan and roll in the other direction.
     for axis, sign in enumerate((-1, 1, 1, 1, -1)):
-        turned = joints.posture(ticks(*(10.0 * (i == axis) for i in range(6)))).raw - found.raw
+        turned = joints.posture(ticks(*(10.0 * (i == axis) for i in range(6)))).raw - posture.raw
         expected = math.radians(10.0) * sign * np.eye(5)[axis]
         assert turned == pytest.approx(expected, abs=2e-3)
 
@@ -88,17 +88,17 @@ def test_directions_of_the_links_are_those_of_the_leader() -> None:
 def test_posture_stays_within_the_limits_of_the_arm() -> None:
     joints = JointMap(decoded_calibration(calibrated()), SO101, arm())
     for way in (-1, 1):
-        found = joints.posture(ticks(*[way * 200.0] * 6))
-        assert (found.q > LOWER).all()
-        assert (found.q < UPPER).all()
-        assert np.abs(found.raw).max() > 3.0
-        assert found.finger == pytest.approx(0.3 if way > 0 else -0.4)
+        posture = joints.posture(ticks(*[way * 200.0] * 6))
+        assert (posture.q > LOWER).all()
+        assert (posture.q < UPPER).all()
+        assert np.abs(posture.raw).max() > 3.0
+        assert posture.finger == pytest.approx(0.3 if way > 0 else -0.4)
 
 
 def test_drive_mode_reverses_a_joint() -> None:
-    found = decoded_calibration(calibrated(drive_mode=1))["elbow_flex"]
-    assert found.angle(MIDDLE + 1024) == pytest.approx(-math.pi / 2, abs=1e-3)
-    assert found.fraction(RANGE[0]) == 1.0
+    motor = decoded_calibration(calibrated(drive_mode=1))["elbow_flex"]
+    assert motor.angle(MIDDLE + 1024) == pytest.approx(-math.pi / 2, abs=1e-3)
+    assert motor.fraction(RANGE[0]) == 1.0
 
 
 def test_arm_without_gripper_needs_no_jaw() -> None:
@@ -143,10 +143,10 @@ def test_layout_of_another_leader(tmp_path: Path) -> None:
     sources = [f"  - {{motor: m{i}, sign: -1, offset: {i}}}" for i in range(5)]
     file.write_text("\n".join(["axes:", *sources, "gripper: {motor: m5, reversed: true}"]))
     layout = read_layout(file)
-    known = {f"m{i}": each for i, each in enumerate(decoded_calibration(calibrated()).values())}
-    found = JointMap(known, layout, arm()).posture(ticks(10, 0, 0, 0, 0, 118))
-    assert np.degrees(found.raw) == pytest.approx([-10, 1, 2, 3, 4], abs=0.1)
-    assert found.finger == pytest.approx(-0.4, abs=0.01)
+    known = {f"m{i}": motor for i, motor in enumerate(decoded_calibration(calibrated()).values())}
+    posture = JointMap(known, layout, arm()).posture(ticks(10, 0, 0, 0, 0, 118))
+    assert np.degrees(posture.raw) == pytest.approx([-10, 1, 2, 3, 4], abs=0.1)
+    assert posture.finger == pytest.approx(-0.4, abs=0.01)
     for text, message in (("axes: [{motor: a, sign: 2}]", "sign"), ("axes: {", "not the layout")):
         file.write_text(text)
         with pytest.raises(InputError, match=message):

@@ -159,13 +159,13 @@ def test_lag_behind_a_sine(
                 break
         shown.process.send_signal(signal.SIGINT)
         shown.process.wait(10.0)
-    t, wave, q = (np.array(each) for each in zip(*rows, strict=True))
-    found = [lag(t, sign * wave, q[:, axis]) for axis, sign in ((0, -1), (2, 1), (4, -1))]
+    t, wave, q = (np.array(column) for column in zip(*rows, strict=True))
+    lags = [lag(t, sign * wave, q[:, axis]) for axis, sign in ((0, -1), (2, 1), (4, -1))]
     # The arm overshoots where the processes got no time for a moment, so most periods count.
     period = np.floor((t - t[0]) * SINE[1])
-    amplitudes = [np.ptp(q[period == each, 0]) for each in range(5)]
+    amplitudes = [np.ptp(q[period == number, 0]) for number in range(5)]
     amplitude = float(np.median(amplitudes) / np.ptp(wave))
     with capsys.disabled():
-        print(f"\nlag {1e3 * max(found):.0f} ms, amplitude {amplitude:.1%}")
-    assert max(found) < MAX_LAG
+        print(f"\nlag {1e3 * max(lags):.0f} ms, amplitude {amplitude:.1%}")
+    assert max(lags) < MAX_LAG
     assert amplitude == pytest.approx(1.0, abs=0.05)

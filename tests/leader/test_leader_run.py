@@ -41,7 +41,7 @@ class StalledServer:
 
     @property
     def programs(self) -> int:
-        return sum(isinstance(each, Program) for each in self.asked)
+        return sum(isinstance(request, Program) for request in self.asked)
 
 
 class Fingers:

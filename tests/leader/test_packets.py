@@ -32,24 +32,24 @@ WORKED = (
 def test_worked_bytes(packet: Packet, text: str) -> None:
     data = bytes.fromhex(text)
     assert packet.encoded == data
-    for at in range(len(data) + 1):
+    for place in range(len(data) + 1):
         reader = PacketReader()
-        assert reader.feed(data[:at]) + reader.feed(data[at:]) == [packet]
+        assert reader.feed(data[:place]) + reader.feed(data[place:]) == [packet]
 
 
 def test_packets_are_found_in_any_split_of_a_stream_with_garbage() -> None:
     random.seed(7)
-    expected = [each for each, _ in WORKED] * 20
+    expected = [packet for packet, _ in WORKED] * 20
     # Garbage without the first byte of a header, and headers that begin nothing.
     noise = [bytes(random.randrange(0xFF) for _ in range(5)), b"\xff\xff\xff", b"\xff\xff\x01\x00"]
-    stream = b"".join(random.choice(noise) + each.encoded for each in expected)
+    stream = b"".join(random.choice(noise) + packet.encoded for packet in expected)
     for _ in range(50):
-        reader, found, at = PacketReader(), [], 0
-        while at < len(stream):
-            end = at + random.randint(1, 9)
-            found += reader.feed(stream[at:end])
-            at = end
-        assert found == expected
+        reader, packets, place = PacketReader(), [], 0
+        while place < len(stream):
+            end = place + random.randint(1, 9)
+            packets += reader.feed(stream[place:end])
+            place = end
+        assert packets == expected
 
 
 def test_wrong_checksum_is_no_packet_and_hides_none() -> None:

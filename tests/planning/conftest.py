@@ -33,10 +33,10 @@ def circle() -> ToolArc:
     return ToolArc(top, centre, axis, math.tau, pitch, roll)
 
 
-def lines(at: ToolTarget) -> ToolLines:
+def lines(start: ToolTarget) -> ToolLines:
     """Return lines round three sides of a frame beside `at`, and a turn on the spot."""
     steps = ((0.0, 0.0, 0.0), (0.0, -0.15, 0.0), (-0.05, -0.15, -0.1), (-0.05, 0.05, -0.1))
-    vias = [ToolTarget(at.position + step, at.pitch, at.roll) for step in steps]
+    vias = [ToolTarget(start.position + step, start.pitch, start.roll) for step in steps]
     last = vias[-1]
     vias += [ToolTarget(last.position, last.pitch + 0.2, last.roll + 1.0)]
     return ToolLines(tuple(vias), np.array([0.8, 0.3, 0.5]))
@@ -46,10 +46,10 @@ def lines(at: ToolTarget) -> ToolLines:
 def paths(arm: ArmModel, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
     """One path of each kind, by name."""
     chain = arm.chain
-    at = ToolTarget.at(chain, ready)
-    aside = at.position + np.array([-0.1, -0.2, -0.15])
-    line = ToolLine(at, ToolTarget(aside, at.pitch + 0.3, at.roll + 1.0))
-    pour = ToolLine(at, ToolTarget(at.position, at.pitch, at.roll + 1.6))
+    start = ToolTarget.at(chain, ready)
+    aside = start.position + np.array([-0.1, -0.2, -0.15])
+    line = ToolLine(start, ToolTarget(aside, start.pitch + 0.3, start.roll + 1.0))
+    pour = ToolLine(start, ToolTarget(start.position, start.pitch, start.roll + 1.6))
     vias = np.array(
         [[0.0, -1.0, 1.0, 0.0, 0.0], [1.0, -0.5, 0.5, 0.3, 0.0], [1.2, -1.5, 0.2, 0.3, 1.0]]
     )
@@ -57,7 +57,7 @@ def paths(arm: ArmModel, circle: ToolArc, ready: FloatArray) -> dict[str, Path]:
         "circle": ToolPath(arm.chain_to("flange"), circle, FRONT_UP, np.zeros(5)),
         "line": ToolPath(chain, line, branch_of(chain, ready), ready),
         "pour": ToolPath(chain, pour, branch_of(chain, ready), ready),
-        "lines": ToolPath(chain, lines(at), branch_of(chain, ready), ready),
+        "lines": ToolPath(chain, lines(start), branch_of(chain, ready), ready),
         "joints": JointPath(chain, vias[:2]),
         "via": JointPath(chain, vias, np.array([0.8])),
     }

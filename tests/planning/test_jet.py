@@ -53,12 +53,12 @@ def test_derivatives_are_those_of_the_textbook() -> None:
 
 
 def test_many_places_equal_single_places() -> None:
-    at = np.linspace(0.1, 0.9, 7)
+    places = np.linspace(0.1, 0.9, 7)
 
     def f(t: Jet) -> Jet:
         s, c = sin_cos(3.0 * t - 1.0)
         return atan2(s * t + 0.2, 1.0 - c / (2.0 + t)) * sqrt(t)
 
-    many = np.array(np.broadcast_arrays(*f(Jet.variable(at)).derivatives()))
-    for number, place in enumerate(at.tolist()):
+    many = np.array(np.broadcast_arrays(*f(Jet.variable(places)).derivatives()))
+    for number, place in enumerate(places.tolist()):
         assert f(Jet.variable(place)).derivatives() == pytest.approx(many[:, number], rel=1e-12)

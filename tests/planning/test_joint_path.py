@@ -58,7 +58,7 @@ def test_a_leg_alone_is_straight(arm: ArmModel) -> None:
     vias = np.array([[0.0, -1.0, 1.0, 0.0, 0.0], [1.0, -0.5, 0.5, 0.3, 0.0]])
     path = JointPath(arm.chain, vias)
     for sigma in (0.0, 0.3, 1.0):
-        q = np.array([each.c0 for each in path.joints(Jet.variable(sigma))])
+        q = np.array([joint.c0 for joint in path.joints(Jet.variable(sigma))])
         assert q == pytest.approx(vias[0] + sigma * (vias[1] - vias[0]), abs=1e-15)
 
 
@@ -75,17 +75,17 @@ def test_a_smaller_blend_passes_its_via_nearer(arm: ArmModel) -> None:
 
 
 def test_invalid_vias_are_refused(arm: ArmModel, ready: FloatArray) -> None:
-    there = ready + 0.1
+    goal = ready + 0.1
     none = np.empty(0)
     for vias, blend in (
         (np.array([ready]), none),
         (np.array([ready, ready]), none),
-        (np.array([ready, there, there]), np.ones(1)),
-        (np.array([ready, there, ready]), none),
-        (np.array([ready, there, ready]), np.zeros(1)),
-        (np.array([ready, there, ready]), np.array([1.1])),
-        (np.array([ready, there * np.nan]), none),
-        (np.array([ready[:4], there[:4]]), none),
+        (np.array([ready, goal, goal]), np.ones(1)),
+        (np.array([ready, goal, ready]), none),
+        (np.array([ready, goal, ready]), np.zeros(1)),
+        (np.array([ready, goal, ready]), np.array([1.1])),
+        (np.array([ready, goal * np.nan]), none),
+        (np.array([ready[:4], goal[:4]]), none),
     ):
         with pytest.raises(InputError):
             JointPath(arm.chain, vias, blend)

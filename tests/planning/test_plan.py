@@ -33,9 +33,9 @@ def bounds(arm: ArmModel) -> Bounds:
 @pytest.fixture(scope="module")
 def bare(robot: Robot) -> CollisionWorld:
     """The arm without an environment."""
-    found, _ = world_of(robot)
-    assert found is not None
-    return found
+    world, _ = world_of(robot)
+    assert world is not None
+    return world
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +49,8 @@ def world(bare: CollisionWorld) -> CollisionWorld:
 def brute_force(path: Path, world: CollisionWorld, places: int = 400) -> float:
     """Return the minimum clearance [m] over many places."""
     sweep = Sweep(path)
-    found = (world.nearest(sweep.at(s, 0.0)) for s in np.linspace(0.0, 1.0, places).tolist())
-    return min(contact.distance for contact in found if contact is not None)
+    contacts = (world.nearest(sweep.at(s, 0.0)) for s in np.linspace(0.0, 1.0, places).tolist())
+    return min(contact.distance for contact in contacts if contact is not None)
 
 
 def across(arm: ArmModel, lift: float) -> JointPath:
@@ -75,24 +75,24 @@ def test_a_wall_thinner_than_any_step_is_not_passed(arm: ArmModel, world: Collis
 
 def test_the_nearest_clearance_is_that_of_brute_force(arm: ArmModel, world: CollisionWorld) -> None:
     rng, looked, near = np.random.default_rng(8), 0, 0
-    beside = across(arm, 0.0).start
+    start = across(arm, 0.0).start
     while looked < 4:
-        a = beside + rng.uniform(-0.2, 0.2, 5)
+        a = start + rng.uniform(-0.2, 0.2, 5)
         path = JointPath(arm.chain, np.array((a, a + rng.uniform((-0.7, 0, 0, 0, 0), 0.1))))
-        seen = brute_force(path, world, 100)
+        clearance = brute_force(path, world, 100)
         try:
             check_clear(path, world, 0.0)
         except BlockedError:
-            assert seen < MARGIN + 1e-3
+            assert clearance < MARGIN + 1e-3
             continue
         sweep = Sweep(path)
-        found = sweep.nearest(SweptClearance.about(world, MARGIN, sweep.at(0.0, 0.0)), 0.0)
-        assert found is not None
+        nearest = sweep.nearest(SweptClearance.about(world, MARGIN, sweep.at(0.0, 0.0)), 0.0)
+        assert nearest is not None
         looked += 1
-        near += seen < 0.06
-        assert seen >= MARGIN - 1e-4
-        assert found.contact.distance <= 1.1 * seen + 1e-3
-        assert found.contact.distance >= 0.9 * seen - 1e-3
+        near += clearance < 0.06
+        assert clearance >= MARGIN - 1e-4
+        assert nearest.contact.distance <= 1.1 * clearance + 1e-3
+        assert nearest.contact.distance >= 0.9 * clearance - 1e-3
     assert near > 0
 
 
@@ -148,9 +148,9 @@ def test_paths_that_do_not_meet_are_refused(
         plan([paths["line"], paths["joints"]], bounds)
     with pytest.raises(InputError, match="at least one path"):
         plan([], bounds)
-    there = JointPath(arm.chain, np.array([ready, ready + 0.1]))
+    outward = JointPath(arm.chain, np.array([ready, ready + 0.1]))
     back = JointPath(arm.chain, np.array([ready + 0.1, ready]))
-    both = plan([there, back], bounds)
+    both = plan([outward, back], bounds)
     assert both.nearest is None
     assert both.begins[1] == both.segments[0].scaling.span
     assert both.q(both.begins[1]) == pytest.approx(ready + 0.1, abs=1e-14)
@@ -162,8 +162,8 @@ def test_paths_that_do_not_meet_are_refused(
 def test_the_length_of_the_circle_is_that_of_a_circle(
     paths: dict[str, Path], bounds: Bounds
 ) -> None:
-    found = plan([paths["circle"]], bounds)
-    assert found.length == pytest.approx(0.2 * np.pi, rel=1e-5)
+    circle = plan([paths["circle"]], bounds)
+    assert circle.length == pytest.approx(0.2 * np.pi, rel=1e-5)
 
 
 def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: Bounds) -> None:
@@ -171,15 +171,15 @@ def test_a_plan_to_a_limit_never_exceeds_it_by_rounding(arm: ArmModel, bounds: B
     for number in range(20):
         start = np.random.default_rng(number).uniform(chain.lower, chain.upper)
         # Vias may exceed a limit by rounding too.
-        made = plan([JointPath(chain, np.array([start, chain.upper + 5e-10]))], bounds)
-        close = made.span - np.geomspace(1e-9, 1e-2, 50)
-        assert (np.array([made.q(tau) for tau in close.tolist()]) <= chain.upper).all()
-        np.testing.assert_array_equal(made.end, chain.upper)
+        motion = plan([JointPath(chain, np.array([start, chain.upper + 5e-10]))], bounds)
+        close = motion.span - np.geomspace(1e-9, 1e-2, 50)
+        assert (np.array([motion.q(tau) for tau in close.tolist()]) <= chain.upper).all()
+        np.testing.assert_array_equal(motion.end, chain.upper)
 
 
 def test_a_plan_ends_at_its_goal_to_the_bit(arm: ArmModel, bounds: Bounds) -> None:
     chain, rng = arm.chain, np.random.default_rng(5)
     for start, goal in rng.uniform(chain.lower, chain.upper, (20, 2, 5)):
-        made = plan([JointPath(chain, np.array([start, goal]))], bounds)
-        np.testing.assert_array_equal(made.q(0.0), start)
-        np.testing.assert_array_equal(made.q(made.span), goal)
+        motion = plan([JointPath(chain, np.array([start, goal]))], bounds)
+        np.testing.assert_array_equal(motion.q(0.0), start)
+        np.testing.assert_array_equal(motion.q(motion.span), goal)

@@ -66,9 +66,9 @@ def loads(path: Path, scaling: Scaling, bounds: Bounds) -> np.ndarray:
 def test_limits_hold_for_any_tau(
     paths: dict[str, Path], scalings: dict[str, Scaling], bounds: Bounds, name: str
 ) -> None:
-    found = loads(paths[name], scalings[name], bounds)
-    assert found.max() <= 1.0
-    assert found.max() > 0.98
+    load = loads(paths[name], scalings[name], bounds)
+    assert load.max() <= 1.0
+    assert load.max() > 0.98
 
 
 def test_limits_hold_at_a_small_corner(bounds: Bounds, paths: dict[str, Path]) -> None:
@@ -108,9 +108,9 @@ def test_straight_line_reaches_its_limits(arm: ArmModel, paths: dict[str, Path])
 def test_a_full_cup_is_carried_gently(paths: dict[str, Path], bounds: Bounds) -> None:
     gentle = replace(bounds, tool_acceleration=0.3)
     scaling = fastest(paths["line"], gentle)
-    found = loads(paths["line"], scaling, gentle)
-    assert 0.98 < found[4] <= 1.0
-    assert found.max() <= 1.0
+    load = loads(paths["line"], scaling, gentle)
+    assert 0.98 < load[4] <= 1.0
+    assert load.max() <= 1.0
     assert scaling.duration > fastest(paths["line"], bounds).duration
 
 
@@ -142,9 +142,9 @@ def test_the_time_from_rest_to_rest_is_that_of_ruckig(distance: float, a: float,
     Ruckig(1).calculate(wanted, trajectory)
     assert rest_to_rest(distance, a, j) == pytest.approx(trajectory.duration, rel=1e-6)
     for t in np.linspace(0.0, trajectory.duration, 21).tolist():
-        (there,), (speed,), (acceleration,) = trajectory.at_time(t)
+        (position,), (speed,), (acceleration,) = trajectory.at_time(t)
         place, first, second = motion_after(t, distance, a, j)
-        assert place == pytest.approx(there, rel=1e-5, abs=1e-6 * distance)
+        assert place == pytest.approx(position, rel=1e-5, abs=1e-6 * distance)
         # The times of ruckig are accurate to about 1e-8 s: the slack is that times the next
         # derivative.
         assert first == pytest.approx(speed, rel=1e-5, abs=1e-6 * (1.0 + a))

@@ -38,7 +38,7 @@ FRONT_UP = Branch("front", "up")
 
 
 def q_at(path: Path, sigma: float) -> FloatArray:
-    return np.array([each.c0 for each in path.joints(Jet.variable(sigma))])
+    return np.array([joint.c0 for joint in path.joints(Jet.variable(sigma))])
 
 
 def test_circle_of_the_paper_is_exact(arm: ArmModel, paths: dict[str, Path]) -> None:
@@ -95,13 +95,15 @@ def test_lines_of_any_member_are_straight_and_keep_their_branch(seed: int) -> No
         return
     assert path.start == pytest.approx(q, abs=1e-7)
     for sigma in rng.uniform(size=4).tolist():
-        found = q_at(path, sigma)
-        wanted, there = start.towards(end, sigma), ToolTarget.at(chain, found)
-        assert there.position == pytest.approx(wanted.position, abs=1e-12)
-        assert math.remainder(there.pitch - wanted.pitch, math.tau) == pytest.approx(0.0, abs=1e-12)
-        assert math.remainder(there.roll - wanted.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
-        assert branch_of(chain, found) == branch
-        assert chain.within_limits(found)
+        posture = q_at(path, sigma)
+        wanted, actual = start.towards(end, sigma), ToolTarget.at(chain, posture)
+        assert actual.position == pytest.approx(wanted.position, abs=1e-12)
+        assert math.remainder(actual.pitch - wanted.pitch, math.tau) == pytest.approx(
+            0.0, abs=1e-12
+        )
+        assert math.remainder(actual.roll - wanted.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
+        assert branch_of(chain, posture) == branch
+        assert chain.within_limits(posture)
 
 
 @pytest.mark.parametrize("name", ["circle", "line", "pour", "lines", "joints", "via"])
@@ -110,20 +112,20 @@ def test_derivatives_agree_with_differences(paths: dict[str, Path], name: str) -
     joins = (0.0, *path.joins, 1.0)
     for low, high in pairwise(joins):
         h = min(1e-4, 1e-3 * (high - low))
-        at = np.linspace(low + 2 * h, high - 2 * h, 9)
+        places = np.linspace(low + 2 * h, high - 2 * h, 9)
         for derivatives in (joint_derivatives, point_derivatives):
-            before, here, after = (derivatives(path, at + step) for step in (-h, 0.0, h))
+            before, middle, after = (derivatives(path, places + step) for step in (-h, 0.0, h))
             for order in range(3):
                 measured = (after[order] - before[order]) / (2.0 * h)
-                scale = np.abs(here[order + 1]).max() + 1.0
-                assert measured == pytest.approx(here[order + 1], abs=3e-5 * scale)
+                scale = np.abs(middle[order + 1]).max() + 1.0
+                assert measured == pytest.approx(middle[order + 1], abs=3e-5 * scale)
 
 
 @pytest.mark.parametrize("name", ["circle", "line", "pour", "lines", "joints", "via"])
 def test_one_place_and_many_agree(paths: dict[str, Path], name: str) -> None:
-    at = np.linspace(0.0, 1.0, 23)
-    many = joint_derivatives(paths[name], at)[0]
-    for sigma, q in zip(at.tolist(), many, strict=True):
+    places = np.linspace(0.0, 1.0, 23)
+    many = joint_derivatives(paths[name], places)[0]
+    for sigma, q in zip(places.tolist(), many, strict=True):
         assert q_at(paths[name], sigma) == pytest.approx(q, abs=1e-14)
 
 
@@ -138,7 +140,7 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
     legs, on = list(pairwise(points)), 0
     for sigma in np.linspace(0.0, 1.0, 301).tolist():
         T = forward(chain, q_at(path, sigma))
-        desired = np.array([each.c0 for each in curve.at(Jet.variable(sigma))[:5]])
+        desired = np.array([value.c0 for value in curve.at(Jet.variable(sigma))[:5]])
         assert T[:3, 3] == pytest.approx(desired[:3], abs=1e-14)
         target = ToolTarget.at(chain, q_at(path, sigma))
         assert (target.pitch, target.roll) == pytest.approx(tuple(desired[3:]), abs=1e-13)
@@ -149,7 +151,7 @@ def test_lines_are_straight_between_their_corners_and_pass_them_near(
     assert on > 100
     for via, near in zip(points[1:3], (0.03, 0.01), strict=True):
         traced = [curve.at(Jet.variable(s)) for s in np.linspace(0.0, 1.0, 4001).tolist()]
-        passed = min(math.dist([each.c0 for each in tool[:3]], via) for tool in traced)
+        passed = min(math.dist([value.c0 for value in tool[:3]], via) for tool in traced)
         assert 1e-5 < passed < near
     start = ToolTarget.at(chain, path.start)
     assert start.position == pytest.approx(points[0], abs=1e-14)
@@ -164,38 +166,38 @@ def off_leg(p: FloatArray, a: FloatArray, b: FloatArray) -> float:
 
 
 def test_invalid_lines_are_refused(arm: ArmModel, ready: FloatArray) -> None:
-    at = ToolTarget.at(arm.chain, ready)
-    there = ToolTarget(at.position + np.array([0.0, 0.05, 0.0]), at.pitch, at.roll)
-    beyond = ToolTarget(at.position + np.array([0.6, 0.0, 0.0]), at.pitch, at.roll)
+    start = ToolTarget.at(arm.chain, ready)
+    goal = ToolTarget(start.position + np.array([0.0, 0.05, 0.0]), start.pitch, start.roll)
+    beyond = ToolTarget(start.position + np.array([0.6, 0.0, 0.0]), start.pitch, start.roll)
     none, half = np.empty(0), np.array([0.5])
     for vias, blend in (
-        ((at,), none),
-        ((at, at), none),
-        ((at, there, there), half),
-        ((at, there, at), none),
-        ((at, there, at), np.array([0.0])),
-        ((at, there, at), np.array([1.1])),
-        ((at, there, at), np.array([math.nan])),
-        ((at, ToolTarget(at.position, math.nan, 0.0)), none),
+        ((start,), none),
+        ((start, start), none),
+        ((start, goal, goal), half),
+        ((start, goal, start), none),
+        ((start, goal, start), np.array([0.0])),
+        ((start, goal, start), np.array([1.1])),
+        ((start, goal, start), np.array([math.nan])),
+        ((start, ToolTarget(start.position, math.nan, 0.0)), none),
     ):
         with pytest.raises(InputError):
             ToolLines(vias, blend)
     with pytest.raises(InputError, match="leaves the reach of the arm"):
-        ToolPath(arm.chain, ToolLines((at, there, beyond), half), FRONT_UP, ready)
+        ToolPath(arm.chain, ToolLines((start, goal, beyond), half), FRONT_UP, ready)
 
 
 @pytest.mark.parametrize("blend", [0.01, 0.1, 1.0])
 def test_small_corner_is_smooth(arm: ArmModel, ready: FloatArray, blend: float) -> None:
-    at = ToolTarget.at(arm.chain, ready)
+    start = ToolTarget.at(arm.chain, ready)
     steps = ((0.0, 0.0, 0.0), (0.0, 0.08, 0.0), (0.0, 0.0, -0.06), (0.0, -0.05, 0.0))
-    vias = tuple(ToolTarget(at.position + step, at.pitch, at.roll) for step in steps)
+    vias = tuple(ToolTarget(start.position + step, start.pitch, start.roll) for step in steps)
     path = ToolPath(arm.chain, ToolLines(vias, np.full(2, blend)), FRONT_UP, ready)
     assert path.start == pytest.approx(ready, abs=1e-12)
 
 
 def straight(chain: Chain, q: FloatArray, step: tuple[float, float, float]) -> ToolPath:
-    at = ToolTarget.at(chain, q)
-    line = ToolLine(at, ToolTarget(at.position + step, at.pitch, at.roll))
+    start = ToolTarget.at(chain, q)
+    line = ToolLine(start, ToolTarget(start.position + step, start.pitch, start.roll))
     return ToolPath(chain, line, branch_of(chain, q), q)
 
 
@@ -211,8 +213,8 @@ def test_a_line_out_of_reach_is_refused_where_it_leaves(arm: ArmModel, ready: Fl
 
 
 def test_a_line_over_a_limit_names_it(arm: ArmModel, ready: FloatArray) -> None:
-    at = ToolTarget.at(arm.chain, ready)
-    line = ToolLine(at, ToolTarget(at.position, at.pitch, 4.0))
+    start = ToolTarget.at(arm.chain, ready)
+    line = ToolLine(start, ToolTarget(start.position, start.pitch, 4.0))
     with pytest.raises(
         InputError, match=r"axis 5, wrist roll, over its limit of 171.5 deg 74\.8 % along"
     ):
@@ -273,23 +275,23 @@ def test_a_tool_beside_the_roll_axis_follows_lines_exactly() -> None:
                 continue
             followed += 1
             for sigma in (0.0, 0.6):
-                found = ToolTarget.at(chain, q_at(path, sigma)).position
-                assert found == pytest.approx(start.towards(end, sigma).position, abs=1e-12)
+                position = ToolTarget.at(chain, q_at(path, sigma)).position
+                assert position == pytest.approx(start.towards(end, sigma).position, abs=1e-12)
     assert followed > 20
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_invalid_numbers_are_refused(arm: ArmModel, ready: FloatArray, bad: float) -> None:
-    at = ToolTarget.at(arm.chain, ready)
+    start = ToolTarget.at(arm.chain, ready)
     still = Linear(0.0, 0.0)
     for wrong in (
-        lambda: ToolLine(at, ToolTarget(at.position, bad, 0.0)),
-        lambda: ToolArc(at.position, np.zeros(3), np.array([0.0, bad, 0.0]), 1.0, still, still),
-        lambda: ToolArc(at.position, np.zeros(3), np.ones(3), bad, still, still),
-        lambda: ToolArc(at.position, np.zeros(3), np.zeros(3), 1.0, still, still),
+        lambda: ToolLine(start, ToolTarget(start.position, bad, 0.0)),
+        lambda: ToolArc(start.position, np.zeros(3), np.array([0.0, bad, 0.0]), 1.0, still, still),
+        lambda: ToolArc(start.position, np.zeros(3), np.ones(3), bad, still, still),
+        lambda: ToolArc(start.position, np.zeros(3), np.zeros(3), 1.0, still, still),
         lambda: Linear(bad, 0.0),
         lambda: Swing(0.0, bad, 0.0, 0.0, 1.0),
-        lambda: ToolPath(arm.chain, ToolLine(at, at), FRONT_UP, np.full(5, bad)),
+        lambda: ToolPath(arm.chain, ToolLine(start, start), FRONT_UP, np.full(5, bad)),
     ):
         with pytest.raises(InputError):
             wrong()

@@ -82,9 +82,9 @@ async def send_to(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) -
         asyncio.create_task(produce(line, buffer, number))
         for number, (produce, line) in lines.items()
     ]
-    for each in pushed:
+    for queued in pushed:
         buffer.atomic_start()
-        for message in each:
+        for message in queued:
             buffer.push(message)
         buffer.atomic_end()
         buffer.flush()
@@ -95,7 +95,7 @@ async def send_to(lines: dict[int, tuple[Any, Line]], pushed: list[list[Any]]) -
 
 def opened(frame: bytes) -> tuple[dict[str, Any], bytes]:
     """Return the content of a frame without its time, and the bytes of its arrays."""
-    size, packed = (int.from_bytes(frame[at : at + 8], "little") for at in (0, 8))
+    size, packed = (int.from_bytes(frame[offset : offset + 8], "little") for offset in (0, 8))
     body = zstandard.ZstdDecompressor().decompress(frame[16 : 16 + packed])
     assert len(body) == size
     decoded = msgspec.msgpack.decode(body)
@@ -132,8 +132,8 @@ def test_frames_for_many_browsers_are_packed_once(monkeypatch: pytest.MonkeyPatc
 
 def test_unread_state_is_replaced_by_a_newer_one() -> None:
     async def take(slot: frames.FrameSlot) -> list[float]:
-        taken = opened(await slot.take())[0]["messages"]
-        return [message["position"][0] for message in taken]
+        messages = opened(await slot.take())[0]["messages"]
+        return [message["position"][0] for message in messages]
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
         slot = frames.FrameSlot()
@@ -142,8 +142,8 @@ def test_unread_state_is_replaced_by_a_newer_one() -> None:
             buffer = AsyncMessageBuffer(viser, persistent_messages=True)
             return buffer, asyncio.create_task(frames.produce(Line(slot), buffer, 1))
 
-        there = partial(asyncio.run_coroutine_threadsafe, loop=viser)
-        buffer, producing = await asyncio.wrap_future(there(begin()))
+        submit = partial(asyncio.run_coroutine_threadsafe, loop=viser)
+        buffer, producing = await asyncio.wrap_future(submit(begin()))
 
         async def push(*xs: float) -> None:
             for x in xs:
@@ -166,7 +166,7 @@ def test_unread_state_is_replaced_by_a_newer_one() -> None:
             with suppress(asyncio.CancelledError):
                 await producing
 
-        await asyncio.wrap_future(there(end()))
+        await asyncio.wrap_future(submit(end()))
 
     with thread_of_viser() as viser:
         asyncio.run(act(viser))
@@ -202,7 +202,7 @@ def test_messages_of_a_browser_wait_for_viser_and_keep_their_order_and_stamps() 
 
     async def act(viser: asyncio.AbstractEventLoop) -> None:
         slot = frames.FrameSlot()
-        there = partial(asyncio.run_coroutine_threadsafe, loop=viser)
+        submit = partial(asyncio.run_coroutine_threadsafe, loop=viser)
 
         def handle(message: str) -> None:
             # As viser does, which may answer one message while the next one comes.
@@ -215,12 +215,12 @@ def test_messages_of_a_browser_wait_for_viser_and_keep_their_order_and_stamps() 
         await asyncio.sleep(0.05)
         # viser's end of the connection is not there yet.
         assert not receiver.done()
-        await asyncio.wrap_future(there(begin()))
+        await asyncio.wrap_future(submit(begin()))
         pass_on = await receiver
         for number in range(100):
             slot.stamps.append(frames.Stamp(number))
             pass_on(f"{number}")
-        await asyncio.wrap_future(there(asyncio.sleep(0.0)))
+        await asyncio.wrap_future(submit(asyncio.sleep(0.0)))
 
     with thread_of_viser() as viser:
         asyncio.run(act(viser))
@@ -263,8 +263,8 @@ def test_scene_is_sent_in_the_order_in_which_it_is_needed() -> None:
         wire.SetPositionMessage("/ghost", (1.0, 0.0, 0.0)),
         end,
     ]
-    seen, panel, unseen = frames.in_parts(window)
-    assert [each.name for each in seen] == ["/ghosts", "/ghosts"]
+    shown, panel, unseen = frames.in_parts(window)
+    assert [message.name for message in shown] == ["/ghosts", "/ghosts"]
     assert panel == [slider]
     assert unseen == [*window[:4], window[-2], end]
     assert frames.in_parts([end]) == [[end]]

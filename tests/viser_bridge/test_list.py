@@ -35,7 +35,7 @@ class Part(NamedTuple):
 
 def listed(section: str = "") -> list[Part]:
     """Return the rows of the list, or those of the section that begins with ``section``."""
-    found = []
+    entries = []
     for part in LIST.read_text(encoding="utf-8").split("\n## ")[1:]:
         if not part.startswith(section):
             continue
@@ -44,9 +44,9 @@ def listed(section: str = "") -> list[Part]:
             if cells and cells[0]:
                 tests = PAGE_TESTS if part.startswith("Page, as our scripts") else SERVER_TESTS
                 named = cells[-1] if len(cells) == 5 else []
-                full = tuple(each if "::" in each else f"{tests}::{each}" for each in named)
-                found.append(Part(tuple(cells[0]), tuple(cells[1]), full))
-    return found
+                full = tuple(test if "::" in test else f"{tests}::{test}" for test in named)
+                entries.append(Part(tuple(cells[0]), tuple(cells[1]), full))
+    return entries
 
 
 def names() -> set[str]:
@@ -64,15 +64,15 @@ def trees(*folders: Path) -> Iterator[tuple[Path, ast.Module]]:
 
 def private_modules(tree: ast.Module) -> set[str]:
     """Return the private modules of viser that ``tree`` imports."""
-    found = set()
+    names = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
-            modules = {each for each in inner if each.rpartition(".")[2].startswith("_")}
-            found |= modules or {node.module}
-    return {each for each in found if re.match(r"viser\.(_|infra\b)", each)}
+            modules = {module for module in inner if module.rpartition(".")[2].startswith("_")}
+            names |= modules or {node.module}
+    return {name for name in names if re.match(r"viser\.(_|infra\b)", name)}
 
 
 def private_names(tree: ast.Module) -> set[str]:
@@ -81,28 +81,28 @@ def private_names(tree: ast.Module) -> set[str]:
     Names that a module defines itself, or that viser does not have, are its own.
     """
     own = _defined(tree)
-    found = set()
+    names = set()
     for node in ast.walk(tree):
         match node:
             case ast.Attribute(value=ast.Name(id="wire"), attr=name) if name != "Message":
-                found.add(name)
+                names.add(name)
             case ast.Attribute(value=ast.Name(id="self" | "cls")):
                 pass
             case ast.Attribute(attr=name) if re.match("_[a-z]", name) and name not in own:
-                found.add(name)
-    return found & VISERS
+                names.add(name)
+    return names & VISERS
 
 
 def _defined(tree: ast.Module) -> set[str]:
     """Return the names of functions, and of attributes of ``self``, in ``tree``."""
-    found = set()
+    names = set()
     for node in ast.walk(tree):
         match node:
             case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
-                found.add(name)
+                names.add(name)
             case ast.Attribute(value=ast.Name(id="self" | "cls"), attr=name):
-                found.add(name)
-    return found
+                names.add(name)
+    return names
 
 
 def _of_viser() -> set[str]:
@@ -129,7 +129,9 @@ def test_only_the_bridge_names_private_parts_of_the_server() -> None:
 def imports_viser(tree: ast.Module) -> bool:
     for node in ast.walk(tree):
         match node:
-            case ast.Import(names=found) if any(each.name.startswith("viser") for each in found):
+            case ast.Import(names=aliases) if any(
+                alias.name.startswith("viser") for alias in aliases
+            ):
                 return True
             case ast.ImportFrom(module=str(module)) if module.partition(".")[0] == "viser":
                 return True
@@ -143,13 +145,13 @@ def test_private_parts_of_the_server_are_listed() -> None:
 
 
 def test_private_parts_in_tests_are_listed_and_in_one_folder() -> None:
-    here = Path(__file__).parent
+    folder = Path(__file__).parent
     views = BRIDGE.parent / "view", BRIDGE.parents[1] / "extensions"
     ours = {name for _, tree in trees(*views) for name in _defined(tree)}
     for path, tree in trees(ROOT / "tests", ROOT / "benchmarks", ROOT / "examples", ROOT / "docs"):
         modules = private_modules(tree)
         used = private_names(tree) - ours if imports_viser(tree) else set()
-        if path.is_relative_to(here):
+        if path.is_relative_to(folder):
             for name in modules | used:
                 assert name in names(), f"{path} relies on viser's {name}: list it in {LIST.name}"
         else:

@@ -18,7 +18,9 @@ POINT = (0.1, -0.2, 0.3)
 
 def messages_for(server: viser.ViserServer, kind: type[Any], node: str) -> list[Any]:
     """Return the messages about a node for a browser that connects now."""
-    return [each for each in sent(server) if isinstance(each, kind) and each.name == node]
+    return [
+        message for message in sent(server) if isinstance(message, kind) and message.name == node
+    ]
 
 
 def test_pose_message_is_identical_to_that_of_viser(server: viser.ViserServer) -> None:
@@ -62,8 +64,8 @@ def test_poses_of_instances_are_sent_in_one_message(
     arrange(ours, wxyzs, positions)
     (message,) = messages_for(server, wire.SceneNodeUpdateMessage, "/ours")
     expected: dict[str, Any] = {}
-    for each in messages_for(server, wire.SceneNodeUpdateMessage, "/theirs"):
-        expected |= each.updates
+    for update in messages_for(server, wire.SceneNodeUpdateMessage, "/theirs"):
+        expected |= update.updates
     assert message.updates.keys() == expected.keys()
     for name, value in expected.items():
         assert message.updates[name].dtype == value.dtype

@@ -49,10 +49,10 @@ def test_no_frame_is_taken_from_viser_while_the_page_is_behind() -> None:
         line._flow.sent(100, 0.0)
         line._flow.seen(1, 0.0)
         sending = asyncio.create_task(line._down())
-        for seen in (1, 2):
+        for count in (1, 2):
             await asyncio.sleep(0.05)
-            assert line.slot.take.await_count == browser.send_bytes.await_count == seen
-            line._note(MagicMock(seen=seen + 1, made=None))
+            assert line.slot.take.await_count == browser.send_bytes.await_count == count
+            line._note(MagicMock(seen=count + 1, made=None))
         sending.cancel()
 
     asyncio.run(act())

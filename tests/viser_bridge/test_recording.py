@@ -19,11 +19,13 @@ DIGITS = "!#$%()*+,-./0123456789:;=?@ABCDEFGHIJKLMNOPQRSTUVWXYZ[\\]^_abcdefghijk
 
 def program() -> str:
     """Return viser's program as its page unpacks it."""
-    found = re.search(r'<script data-p="([^"]*)" data-ss="(\d+)"', PAGE.read_text(encoding="utf-8"))
-    assert found
+    script = re.search(
+        r'<script data-p="([^"]*)" data-ss="(\d+)"', PAGE.read_text(encoding="utf-8")
+    )
+    assert script
     value = np.zeros(128, dtype=np.uint64)
     value[np.frombuffer(DIGITS.encode(), dtype=np.uint8)] = np.arange(88)
-    digits = value[np.frombuffer(found[1].encode(), dtype=np.uint8)]
+    digits = value[np.frombuffer(script[1].encode(), dtype=np.uint8)]
     whole = len(digits) // 5 * 5
     powers = np.array([88**power for power in range(4, -1, -1)], dtype=np.uint64)
     packed = (digits[:whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
@@ -34,7 +36,7 @@ def program() -> str:
             number = 88 * number + digit
         packed += number.to_bytes(len(rest) - 1, "big")
     unpacked = zstandard.ZstdDecompressor().decompressobj().decompress(packed)
-    return unpacked[int(found[2]) :].decode("utf-8")
+    return unpacked[int(script[2]) :].decode("utf-8")
 
 
 def test_each_change_of_the_player_is_found_once() -> None:
@@ -42,7 +44,9 @@ def test_each_change_of_the_player_is_found_once() -> None:
     # The patterns of JavaScript, with its backreferences and groups, are those of Python.
     patterns = re.findall(r"^    \[/(.*)/,(?: |$)", PLAYER, re.MULTILINE)
     assert len(patterns) == 3
-    light, seek, play = ([at.start() for at in re.finditer(each, text)] for each in patterns)
+    light, seek, play = (
+        [match.start() for match in re.finditer(pattern, text)] for pattern in patterns
+    )
     assert len(light) == len(seek) == len(play) == 1
     # Next to it the player hides all nodes, before it plays from the start.
     assert "useSceneTree.getAll()" in text[light[0] : light[0] + 200]

@@ -146,7 +146,7 @@ def test_first_callback_of_a_connection_comes_before_any_frame(server: viser.Vis
 def test_request_of_a_connection_can_be_read(server: viser.ViserServer) -> None:
     async def trial() -> None:
         named: list[str] = []
-        gone: list[int] = []
+        ended: list[int] = []
         websocket = server._websock_server
 
         def meet(connection: Any) -> None:
@@ -154,11 +154,11 @@ def test_request_of_a_connection_can_be_read(server: viser.ViserServer) -> None:
             named.append(request.headers["X-Test"] if request else "no request")
 
         websocket.on_client_connect(meet)
-        websocket.on_client_disconnect(lambda connection: gone.append(connection.client_id))
+        websocket.on_client_disconnect(lambda connection: ended.append(connection.client_id))
         async with browser(server):
             await until(lambda: named, "the connection")
         assert named == ["here"]
-        await until(lambda: gone, "the end of the connection")
+        await until(lambda: ended, "the end of the connection")
 
     with part("_live_connections"):
         run(trial())
@@ -233,7 +233,8 @@ def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> 
             connections[0].queue_message(wire.SetPositionMessage("/only", (0.0, 0.0, 0.0)))
             received = [await Peer(socket).listen() for socket in (one, other)]
         named = [
-            [each for each in messages if each.get("name") == "/only"] for messages in received
+            [message for message in messages if message.get("name") == "/only"]
+            for messages in received
         ]
         assert sorted(map(len, named)) == [0, 1]
 
@@ -244,8 +245,10 @@ def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> 
 def test_control_is_found_by_its_id(server: viser.ViserServer) -> None:
     slider = server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
     with part("_gui_input_handle_from_uuid"):
-        (made,) = (each for each in sent(server) if isinstance(each, wire.GuiSliderMessage))
-        assert server.gui._gui_input_handle_from_uuid.get(made.uuid) is slider
+        (control,) = (
+            message for message in sent(server) if isinstance(message, wire.GuiSliderMessage)
+        )
+        assert server.gui._gui_input_handle_from_uuid.get(control.uuid) is slider
         assert server.gui._gui_input_handle_from_uuid.get("none") is None
 
 
@@ -258,7 +261,9 @@ def test_state_of_a_node_can_be_written_and_sent(server: viser.ViserServer) -> N
         assert frame._impl.props.show_axes == frame.show_axes
     with part("_queue_scene_message"):
         frame._impl.api._queue_scene_message(wire.SetPositionMessage("/frame", (1.0, 2.0, 3.0)))
-        (message,) = (each for each in sent(server) if isinstance(each, wire.SetPositionMessage))
+        (message,) = (
+            queued for queued in sent(server) if isinstance(queued, wire.SetPositionMessage)
+        )
         assert message.position == (1.0, 2.0, 3.0)
 
 
@@ -271,8 +276,8 @@ def test_message_of_the_page_is_decoded(kind: str) -> None:
         for name, value in FROM_PAGE[kind].items():
             if name == "type":
                 continue
-            found = getattr(message, name)
-            assert (list(found) if isinstance(found, tuple) else found) == value, name
+            decoded = getattr(message, name)
+            assert (list(decoded) if isinstance(decoded, tuple) else decoded) == value, name
 
 
 @pytest.mark.parametrize(
@@ -296,7 +301,7 @@ def test_message_of_ours_is_packed(
 
 def test_sky_is_sent_as_viser_sends_an_image(server: viser.ViserServer) -> None:
     def sent_last() -> Any:
-        return next(each for each in reversed(sent(server)) if hasattr(each, "rgb_data"))
+        return next(message for message in reversed(sent(server)) if hasattr(message, "rgb_data"))
 
     with part("BackgroundImageMessage"):
         set_sky(server, LIGHT)

@@ -62,13 +62,15 @@ def test_count_is_that_of_poses_which_a_single_solution_takes(chain: Chain) -> N
     points = [forward(narrow, q)[:3, 3] for q in inside(narrow, 4, 3)]
     solver, counted = kinematics_of(narrow), []
     for point in points:
-        taken = 0
+        reached = 0
         for R in rotations(6, 3):
             T = se3.from_rotation_translation(STAND[:3, :3].T @ R, point)
-            taken += any(each.exact and each.within_limits for each in solver.inverse(T))
-        counted.append(taken)
-    found = every.count(in_base(every, np.array(points)))
-    assert found.tolist() == counted
+            reached += any(
+                solution.exact and solution.within_limits for solution in solver.inverse(T)
+            )
+        counted.append(reached)
+    counts = every.count(in_base(every, np.array(points)))
+    assert counts.tolist() == counted
     assert 0 < sum(counted) < 4 * 18
 
 
@@ -86,7 +88,7 @@ def test_axes_from_the_third_on_stay_above_the_table() -> None:
     every = reachability(UR5E, table=0.5)
     q = inside(UR5E, 200, 7)
     elbow = np.append(screws.point_on(UR5E.S[:, 2]), 1.0)
-    heights = np.array([STAND[2] @ joint_frames(UR5E, each)[1] @ elbow for each in q])
+    heights = np.array([STAND[2] @ joint_frames(UR5E, posture)[1] @ elbow for posture in q])
     low = heights < 0.5
     assert 20 < low.sum() < len(q)
     clear = every.clear(q)
@@ -125,10 +127,10 @@ def test_other_arms_reach_points_in_some_orientation(chain: Chain) -> None:
 
 @pytest.mark.parametrize("chain", [OPENMANIPULATOR_X, UR5E])
 def test_map_has_fractions(chain: Chain) -> None:
-    found = reachability_map(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
-    assert len(found.points) > 10
-    assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
-    assert (found.points[:, 2] >= 0.0).all()
+    reach_map = reachability_map(chain, STAND, 0.0, 0.3 if chain.n > 4 else 0.08)
+    assert len(reach_map.points) > 10
+    assert ((reach_map.fraction > 0.0) & (reach_map.fraction <= 1.0)).all()
+    assert (reach_map.points[:, 2] >= 0.0).all()
 
 
 def test_map_that_would_take_too_long_is_refused_with_what_to_do() -> None:

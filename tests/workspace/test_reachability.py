@@ -43,7 +43,7 @@ def test_orientations_from_forward_kinematics_are_counted(
     q[:, 3] = -q[:, 1] - q[:, 2]
     q[:, 4] = 0.0
     q = q[(q[:, 3] >= chain.lower[3]) & (q[:, 3] <= chain.upper[3])]
-    T = np.array([forward(chain, each) for each in q])
+    T = np.array([forward(chain, posture) for posture in q])
     # With its back to the point, the arm has the tool inward, at pitch pi and not 0.
     outward = (T[:, :2, 0] * T[:, :2, 3]).sum(axis=1) > 0.0
     assert outward.sum() > 20
@@ -74,7 +74,7 @@ def test_elbow_and_wrist_stay_above_the_table(arm: MountedArm) -> None:
     chain = arm.chain
     q = postures_inside(chain, 300, 11)
     points = [screws.point_on(S) for S in chain.S.T]
-    frames = np.array([joint_frames(chain, each) for each in q])
+    frames = np.array([joint_frames(chain, posture) for posture in q])
     heights = np.stack(
         [
             (frames[:, 1] @ [*points[2], 1.0])[:, 2],
@@ -83,9 +83,9 @@ def test_elbow_and_wrist_stay_above_the_table(arm: MountedArm) -> None:
     )
     shoulder = arm.T_base_shoulder[2, 3]
     for table in (0.1, 0.3, 0.4):
-        found = reachability(arm, table=table).clear(q)
-        assert np.array_equal(found, (heights + shoulder >= table).all(axis=0))
-        assert 0 < found.sum() < len(q) or table == 0.1
+        clear = reachability(arm, table=table).clear(q)
+        assert np.array_equal(clear, (heights + shoulder >= table).all(axis=0))
+        assert 0 < clear.sum() < len(q) or table == 0.1
 
 
 def test_a_higher_table_never_helps(arm: MountedArm) -> None:
