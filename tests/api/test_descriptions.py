@@ -38,10 +38,10 @@ def server() -> Iterator[AppServer]:
 
 def resolved(document: dict[str, Any], reference: str) -> Any:
     """Return what a reference such as ``#/a/b`` leads to, through further references."""
-    found: Any = document
+    part: Any = document
     for name in reference.removeprefix("#/").split("/"):
-        found = found[name]
-    return resolved(document, found["$ref"]) if "$ref" in found else found
+        part = part[name]
+    return resolved(document, part["$ref"]) if "$ref" in part else part
 
 
 def test_generators_of_clients_can_read_every_schema() -> None:
@@ -65,8 +65,8 @@ def test_every_reference_leads_somewhere() -> None:
 
 
 def test_every_operation_of_openapi_has_a_name_of_its_own() -> None:
-    operations = [each for path in openapi()["paths"].values() for each in path.values()]
-    names = [each["operationId"] for each in operations]
+    operations = [operation for path in openapi()["paths"].values() for operation in path.values()]
+    names = [operation["operationId"] for operation in operations]
     assert len(names) > 20
     assert len(set(names)) == len(names)
     assert all(re.fullmatch(r"[a-z_]+", name) for name in names)
@@ -74,16 +74,18 @@ def test_every_operation_of_openapi_has_a_name_of_its_own() -> None:
 
 
 def test_every_refusal_of_openapi_has_the_schema_of_a_refusal() -> None:
-    operations = [each for path in openapi()["paths"].values() for each in path.values()]
+    operations = [operation for path in openapi()["paths"].values() for operation in path.values()]
     refusals = [
         (status, response.get("content"))
-        for each in operations
-        for status, response in each["responses"].items()
+        for operation in operations
+        for status, response in operation["responses"].items()
         if status.startswith("4")
     ]
     assert len(refusals) > 50
     # A motion that ends elsewhere than asked is reported with the status of a refusal.
-    wrong = [each for each in refusals if "#/components/schemas/Refused" not in json.dumps(each)]
+    wrong = [
+        refusal for refusal in refusals if "#/components/schemas/Refused" not in json.dumps(refusal)
+    ]
     assert wrong == []
 
 
@@ -97,20 +99,25 @@ def test_fields_are_described_with_their_units() -> None:
 def checked(message: dict[str, Any]) -> str:
     """Return the name of a message that fits the schema of its name."""
     message = dict(message)
-    name = next(each.__name__ for each in answers.EVERY if tag_of(each.__name__) == message["is"])
+    name = next(
+        answer.__name__ for answer in answers.EVERY if tag_of(answer.__name__) == message["is"]
+    )
     schema = {"$ref": f"#/components/schemas/{name}", "components": openapi()["components"]}
     jsonschema.Draft202012Validator(schema).validate(message)
     return name
 
 
 def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
-    lines, seen = Lines(server), set()
+    lines, kinds = Lines(server), set()
     with lines.socket, lines.reader:
         lines.say(do="hello", name="Schemas")
-        seen.add(checked(lines.hear()))
-        asked: list[dict[str, Any]] = [
-            *({"do": "query", "at": each} for each in ("state", "arm", "objects", "world", "loop")),
-            *({"do": "query", "at": each} for each in ("links", "branches")),
+        kinds.add(checked(lines.hear()))
+        questions: list[dict[str, Any]] = [
+            *(
+                {"do": "query", "at": topic}
+                for topic in ("state", "arm", "objects", "world", "loop")
+            ),
+            *({"do": "query", "at": topic} for topic in ("links", "branches")),
             {"do": "get", "node": "tcp", "field": "translation"},
             {"do": "heartbeat"},
             {"do": "list_people"},
@@ -118,9 +125,9 @@ def test_messages_of_a_server_fit_the_schemas(server: AppServer) -> None:
             {"do": "joint", "axis": 5, "value": 40},
             {"do": "joint", "axis": 9, "value": 0},
         ]
-        for request in asked:
-            seen.add(checked(lines.answer(**request)))
-    assert seen == {kind.__name__ for kind in answers.EVERY} - {"Mesh", "Scene"}
+        for request in questions:
+            kinds.add(checked(lines.answer(**request)))
+    assert kinds == {kind.__name__ for kind in answers.EVERY} - {"Mesh", "Scene"}
     with pytest.raises(jsonschema.ValidationError):
         checked({"is": "echo", "n": "one"})
     # A pose is four rows of four numbers.
@@ -138,7 +145,7 @@ def test_a_server_describes_all_its_paths(server: AppServer) -> None:
 
 def test_every_path_in_the_code_is_described() -> None:
     app = Path(requests.__file__).parents[2]
-    found = {
+    names = {
         name
         for file in app.rglob("*.py")
         for name in re.findall(
@@ -146,11 +153,11 @@ def test_every_path_in_the_code_is_described() -> None:
             file.read_text(encoding="utf-8").replace("{{", "{").replace("}}", "}"),
         )
     }
-    found = {name.replace("{number:int}", "{number}") for name in found} - {"socket", "{subject}"}
+    names = {name.replace("{number:int}", "{number}") for name in names} - {"socket", "{subject}"}
     paths = {path.removeprefix("/api/v1/") for path in openapi()["paths"]}
     # The page alone asks for its address for a phone.
-    assert found - paths == {"phone"}
-    assert {"do", "stop", "episodes/{number}", "scripts/{name}"} <= found
+    assert names - paths == {"phone"}
+    assert {"do", "stop", "episodes/{number}", "scripts/{name}"} <= names
 
 
 def test_paths_of_a_missing_extension_are_not_described() -> None:

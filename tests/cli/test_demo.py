@@ -31,20 +31,20 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.long
 def test_the_circle_is_as_exact_as_in_the_paper(out: Path) -> None:
-    found = json.loads((out / "report.json").read_text(encoding="utf-8"))
-    assert next(iter(found)) == "max_position_error_mm"
-    assert 0.0 < found["max_position_error_mm"] < 1e-12
-    assert 0.0 < found["executed_position_error_mm"] < 1e-9
+    report = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert next(iter(report)) == "max_position_error_mm"
+    assert 0.0 < report["max_position_error_mm"] < 1e-12
+    assert 0.0 < report["executed_position_error_mm"] < 1e-9
     # Between two ticks the drive takes the chord: an error of v^2 dt^2 / (8 r), with about 0.19 m/s
     # and 100 mm.
-    assert 1e-3 < found["between_ticks_error_mm"] < 1e-2
-    assert found["path_length_mm"] == pytest.approx(200.0 * math.pi, rel=1e-5)
-    assert found["margin_to_limits_deg"] > 5.0
-    assert found["smallest_singular_value"] > 0.1
-    assert found["max_speed_fraction"] <= 1.0
-    assert found["nearest_clearance_mm"] > 6.0
-    assert found["bounds_held"]
-    assert found["gripper"] == "none"
+    assert 1e-3 < report["between_ticks_error_mm"] < 1e-2
+    assert report["path_length_mm"] == pytest.approx(200.0 * math.pi, rel=1e-5)
+    assert report["margin_to_limits_deg"] > 5.0
+    assert report["smallest_singular_value"] > 0.1
+    assert report["max_speed_fraction"] <= 1.0
+    assert report["nearest_clearance_mm"] > 6.0
+    assert report["bounds_held"]
+    assert report["gripper"] == "none"
 
 
 @pytest.mark.long
@@ -73,13 +73,13 @@ def test_pouring_is_shown_as_in_the_paper(tmp_path: Path) -> None:
     for one, other in itertools.combinations(shown, 2):
         # At least the hand is at another place.
         assert (np.abs(one - other).sum(axis=2) > 60).mean() > 0.005
-    found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    figures = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     # The contact of cup and table before the lift does not count as clearance of the arm.
-    assert 6.0 < found["nearest_clearance_mm"] < 60.0
+    assert 6.0 < figures["nearest_clearance_mm"] < 60.0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     # A film of water stays in the cup, as in every real one.
-    assert 99.5 <= found["emptied_percent"] <= 99.99
-    assert f"Emptied: {found['emptied_percent']:.2f} %; at least 99.5 and at most 99.99" in page
+    assert 99.5 <= figures["emptied_percent"] <= 99.99
+    assert f"Emptied: {figures['emptied_percent']:.2f} %; at least 99.5 and at most 99.99" in page
     captions = ("Initial configuration", "Grasping the cup", "Approaching the", "Emptying the cup")
     places = [page.index(caption) for caption in captions]
     assert places == sorted(places)

@@ -35,9 +35,9 @@ def test_ik_gives_back_the_joints_among_every_branch() -> None:
     poses = ask("fk", [{"q": sample["q"]} for sample in samples])
     answers = ask("ik", poses)
     for sample, answer in zip(samples, answers, strict=True):
-        found = [s for s in answer["solutions"] if np.allclose(s["q"], sample["q"])]
-        assert found
-        assert all(solution["within_limits"] for solution in found)
+        same = [s for s in answer["solutions"] if np.allclose(s["q"], sample["q"])]
+        assert same
+        assert all(solution["within_limits"] for solution in same)
         assert {s["branch"] for s in answer["solutions"]} == {
             "front-up",
             "front-down",
@@ -62,8 +62,8 @@ def test_ik_states_the_error_of_a_pose_that_five_axes_cannot_take() -> None:
 def test_posture_in_a_line_of_ik_chooses_what_the_pose_leaves_free() -> None:
     (pose,) = ask("fk", [{"q": [0.3, -math.pi / 2.0, 0.0, 0.0, 0.0]}])
     (answer,) = ask("ik", [pose | {"q": [0.3, -1.5, 0.1, 0.0, 0.0]}])
-    assert any(abs(each["q"][0] - 0.3) < 1e-9 for each in answer["solutions"])
-    assert all(each["singular"] for each in answer["solutions"])
+    assert any(abs(solution["q"][0] - 0.3) < 1e-9 for solution in answer["solutions"])
+    assert all(solution["singular"] for solution in answer["solutions"])
 
 
 @pytest.mark.cases(1)
@@ -88,9 +88,9 @@ def test_ik_takes_printed_poses(arm: MountedArm, decimals: int) -> None:
         plane = math.sqrt(2.0) * rounding / math.hypot(pose[0, 3], pose[1, 3])
         beyond += answer["residual_rad"] > turned + plane + 1e-9
         for solution in answer["solutions"]:
-            found = forward(chain, solution["q"])
-            assert np.linalg.norm(found[:3, 3] - pose[:3, 3]) <= math.sqrt(3.0) * rounding + 1e-9
-            angle = so3.angle(found[:3, :3], pose[:3, :3])
+            reached = forward(chain, solution["q"])
+            assert np.linalg.norm(reached[:3, 3] - pose[:3, 3]) <= math.sqrt(3.0) * rounding + 1e-9
+            angle = so3.angle(reached[:3, :3], pose[:3, :3])
             assert angle <= 1.01 * turned + answer["residual_rad"] + 1e-9
     assert beyond <= 5
 

@@ -141,8 +141,8 @@ def test_folder_of_a_killed_server_is_removed_at_the_next_start(
     running, claimed = serve._private_folder()
     newest, also = serve._private_folder()
     assert set(tmp_path.iterdir()) == {other, running, newest}
-    for each in (claimed, also):
-        os.close(each)
+    for folder in (claimed, also):
+        os.close(folder)
     with (running / serve.CLAIM).open("r+b") as file:
         claim_file(file.fileno())
     shutil.rmtree(running)
@@ -159,6 +159,6 @@ def test_server_that_ends_early_reports_no_lost_episodes(
     monkeypatch.setattr(EpisodeFolder, "claim", claim)
     config, ended = SimpleNamespace(episodes=tmp_path), threading.Event()
     for _ in range(2):
-        found = recorder._episodes(config, Mock(), Mock(), ended)  # type: ignore[arg-type]
-        assert isinstance(found, InputError)
+        episodes = recorder._episodes(config, Mock(), Mock(), ended)  # type: ignore[arg-type]
+        assert isinstance(episodes, InputError)
     assert not caplog.text

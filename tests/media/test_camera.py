@@ -27,9 +27,9 @@ def test_a_ray_passes_through_the_point_projected_to_its_pixel(
     (way,) = camera.directions(np.array([x], dtype=np.float32), np.array([y], dtype=np.float32))
     assert np.linalg.norm(way) == pytest.approx(1.0, abs=1e-6)
     # Projection matrix from the vectors of the camera.
-    ahead = np.array((-1.0, 0.5, -0.3)) / math.sqrt(1.34)
-    right = np.cross(ahead, (0.0, 0.0, 1.0)) / math.hypot(*ahead[:2])
-    down = np.cross(ahead, right)
-    scale = 200.0 / math.tan(0.5 * fov) / (way @ ahead)
+    axis = np.array((-1.0, 0.5, -0.3)) / math.sqrt(1.34)
+    right = np.cross(axis, (0.0, 0.0, 1.0)) / math.hypot(*axis[:2])
+    down = np.cross(axis, right)
+    scale = 200.0 / math.tan(0.5 * fov) / (way @ axis)
     assert 320.0 + scale * (way @ right) == pytest.approx(x, abs=0.01)
     assert 200.0 + scale * (way @ down) == pytest.approx(y, abs=0.01)

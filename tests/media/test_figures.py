@@ -13,7 +13,7 @@ def test_the_drawn_error_is_the_largest_of_every_part_of_every_path() -> None:
     sigma = np.linspace(0.0, 1.0, 2001)
     off = rng.normal(size=(3, 2001, 3))
     still = np.zeros((2001, 3))
-    paths = [PathTrace("line", sigma, still, each, np.zeros(2001)) for each in off]
+    paths = [PathTrace("line", sigma, still, error, np.zeros(2001)) for error in off]
     middles, drawn = largest(paths)
     errors = np.linalg.norm(off, axis=2).max(axis=0)
     half = 0.5 / PARTS

@@ -54,7 +54,7 @@ def test_a_film_has_its_frames_size_and_length(tmp_path: Path) -> None:
     for number, picture in enumerate(shown):
         red = picture[:, :, 0].mean(axis=0)
         assert 8 * number <= int(red.argmax()) < 8 * number + 8
-    assert [each.name for each in tmp_path.iterdir()] == ["film.mp4"]
+    assert [file.name for file in tmp_path.iterdir()] == ["film.mp4"]
 
 
 def test_an_unfinished_film_leaves_nothing(tmp_path: Path) -> None:
@@ -123,4 +123,4 @@ def test_failure_of_ffmpeg_is_reported(on_path: Path, tmp_path: Path) -> None:
     script(on_path, "echo libx264; cat > /dev/null; exit 1")
     with pytest.raises(InputError, match="cannot be written: ffmpeg has failed"):
         write_film(tmp_path / "film.mp4", frames(2), (WIDTH, HEIGHT), 25.0)
-    assert [each.name for each in tmp_path.iterdir()] == ["ffmpeg"]
+    assert [file.name for file in tmp_path.iterdir()] == ["ffmpeg"]

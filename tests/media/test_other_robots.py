@@ -36,8 +36,8 @@ def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
     state = of_pose((), urdf).at(0.0)
     look = camera_pose(preset, robot, state)
     eye = np.array(look.position)
-    ahead = np.subtract(look.target, eye) / np.linalg.norm(np.subtract(look.target, eye))
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    view_axis = np.subtract(look.target, eye) / np.linalg.norm(np.subtract(look.target, eye))
+    right = np.cross(view_axis, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
     frames = robot.frames(robot.joint_values(session.ready, 0.0))
     corners = [
@@ -45,14 +45,14 @@ def test_named_views_show_the_whole_robot(urdf: Path, preset: Preset) -> None:
         for link in robot.links
         for shape in link.shapes
     ]
-    seen = np.concatenate(corners) - eye
-    depth = seen @ ahead
+    rays = np.concatenate(corners) - eye
+    depth = rays @ view_axis
     assert depth.min() > 0.0
     half = math.tan(FOV / 2.0)
-    assert np.abs(seen @ np.cross(right, ahead) / depth).max() < half
-    assert np.abs(seen @ right / depth).max() < half * ASPECT
+    assert np.abs(rays @ np.cross(right, view_axis) / depth).max() < half
+    assert np.abs(rays @ right / depth).max() < half * ASPECT
     # Not from far away either: it takes at least a sixth of the height or width.
-    sizes = [np.ptp(seen @ axis / depth) for axis in (right, np.cross(right, ahead))]
+    sizes = [np.ptp(rays @ axis / depth) for axis in (right, np.cross(right, view_axis))]
     assert max(sizes) > half / 3.0
 
 

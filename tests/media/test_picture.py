@@ -77,14 +77,14 @@ def test_the_arm_covers_the_same_pixels_as_in_pillow(
 ) -> None:
     """Compare with a projection by other programs, of meshes that other programs read and pose."""
     view: Viewpoint = camera(katana)
-    at = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
+    pinhole = Camera(tuple(view.eye), tuple(view.target), FIELD_OF_VIEW, (SIZE, SIZE))
     scene = RenderScene.of(
         workshop.stage.arm(workshop.session.begin(np.array(pose[:5]), pose[5], 0.0))
     )
     # Rays through the middle of each pixel, as in a picture, but without light.
     y, x = np.mgrid[0.5:SIZE, 0.5:SIZE].reshape(2, -1).astype(np.float32)
-    eye = np.array(at.position, dtype=np.float32)
-    hits = first_hits(Tracer(scene), eye, at.directions(x, y), -10.0)
+    eye = np.array(pinhole.position, dtype=np.float32)
+    hits = first_hits(Tracer(scene), eye, pinhole.directions(x, y), -10.0)
     theirs = silhouette(placed(URDF_PATH, katana.values(pose)), view)
     assert overlap((hits.item >= 0).reshape(SIZE, SIZE), theirs) >= 0.98
 
@@ -111,40 +111,40 @@ def test_an_uploaded_object_is_seen_at_its_place(workshop: Workshop) -> None:
     shown = picture(workshop.stage.surrounding_items(state), (), NEAR)
     where = np.argwhere(shown.shows("crate")).mean(axis=0)
     away = np.array((0.4, 0.0, 0.05)) - NEAR.position
-    right, up, ahead = NEAR.frame @ away / NEAR.pixel
+    right, up, distance = NEAR.frame @ away / NEAR.pixel
     depth = NEAR.frame[2] @ away
     assert where[1] == pytest.approx(160.0 + right / depth, abs=3.0)
     assert where[0] == pytest.approx(100.0 - up / depth, abs=3.0)
-    assert ahead > 0.0
+    assert distance > 0.0
 
 
 def test_a_sphere_has_the_size_of_its_projection() -> None:
     """A distant sphere covers a disc with the sine of its half angle as radius."""
-    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
-    shown = picture([Item("ball", ball(0.3), UP)], (), at)
-    radius = math.tan(math.asin(0.3 / 2.0)) / at.pixel
+    camera = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (300, 300))
+    shown = picture([Item("ball", ball(0.3), UP)], (), camera)
+    radius = math.tan(math.asin(0.3 / 2.0)) / camera.pixel
     assert shown.shows("ball").sum() == pytest.approx(math.pi * radius**2, rel=0.01)
 
 
 def test_a_shadow_falls_along_the_key_light() -> None:
     """The shadow of a sphere 0.5 m up lies along the light's direction from its centre."""
-    at = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
+    camera = Camera((0.0, -2.5, 2.5), (0.0, 0.0, 0.0), math.radians(50.0), (200, 200))
     items = [Item("ball", ball(0.15), UP)]
-    with_ball, without = picture(items, (), at), picture((), (), at)
+    with_ball, without = picture(items, (), camera), picture((), (), camera)
     darker = without.pixels.astype(int).sum(axis=2) - with_ball.pixels.astype(int).sum(axis=2)
     shadow = (darker > 60) & (with_ball.item == FLOOR)
     key = np.array((0.7, -0.9, 1.9))
     foot = np.array((0.0, 0.0, 0.5)) - key * (0.5 + 0.0255) / key[2]
-    right, up, depth = at.frame @ (foot - at.position)
+    right, up, depth = camera.frame @ (foot - camera.position)
     row, column = np.argwhere(shadow).mean(axis=0)
-    assert column == pytest.approx(100.0 + right / depth / at.pixel, abs=2.0)
-    assert row == pytest.approx(100.0 - up / depth / at.pixel, abs=2.0)
+    assert column == pytest.approx(100.0 + right / depth / camera.pixel, abs=2.0)
+    assert row == pytest.approx(100.0 - up / depth / camera.pixel, abs=2.0)
 
 
 def test_edges_are_smooth() -> None:
     """Pixels between a dark sphere and the bright room have intermediate colours."""
-    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
-    row = picture([Item("ball", ball(0.3), UP)], (), at).pixels[:, :, 1].astype(int)
+    camera = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (200, 200))
+    row = picture([Item("ball", ball(0.3), UP)], (), camera).pixels[:, :, 1].astype(int)
     inside, outside = row[100, 100], row[100, 5]
     # A nearly vertical outline crosses pixels at another place in each row.
     rim = row[70:130, 10:60]
@@ -152,8 +152,8 @@ def test_edges_are_smooth() -> None:
 
 
 def test_an_empty_picture_is_the_room() -> None:
-    at = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (64, 48))
-    shown = picture((), (), at)
+    camera = Camera((2.0, 0.0, 0.5), (0.0, 0.0, 0.5), math.radians(30.0), (64, 48))
+    shown = picture((), (), camera)
     assert set(np.unique(shown.item)) == {FLOOR, NOWHERE}
     assert shown.names == ()
 

@@ -98,9 +98,9 @@ def test_measured_arm_is_apart_from_its_setpoints(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.index(titles[0]) < page.index("Executed position") < page.index(titles[1])
     assert page.index(titles[1]) < page.index("Measured position error")
-    found = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
-    assert found["tracking_lag_ms"] == pytest.approx(100.0, abs=3.0)
-    assert found["measured"] == "a test"
+    figures = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert figures["tracking_lag_ms"] == pytest.approx(100.0, abs=3.0)
+    assert figures["measured"] == "a test"
     assert "measured.png" not in {
         path.name for path in commanded.write(tmp_path / "exact", WRITTEN)
     }
@@ -114,12 +114,12 @@ def test_distances_are_drawn_by_a_round_factor_that_fits() -> None:
         driver = LaggingDriver(arm, start.q, start.gripper, 0, offset)
         run = MeasuredRun.of(arm, run_by_clock(plan, driver).states)
         assert run is not None
-        found = magnification(run.deviations)
-        worst = max(float(each.error.max()) for each in run.deviations)
-        assert f"{found:.0e}"[0] in "125"
-        assert (found > 1.0) is magnified
+        factor = magnification(run.deviations)
+        worst = max(float(deviation.error.max()) for deviation in run.deviations)
+        assert f"{factor:.0e}"[0] in "125"
+        assert (factor > 1.0) is magnified
         if magnified:
-            assert 0.4 * DRAWN <= found * worst / 0.06 <= 1.01 * DRAWN
+            assert 0.4 * DRAWN <= factor * worst / 0.06 <= 1.01 * DRAWN
 
 
 def test_water_figure_is_drawn(run: tuple[Planned, Report]) -> None:

@@ -69,9 +69,9 @@ class SmallLoop:
     def reports_since(self, t: float) -> list[tuple[float, ArmReport, FloatArray]]:
         """Return the reports from ``t`` [s] on, with their times and the joints (5,) [rad]."""
         return [
-            (at, answer.report, answer.q)
-            for at, answer in self.answers
-            if at >= t and answer.report is not None
+            (moment, answer.report, answer.q)
+            for moment, answer in self.answers
+            if moment >= t and answer.report is not None
         ]
 
     def act(self, act: ArmAct, mode: ArmMode, seconds: float = 3.0) -> None:
@@ -81,12 +81,12 @@ class SmallLoop:
 
     def wait(self, mode: ArmMode, seconds: float = 3.0) -> float:
         """Return the time until ``mode`` is reported [s], however short it lasts."""
-        begun, place = time.perf_counter(), len(self.answers) - 1
-        while time.perf_counter() - begun < seconds:
-            for at, answer in self.answers[place:]:
+        start, place = time.perf_counter(), len(self.answers) - 1
+        while time.perf_counter() - start < seconds:
+            for t, answer in self.answers[place:]:
                 place += 1
                 if answer.report is not None and answer.report.mode is mode:
-                    return max(at - begun, 0.0)
+                    return max(t - start, 0.0)
             time.sleep(0.002)
         raise AssertionError(f"{self.report.mode} instead of {mode}: {self.report.note}")
 

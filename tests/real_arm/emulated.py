@@ -79,7 +79,9 @@ class Bench:
         """Send ``segments`` of one axis; the others stay where they are."""
         positions = self.positions
         for number, segment in enumerate(segments):
-            still = [AxisSegment(segment.ticks, each, each, 0, 0, 0) for each in positions]
+            still = [
+                AxisSegment(segment.ticks, position, position, 0, 0, 0) for position in positions
+            ]
             still[axis - 1] = segment
             more = 1 if last and number == len(segments) - 1 else 2 if not last else 0
             self.ask(SendSplines(tuple(still), more))
@@ -111,9 +113,9 @@ def emulator_process(*options: str) -> Iterator[tuple[subprocess.Popen[str], int
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
-        found = re.search(r"tcp://127\.0\.0\.1:(\d+)", line)
-        assert found, line
-        yield process, int(found[1])
+        match = re.search(r"tcp://127\.0\.0\.1:(\d+)", line)
+        assert match, line
+        yield process, int(match[1])
     finally:
         if process.poll() is None:
             process.kill()

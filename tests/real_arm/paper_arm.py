@@ -87,8 +87,8 @@ class PaperArm:
 
     def _take(self, packet: SendSplines, t: float) -> None:
         before = self._packets[-1].segments if self._packets else None
-        at = self.place if before is None else [segment.target for segment in before]
-        jumps = [abs(s.p0 - place) for s, place in zip(packet.segments[:5], at, strict=False)]
+        starts = self.place if before is None else [segment.target for segment in before]
+        jumps = [abs(s.p0 - place) for s, place in zip(packet.segments[:5], starts, strict=False)]
         self.largest_jump = max(self.largest_jump, *jumps)
         self._packets.append(packet)
         if self._began is None and packet.more != More.STORE:
@@ -122,8 +122,8 @@ class PaperArm:
             self.calibrated_at = np.inf
             self.states = [int(AxisStatus.FIXED)] * 6
             self.place = np.array([30500.0, -30500, -30500, 30500, 30500, 30500])
-        for axis, (begun, start, end) in list(self._targets.items()):
-            reach = 18_000 * (t - begun)
+        for axis, (start_time, start, end) in list(self._targets.items()):
+            reach = 18_000 * (t - start_time)
             self.place[axis] = start + np.clip(end - start, -reach, reach)
             if self.place[axis] == end:
                 del self._targets[axis]

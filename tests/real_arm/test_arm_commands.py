@@ -117,7 +117,7 @@ def test_server_drives_the_emulated_arm_and_keeps_a_log(tmp_path: Path) -> None:
                 client.ask(OperateArm(act=act, confirmed=True))
                 wait_for(client, mode)
             client.clear_stop()
-            target = [each - 0.1 * np.sign(each) for each in client.query(answers.State).q]
+            target = [angle - 0.1 * np.sign(angle) for angle in client.query(answers.State).q]
             state = client.joints(target)
             wait_for(client, "holding")
             state = client.query(answers.State)

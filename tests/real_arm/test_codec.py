@@ -161,9 +161,9 @@ def test_error_flag_has_its_worked_bytes() -> None:
 
 
 def test_every_request_and_reply_is_tested() -> None:
-    asked = {type(request) for request, _ in PAIRS}
-    assert asked == {*requests.REQUESTS, requests.ErrorQuery}
-    assert {request.REPLY for request in asked} == {type(reply) for _, reply in PAIRS}
+    tested = {type(request) for request, _ in PAIRS}
+    assert tested == {*requests.REQUESTS, requests.ErrorQuery}
+    assert {request.REPLY for request in tested} == {type(reply) for _, reply in PAIRS}
 
 
 def test_lengths_are_those_of_the_protocol() -> None:
@@ -266,13 +266,13 @@ def test_reply_is_read_at_every_split(
 @pytest.mark.parametrize("request_", [request for request, _ in PAIRS])
 def test_request_and_refusal_are_read_at_every_split(request_: requests.ArmRequest) -> None:
     address = 0 if isinstance(request_, requests.ErrorQuery) else 24
-    for data, read, found in (
+    for data, read, event in (
         (request_bytes(request_), firmware_events, RequestReceived(request_, address)),
         (refusal_bytes(), partial(host_events, request_), RequestRefused(request_)),
     ):
         for cut in range(len(data) + 1):
-            assert read([data[:cut], data[cut:]]) == [found]
-        assert read([bytes((byte,)) for byte in data]) == [found]
+            assert read([data[:cut], data[cut:]]) == [event]
+        assert read([bytes((byte,)) for byte in data]) == [event]
         assert read([data[:-1]]) == []
 
 
@@ -375,7 +375,7 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
     arm = FirmwareCodec()
     # A second source of bytes looks like the protocol, so that the fuzz reaches all of the codec.
     likely = [reply_bytes(reply) for _, reply in PAIRS] + [STREAM, refusal_bytes(), b"\0\0\0\xc1"]
-    done = found = 0
+    done = events = 0
     received_bytes = b""
     while done < count:
         data = bytearray(rng.choice(likely) if rng.random() < 0.5 else rng.randbytes(64))
@@ -385,7 +385,7 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
         received_bytes = (received_bytes + data)[-4096:]
         for event in arm.receive(bytes(data)):
             if isinstance(event, RequestReceived):
-                found += 1
+                events += 1
                 sent = request_bytes(event.request, event.address)
                 assert firmware_events([sent]) == [event]
                 assert sent in received_bytes
@@ -395,4 +395,4 @@ def test_fuzzed_bytes_raise_nothing_and_give_no_wrong_event(count: int) -> None:
                 length = len(received.reply.payload)
                 assert with_crc(bytes(data[:length])) == data[: length + 2]
         done += len(data)
-    assert found
+    assert events

@@ -162,9 +162,9 @@ def test_internal_error_is_a_loss_and_does_not_end_the_thread(
         def urgent(machine: ArmMachine, now: float) -> requests.ArmRequest | None:
             if next(broken, False):
                 raise ArithmeticError("a fault of the test")
-            return found(machine, now)
+            return before(machine, now)
 
-        found = ArmMachine.urgent
+        before = ArmMachine.urgent
         monkeypatch.setattr(ArmMachine, "urgent", urgent)
         loop.wait(ArmMode.LOST)
         assert "internal error: a fault of the test" in loop.report.note

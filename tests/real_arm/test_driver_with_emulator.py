@@ -80,10 +80,10 @@ def inwards(loop: SmallLoop, size: float = 0.3, fingers: float = 0.0) -> None:
 
     fingers: speed at which they close meanwhile [rad/s].
     """
-    begun = time.perf_counter()
-    away, closing = swing(np.zeros(6), begun, size), np.array([0.0] * 5 + [-fingers])
+    start_time = time.perf_counter()
+    away, closing = swing(np.zeros(6), start_time, size), np.array([0.0] * 5 + [-fingers])
     start = loop.measured
-    loop.setpoint = lambda t: start + away(t) + closing * max(t - begun, 0.0)
+    loop.setpoint = lambda t: start + away(t) + closing * max(t - start_time, 0.0)
 
 
 def test_collision_is_reported_and_unblocked(wire: Wire) -> None:
@@ -127,7 +127,7 @@ def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
     Returns the time from then to the last tick whose report still had the arm connected [s]. A busy
     machine may delay the next tick, but none may be later than that.
     """
-    begun = time.perf_counter()
+    start = time.perf_counter()
     with server.lock if hangs else nullcontext():
         if not hangs:
             server.drop_client()
@@ -135,10 +135,10 @@ def cut(server: EmulatorServer, loop: SmallLoop, *, hangs: bool) -> float:
         while "Trying to connect again" not in loop.report.note:
             # The thread of the driver has not noticed it yet.
             time.sleep(0.005)
-            assert time.perf_counter() < begun + 5.0
-    reports = loop.reports_since(begun)
+            assert time.perf_counter() < start + 5.0
+    reports = loop.reports_since(start)
     lost = next(n for n, (_, report, _) in enumerate(reports) if report.mode is ArmMode.LOST)
-    return reports[lost - 1][0] - begun if lost else 0.0
+    return reports[lost - 1][0] - start if lost else 0.0
 
 
 def test_cuts_at_random_instants_repeat_no_motion(wire: Wire) -> None:

@@ -42,8 +42,8 @@ def test_calibration_finds_the_stops_of_an_arm_after_power_up(robot: Robot) -> N
     assert bench.states == (AxisStatus.CALIBRATING,) * 6
     assert 20.0 < bench.wait_until(HOLDS, 60.0) < 40.0
     bench.wait(1.0)
-    for found, wanted in zip(bench.positions, CALIBRATED, strict=True):
-        assert abs(found - wanted) < 100
+    for position, wanted in zip(bench.positions, CALIBRATED, strict=True):
+        assert abs(position - wanted) < 100
     for axis in bench.arm.axes:
         assert abs(axis.position - axis.plant.position) < 10, "the counts are those of the arm"
 
@@ -107,7 +107,7 @@ def test_splines_are_followed_as_the_closed_polynomial(stiff: Bench) -> None:
 
 
 def test_gripper_follows_no_polynomial(stiff: Bench) -> None:
-    still = [AxisSegment(10, each, each, 0, 0, 0) for each in stiff.positions]
+    still = [AxisSegment(10, position, position, 0, 0, 0) for position in stiff.positions]
     still[5] = AxisSegment(10, 30400, 30500, -640, 0, 0)
     stiff.ask(req.SendSplines(tuple(still), 1))
     stiff.wait(0.2)
@@ -246,7 +246,7 @@ def test_gripper_closes_on_an_object_and_its_sensors_feel_it(width: float) -> No
     bench.ask(req.CommandMotor(6, req.MotorFlag.FREEZE, 0))
     bench.move(6, 30770)
     bench.wait(4.0)
-    assert [bench.arm.sensors[each] for each in (6, 7, 14, 15)] == [free[6]] * 4
+    assert [bench.arm.sensors[number] for number in (6, 7, 14, 15)] == [free[6]] * 4
 
 
 @pytest.mark.parametrize(("gap", "encoder"), [(0.4, 12240), (43.0, 18250), (120.4, 30770)])

@@ -90,10 +90,10 @@ FAULTS: dict[str, tuple[tuple[Piece, ...], str]] = {
 def test_fault_loses_the_link_within_the_deadline_and_repeats_nothing(fault: str) -> None:
     pieces, problem = FAULTS[fault]
     with link_to(*pieces) as (link, firmware):
-        begun = time.perf_counter()
+        start = time.perf_counter()
         with pytest.raises(LinkLostError, match=problem):
             link.exchange(requests.ReadPositions(), 0.2)
-        assert time.perf_counter() - begun < 0.3
+        assert time.perf_counter() - start < 0.3
         time.sleep(0.02)
         assert firmware.requests == [requests.ReadPositions()]
         with pytest.raises(LinkLostError, match="connect again"):

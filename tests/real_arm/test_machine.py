@@ -187,7 +187,7 @@ def test_motion_is_followed_with_two_to_four_segments_ahead(
     talk.engage()
     rng = np.random.default_rng(3)
     talk.delay = lambda: delay * rng.uniform(0.9, 1.2)
-    begun = talk.now
+    start = talk.now
     talk.setpoint = sway(talk.now)
     talk.run(3.0)
     assert talk.mode() is ArmMode.MOVING
@@ -202,11 +202,11 @@ def test_motion_is_followed_with_two_to_four_segments_ahead(
     errors = [
         np.abs(q - report.expected)[:5].max()
         for t, report, q in talk.reports
-        if t > begun and report.mode.follows
+        if t > start and report.mode.follows
     ]
     # Positions are measured within an exchange, so their time is known to half of it.
     assert max(errors) < 0.002 + 1.0 * delay
-    ages = [t - report.t for t, report, _ in talk.reports if t > begun]
+    ages = [t - report.t for t, report, _ in talk.reports if t > start]
     assert max(ages) < 0.1 + 4 * delay
 
 
@@ -274,10 +274,10 @@ def test_slow_exchanges_freeze_each_axis_at_a_fresh_position(talk: Conversation)
     talk.delay = lambda: 0.04
     talk.setpoint = sway(talk.now)
     talk.run(1.5)
-    begun = talk.now
+    start = talk.now
     talk.stopped = True
     talk.run(1.0)
-    stop = [request for t, request in talk.arm.requests if t > begun]
+    stop = [request for t, request in talk.arm.requests if t > start]
     assert len(talk.motors) > 5
     freezes = [i for i, r in enumerate(stop) if getattr(r, "flag", None) == MotorFlag.FREEZE]
     reads = [i for i, r in enumerate(stop) if type(r).__name__ == "ReadPositions"]

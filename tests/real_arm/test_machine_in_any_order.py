@@ -85,8 +85,8 @@ class Story:
     def swing(self, size: float) -> None:
         talk = self.talk
         if not talk.stopped:
-            start, begun = talk.setpoint(talk.now), talk.now
-            talk.setpoint = lambda t: start + size * np.sin(min(t - begun, np.pi)) ** 2
+            start, since = talk.setpoint(talk.now), talk.now
+            talk.setpoint = lambda t: start + size * np.sin(min(t - since, np.pi)) ** 2
 
     def pass_time(self, seconds: float) -> None:
         talk = self.talk

@@ -13,8 +13,8 @@ from tests.real_arm.paper_arm import ENDS, JOINTS, MAP, Conversation, sway
 
 def test_gripper_moves_by_targets_and_not_by_polynomials(talk: Conversation) -> None:
     talk.engage()
-    begun = talk.now
-    talk.setpoint = lambda t: JOINTS + np.array([0, 0, 0, 0, 0, 0.2 * min(t - begun, 1.0)])
+    start = talk.now
+    talk.setpoint = lambda t: JOINTS + np.array([0, 0, 0, 0, 0, 0.2 * min(t - start, 1.0)])
     talk.run(3.0)
     assert not talk.sent(SendSplines)
     moves = [r for _, r in talk.arm.requests if getattr(r, "flag", None) == MotorFlag.MOVE]
@@ -33,12 +33,12 @@ def test_object_between_the_fingers_is_held_and_is_no_collision(talk: Conversati
 
 def test_stop_lets_fingers_at_rest_keep_what_they_hold(talk: Conversation) -> None:
     talk.engage()
-    begun = talk.now
-    talk.setpoint = lambda t: JOINTS + np.array([0, 0, 0, 0, 0, -0.2 * min(t - begun, 0.5)])
+    start = talk.now
+    talk.setpoint = lambda t: JOINTS + np.array([0, 0, 0, 0, 0, -0.2 * min(t - start, 0.5)])
     talk.run(2.0)
     talk.setpoint = sway(talk.now)
     grip = talk.reports[-1][2][5] - 0.05
-    talk.setpoint = lambda t: np.array([*sway(begun + 2.0)(t)[:5], grip])
+    talk.setpoint = lambda t: np.array([*sway(start + 2.0)(t)[:5], grip])
     talk.run(1.5)
     count = len(talk.motors)
     talk.stopped = True
@@ -78,8 +78,8 @@ def test_silent_control_loop_is_braked_before_the_arm_runs_dry(talk: Conversatio
 
 def test_setpoint_beyond_the_limits_ends_at_them(talk: Conversation) -> None:
     talk.engage()
-    begun = talk.now
-    talk.setpoint = lambda t: JOINTS + np.array([-1.0, 0, 0, 0, 0, 0]) * min(t - begun, 4.0)
+    start = talk.now
+    talk.setpoint = lambda t: JOINTS + np.array([-1.0, 0, 0, 0, 0, 0]) * min(t - start, 4.0)
     talk.run(6.0)
     assert talk.mode() is ArmMode.HOLDING
     assert talk.arm.place[0] == MAP.upper[0]

@@ -37,11 +37,11 @@ def moved(t: float) -> FloatArray:
 
 
 def driven(
-    driver: PlantDriver, seconds: float, at: Callable[[float], FloatArray]
+    driver: PlantDriver, seconds: float, setpoint: Callable[[float], FloatArray]
 ) -> list[DriverAnswer]:
     driver.start(0.0)
     ticks = range(1, round(seconds / TICK) + 1)
-    return [driver.send(at(n * TICK), 0.0, n * TICK) for n in ticks]
+    return [driver.send(setpoint(n * TICK), 0.0, n * TICK) for n in ticks]
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -59,18 +59,18 @@ def test_plant_comes_to_rest_exactly_and_keeps_its_arrays(robot: Robot, name: st
 
 def test_stiff_plant_follows_its_setpoints(robot: Robot) -> None:
     answers = driven(PlantDriver(robot, START, 0.0, STIFF), 1.2, moved)
-    worst = max(np.abs(each.q - moved((n + 1) * TICK)).max() for n, each in enumerate(answers))
+    worst = max(np.abs(answer.q - moved((n + 1) * TICK)).max() for n, answer in enumerate(answers))
     assert np.degrees(worst) < 0.01
 
 
 def test_katana_plant_lags_by_its_delay_and_little_more(robot: Robot) -> None:
     answers = driven(PlantDriver(robot, START, 0.0, KATANA450), 1.2, moved)
     tracked = 0.0
-    for n, each in enumerate(answers, 1):
-        assert each.report is not None
+    for n, answer in enumerate(answers, 1):
+        assert answer.report is not None
         wanted = moved(n * TICK - KATANA450.delay)
-        assert np.allclose(each.report.expected[:-1], wanted, atol=2e-4)
-        tracked = max(tracked, float(np.abs(each.q - each.report.expected[:-1]).max()))
+        assert np.allclose(answer.report.expected[:-1], wanted, atol=2e-4)
+        tracked = max(tracked, float(np.abs(answer.q - answer.report.expected[:-1]).max()))
     # Far from the 3 degrees at which the session stops the arm.
     assert 0.02 < np.degrees(tracked) < 0.3
 
@@ -134,7 +134,7 @@ def test_short_ticks_without_a_whole_step_lose_no_setpoint(robot: Robot) -> None
 
 
 def axis(**changes: float) -> PlantAxis:
-    values = {each: getattr(KATANA450, each) for each in KATANA450.__dataclass_fields__} | changes
+    values = {name: getattr(KATANA450, name) for name in KATANA450.__dataclass_fields__} | changes
     return PlantAxis(type(KATANA450)(**values), 0.0, (-2.0, 2.0), 2.0, 2.0)
 
 

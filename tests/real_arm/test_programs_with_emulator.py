@@ -114,8 +114,8 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
         report = answer.report
         assert report is not None
         assert report.mode in (ArmMode.HOLDING, ArmMode.MOVING), report.note
-        there, due = forward(chain, answer.q), forward(chain, report.expected[:5])
-        errors.append(float(np.linalg.norm(there[:3, 3] - due[:3, 3])))
+        actual, due = forward(chain, answer.q), forward(chain, report.expected[:5])
+        errors.append(float(np.linalg.norm(actual[:3, 3] - due[:3, 3])))
         lags.append(float(np.abs(answer.q - state.setpoint).max()))
         state = session.supervised(session.observe(state, answer.q, answer.gripper), report)
         assert state.stopped is None, state.stopped
@@ -143,4 +143,4 @@ def test_program_runs_with_slow_replies(name: str, monkeypatch: pytest.MonkeyPat
     # The report has both apart: four polynomials and one exchange late, and still on the path.
     assert 320.0 < (run.values["tracking_lag_ms"] or 0.0) < 480.0
     assert (run.values["measured_position_error_mm"] or 9.0) < 2.0
-    assert max(float(each.commanded.max()) for each in run.deviations) < 1e-9
+    assert max(float(deviation.commanded.max()) for deviation in run.deviations) < 1e-9

@@ -41,8 +41,8 @@ def command_done(*options: str, seconds: float = 120.0) -> subprocess.CompletedP
 
 
 def report_in(folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    return found
+    report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return report
 
 
 def test_bound_on_a_measured_arm_needs_one(
@@ -62,9 +62,9 @@ def test_circle_of_a_plant_has_commanded_and_measured_apart(tmp_path: Path) -> N
         "demo", "circle", "--headless", "--plant", "katana450", "--report", str(tmp_path)
     )
     assert done.returncode == 0, done.stderr
-    found = report_in(tmp_path)
-    assert found["executed_position_error_mm"] < 1e-9
-    assert found["bounds_held"]
+    report = report_in(tmp_path)
+    assert report["executed_position_error_mm"] < 1e-9
+    assert report["bounds_held"]
     with (tmp_path / "trace.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["task"] == "circle"]
     # The paper's circle, by the measured points: across it and along its axis.
@@ -72,7 +72,7 @@ def test_circle_of_a_plant_has_commanded_and_measured_apart(tmp_path: Path) -> N
     for row in rows:
         x, y, z = (float(row[f"measured_{axis}_mm"]) for axis in "xyz")
         off.append(math.hypot(x - 150.0, math.hypot(y, z + 110.0) - 100.0))
-    assert found["measured_position_error_mm"] == pytest.approx(max(off), rel=0.02)
+    assert report["measured_position_error_mm"] == pytest.approx(max(off), rel=0.02)
     assert 0.05 < max(off) < 2.0
     for name in ("measured.png", "joints.png", "path.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

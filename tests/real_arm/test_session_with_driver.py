@@ -77,10 +77,10 @@ def operator(request: pytest.FixtureRequest) -> Iterator[Operator]:
     server = EmulatorServer(arm, "127.0.0.1", 0, delay)
     server.start()
     session = describe_robot(Settings(), URDF_PATH, None).session
-    found = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
-    found.loop.start()
-    yield found
-    found.loop.stop()
+    operator = Operator(session, KatanaDriver(ArmUrl("127.0.0.1", server.port), ENDS, JOINTS))
+    operator.loop.start()
+    yield operator
+    operator.loop.stop()
     server.stop()
 
 
@@ -98,10 +98,10 @@ def test_person_connects_calibrates_moves_and_stops(operator: Operator) -> None:
     operator.give(cmd.Joints(goal))
     operator.give(cmd.Gripper(0.0))
     operator.until(lambda state: state.moving)
-    there = operator.until(lambda state: not state.moving)
-    assert there.stopped is None
-    assert np.abs(there.q - goal).max() < 0.005
-    assert abs(there.gripper) < 0.02
+    rest = operator.until(lambda state: not state.moving)
+    assert rest.stopped is None
+    assert np.abs(rest.q - goal).max() < 0.005
+    assert abs(rest.gripper) < 0.02
     operator.give(cmd.Joints(start + 0.25 * (goal - start)))
     operator.until(lambda state: state.moving and np.abs(state.q - goal).max() > 0.1)
     operator.give(cmd.Stop())

@@ -71,12 +71,12 @@ def test_circle_is_followed_within_half_an_encoder() -> None:
     setpoints, times = circle(3.0)
     segments = cut(setpoints, times)
     assert_joined(segments)
-    found = positions(segments)
+    places = positions(segments)
     # The stream begins one tick before the first setpoint, at the start.
-    plan = np.vstack([START, setpoints])[: len(found)]
+    plan = np.vstack([START, setpoints])[: len(places)]
     knots = slice(0, None, SEGMENT_TICKS)
-    assert np.abs(found[knots] - plan[knots]).max() <= 0.5
-    assert np.abs(found - plan).max() < 0.6
+    assert np.abs(places[knots] - plan[knots]).max() <= 0.5
+    assert np.abs(places - plan).max() < 0.6
     assert segments[-1].end.is_at_rest
 
 
@@ -84,9 +84,9 @@ def test_error_does_not_accumulate() -> None:
     times = ticks_from(1, 20_000 if LONG else 4_000)
     drift = np.minimum(0.013 * np.arange(1, len(times) + 1), 1e4)
     setpoints = START + drift[:, None] * np.array([1, -1, 0.5, 0.3, -0.7, 0])
-    found = positions(cut(setpoints, times))
-    plan = np.vstack([START, setpoints])[: len(found)]
-    assert np.abs(found[16:] - plan[16:]).max() < 0.6
+    places = positions(cut(setpoints, times))
+    plan = np.vstack([START, setpoints])[: len(places)]
+    assert np.abs(places[16:] - plan[16:]).max() < 0.6
 
 
 def test_setpoint_beyond_the_speed_is_reached_at_the_maximum_speed() -> None:
@@ -165,8 +165,8 @@ def test_punctual_setpoints_are_not_slowed_down() -> None:
     packets = played({})
     assert largest_acceleration(packets) < 0.4
     end = np.array([axis.target for axis in packets[-1][1].segments])
-    begun = packets[0][0] - 0.09
-    expected = HOME + DIRECTIONS * (1.0 - np.cos(begun + 0.08 * len(packets)))
+    start = packets[0][0] - 0.09
+    expected = HOME + DIRECTIONS * (1.0 - np.cos(start + 0.08 * len(packets)))
     assert np.abs(end - expected).max() <= 0.5
 
 

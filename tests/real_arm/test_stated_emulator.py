@@ -56,10 +56,10 @@ def test_lost_connection_stops_no_motion() -> None:
         with linked(server.port) as link:
             link.exchange(req.CommandMotor(1, req.MotorFlag.MOVE, 0))
         with server.lock:
-            begun = server.arm.axes[0].plant.position
+            start = server.arm.axes[0].plant.position
         time.sleep(0.5)
         with server.lock:
-            moved = abs(server.arm.axes[0].plant.position - begun)
+            moved = abs(server.arm.axes[0].plant.position - start)
             assert server.arm.axes[0].plant.speed != 0.0
         assert moved > 100.0
     finally:
@@ -73,10 +73,10 @@ def test_replies_are_late_and_the_arm_moves_meanwhile() -> None:
     try:
         with linked(server.port) as link:
             link.exchange(req.EchoRequest())
-            begun = server.arm.time
+            start = server.arm.time
             link.exchange(req.EchoRequest())
             link.exchange(req.EchoRequest())
-            assert server.arm.time - begun > 0.07
+            assert server.arm.time - start > 0.07
             assert sorted(link.round_trips)[-2] > 0.03
     finally:
         server.stop()

@@ -58,10 +58,10 @@ def test_stop_of_the_emulated_arm_takes_the_stated_time(
 
 def test_positions_come_four_times_a_second_with_replies_of_40_milliseconds() -> None:
     _, _, times = moving(0.04, 5.0)
-    found = sorted({t for t in times if t > 1.0})
-    rate = (len(found) - 1) / (found[-1] - found[0])
+    moments = sorted({t for t in times if t > 1.0})
+    rate = (len(moments) - 1) / (moments[-1] - moments[0])
     assert 3.5 < rate < 8.0
-    assert max(b - a for a, b in itertools.pairwise(found)) < 0.35
+    assert max(b - a for a, b in itertools.pairwise(moments)) < 0.35
 
 
 @settings(max_examples=300 if LONG else 40)
@@ -96,9 +96,9 @@ def rows_of_plant() -> dict[str, tuple[str, str]]:
 
 
 def number(text: str) -> float:
-    found = re.match(r"[-\d.]+", text)
-    assert found, text
-    return float(found[0])
+    number_match = re.match(r"[-\d.]+", text)
+    assert number_match, text
+    return float(number_match[0])
 
 
 @pytest.mark.parametrize(

@@ -36,9 +36,9 @@ def test_rebuild_gives_the_committed_bytes(
     if sys.platform != "linux" or platform.machine() != "x86_64":
         pytest.skip("the committed bytes are those of Linux on x86-64")
     list(make(tmp_path))
-    made = {path.name for path in tmp_path.iterdir()}
-    assert made == {path.name for path in folder.iterdir()}
-    for name in made:
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {path.name for path in folder.iterdir()}
+    for name in names:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), (
             f"{folder / name} is not what the code makes: run python -m robot_description.cad"
         )

@@ -52,8 +52,8 @@ def fingers(angle: float) -> tuple[Manifold, Manifold]:
     )
 
 
-def corners(made: Manifold) -> NDArray[np.float64]:
-    return np.asarray(made.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
+def corners(solid: Manifold) -> NDArray[np.float64]:
+    return np.asarray(solid.to_mesh64().vert_properties, dtype=np.float64)[:, :3]
 
 
 def test_fingers_are_clear_of_each_other_and_of_the_body() -> None:
@@ -96,13 +96,13 @@ def test_gripper_sits_on_the_roll_links_flange() -> None:
 def test_pads_hold_the_cup_on_four_lines() -> None:
     cup = json.loads(PROPS_PATH.read_text("utf-8"))["cup"]
     angle, radius = cup["held_at_finger_angle"], 1e3 * cup["outer_radius"]
-    at = (1e3 * cup["held_before_pivot"], 0.0, 0.0)
-    body = rod(2 * radius, -45.0, 45.0, at=at, segments=720)
+    centre = (1e3 * cup["held_before_pivot"], 0.0, 0.0)
+    body = rod(2 * radius, -45.0, 45.0, at=centre, segments=720)
     assert limits()[0] < angle < limits()[1] - 0.1
     for finger in fingers(angle):
         assert (finger ^ body).volume() < 1.0
         assert finger.min_gap(body, 1.0) < 0.02
-        pressed = finger ^ rod(2 * radius + 0.3, -45.0, 45.0, at=at, segments=720)
+        pressed = finger ^ rod(2 * radius + 0.3, -45.0, 45.0, at=centre, segments=720)
         assert len(pressed.decompose()) == 2
     for finger in fingers(limits()[1]):
         assert finger.min_gap(body, 30.0) > 8.0, "the open fingers do not pass the cup"

@@ -173,17 +173,17 @@ def test_every_hull_stays_near_its_link(link: str) -> None:
     for number, hull in enumerate(hulls(link)):
         excess = hull - reference
         fraction = excess.volume() / (hull.volume() - excess.volume())
-        far, at = standoff(excess, surface)
+        far, place = standoff(excess, surface)
         assert fraction <= EXCESS or far <= STANDOFF, (
-            f"{link}_{number} stands {far:.1f} mm off at {at} and is {fraction:.0%} too big: "
+            f"{link}_{number} stands {far:.1f} mm off at {place} and is {fraction:.0%} too big: "
             "give the link another plane in robot_description/cad/hulls.py"
         )
 
 
 def test_pieces_are_in_order_and_complete() -> None:
     bar = block((0.0, 9.0), (0.0, 2.0), (0.0, 1.0))
-    found = pieces(bar, Cut("x", (1.0, 3.0), {1: Cut("y", (0.5,))}))
-    assert [piece.volume() for piece in found] == pytest.approx([2.0, 1.0, 3.0, 12.0])
+    parts = pieces(bar, Cut("x", (1.0, 3.0), {1: Cut("y", (0.5,))}))
+    assert [piece.volume() for piece in parts] == pytest.approx([2.0, 1.0, 3.0, 12.0])
     assert len(pieces(bar, Cut("x", (-1.0, 10.0)))) == 1
 
 

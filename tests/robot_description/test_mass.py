@@ -40,11 +40,11 @@ def test_moments_agree_with_an_independent_integral() -> None:
     moved = skew.translate((40.0, -25.0, 60.0))
     other = as_trimesh(moved)
     other.density = 2700.0
-    found = moments(moved, 2700.0)
-    assert found.mass == pytest.approx(other.mass, rel=1e-9)
-    centre = found.first / found.mass
+    integral = moments(moved, 2700.0)
+    assert integral.mass == pytest.approx(other.mass, rel=1e-9)
+    centre = integral.first / integral.mass
     np.testing.assert_allclose(centre, other.center_mass, atol=1e-9)
-    second = found.second - found.mass * np.outer(centre, centre)
+    second = integral.second - integral.mass * np.outer(centre, centre)
     inertia = np.trace(second) * np.eye(3) - second
     np.testing.assert_allclose(inertia, other.moment_inertia, rtol=1e-6, atol=1e-12)
 
@@ -62,27 +62,27 @@ def test_every_material_has_a_density() -> None:
 
 
 def test_castings_are_hollow_with_plausible_walls() -> None:
-    for link, found in inertials().items():
-        assert 0.25 < found.fill <= 1.0, f"{link}: {found.fill:.2f} of the solid's weight"
+    for link, inertia in inertials().items():
+        assert 0.25 < inertia.fill <= 1.0, f"{link}: {inertia.fill:.2f} of the solid's weight"
 
 
 def test_centres_of_mass_lie_within_the_links_and_inertias_are_of_bodies() -> None:
     for part in parts():
-        found = inertials()[part.link]
+        inertia = inertials()[part.link]
         boxes = np.array([solid.bounding_box() for _, solid in part.bodies()]) * 1e-3
         low, high = boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)
-        assert (low < found.centre).all()
-        assert (found.centre < high).all()
-        smallest, middle, largest = np.linalg.eigvalsh(found.inertia)
+        assert (low < inertia.centre).all()
+        assert (inertia.centre < high).all()
+        smallest, middle, largest = np.linalg.eigvalsh(inertia.inertia)
         assert smallest > 0.0
         assert smallest + middle > largest
         reach = math.sqrt(float(((high - low) ** 2).sum()))
-        assert largest < found.mass * reach * reach / 4.0
+        assert largest < inertia.mass * reach * reach / 4.0
 
 
 def test_fingers_are_mirror_images() -> None:
-    found = inertials()
-    right, left = found["finger_right_link"], found["finger_left_link"]
+    by_link = inertials()
+    right, left = by_link["finger_right_link"], by_link["finger_left_link"]
     turn = np.diag([1.0, -1.0, -1.0])
     np.testing.assert_allclose(left.centre, turn @ right.centre, atol=1e-9)
     np.testing.assert_allclose(left.inertia, turn @ right.inertia @ turn, atol=1e-12)
@@ -96,6 +96,6 @@ def test_the_urdf_holds_what_the_solids_give() -> None:
 
 
 def test_a_link_without_inertial_is_named() -> None:
-    found = {"elbow": inertials()["pan_link"]}
+    by_link = {"elbow": inertials()["pan_link"]}
     with pytest.raises(ValueError, match="no <inertial> in link elbow"):
-        with_inertials('<link name="elbow"></link><link name="b"><inertial/></link>', found)
+        with_inertials('<link name="elbow"></link><link name="b"><inertial/></link>', by_link)

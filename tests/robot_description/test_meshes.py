@@ -75,8 +75,8 @@ def test_outer_size(link: str) -> None:
     bare = [m.vertices for name, m in primitives(link).items() if name != "black rubber"]
     for axis in range(3):
         points = everything if axis == 1 or "finger" in link else np.vstack(bare) * 1e3
-        found = points[:, axis].min(), points[:, axis].max()
-        np.testing.assert_allclose(found, EXTENT[link][axis], atol=TOLERANCE)
+        span = points[:, axis].min(), points[:, axis].max()
+        np.testing.assert_allclose(span, EXTENT[link][axis], atol=TOLERANCE)
 
 
 @pytest.mark.parametrize("link", EXTENT)
@@ -84,9 +84,9 @@ def test_every_material_is_a_closed_solid(link: str) -> None:
     for name, mesh in primitives(link).items():
         faces = welded(mesh)
         edges = np.vstack((faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]))
-        there = np.unique(edges, axis=0, return_counts=True)
+        counted = np.unique(edges, axis=0, return_counts=True)
         back = np.unique(edges[:, ::-1], axis=0, return_counts=True)
-        for one, other in zip(there, back, strict=True):
+        for one, other in zip(counted, back, strict=True):
             np.testing.assert_array_equal(one, other, err_msg=f"{link}: {name} is open")
         assert mesh.volume > 0.0, f"{link}: {name} is inside out"
 

@@ -24,8 +24,8 @@ PAYLOAD = 0.4  # kg
 
 @functools.cache
 def data() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(PROPS_PATH.read_text("utf-8"))
-    return found
+    props: dict[str, Any] = json.loads(PROPS_PATH.read_text("utf-8"))
+    return props
 
 
 def prop(name: str) -> trimesh.Scene:

@@ -36,10 +36,10 @@ def trajectory(*points: tuple[float, list[float]], **more: Any) -> dict[str, Any
 
 def twist(frame: str = "", **parts: float) -> dict[str, Any]:
     """Return a TwistStamped; ``vx`` is linear.x, ``wy`` is angular.y, and so on."""
-    given: dict[str, dict[str, float]] = {"linear": {}, "angular": {}}
+    twist: dict[str, dict[str, float]] = {"linear": {}, "angular": {}}
     for name, value in parts.items():
-        given["linear" if name[0] == "v" else "angular"][name[1]] = value
-    return {"header": {"frame_id": frame}, "twist": given}
+        twist["linear" if name[0] == "v" else "angular"][name[1]] = value
+    return {"header": {"frame_id": frame}, "twist": twist}
 
 
 class RosClient:
@@ -74,13 +74,13 @@ class RosClient:
         await self.socket.send(json.dumps({"op": op, **fields}))
 
     async def until(
-        self, found: Callable[[dict[str, Any]], bool], seconds: float = 10.0
+        self, matches: Callable[[dict[str, Any]], bool], seconds: float = 10.0
     ) -> dict[str, Any]:
         """Wait for an operation, remove it, and return it."""
         async with asyncio.timeout(seconds):
             while True:
                 for op in self.heard:
-                    if found(op):
+                    if matches(op):
                         self.heard.remove(op)
                         return op
                 await asyncio.sleep(0.005)
@@ -88,14 +88,14 @@ class RosClient:
     async def refusal(self, op_id: Any = None) -> str:
         """Return the text of the next status for ``op_id``, or of any if it is None."""
         op = await self.until(
-            lambda each: each["op"] == "status" and (op_id is None or each.get("id") == op_id)
+            lambda op: op["op"] == "status" and (op_id is None or op.get("id") == op_id)
         )
         assert op["level"] == "error", op
         return str(op["msg"])
 
     async def answer_to(self, op_id: str) -> dict[str, Any]:
         """Return the next operation with this id."""
-        return await self.until(lambda each: each.get("id") == op_id)
+        return await self.until(lambda op: op.get("id") == op_id)
 
     async def message(self, topic: str, seconds: float = 10.0) -> dict[str, Any]:
         """Return a message of ``topic`` that is newer than this call."""
@@ -126,7 +126,7 @@ class RosClient:
         number = f"call {next(self._ids)}"
         await self.say("call_service", id=number, service=service, args={**(args or {}), **more})
         return await self.until(
-            lambda each: each["op"] == "service_response" and each.get("id") == number
+            lambda op: op["op"] == "service_response" and op.get("id") == number
         )
 
     async def goal(self, action: str, args: dict[str, Any], **more: Any) -> str:
@@ -138,7 +138,7 @@ class RosClient:
 
     async def result(self, number: str, seconds: float = 30.0) -> dict[str, Any]:
         return await self.until(
-            lambda each: each["op"] == "action_result" and each.get("id") == number, seconds
+            lambda op: op["op"] == "action_result" and op.get("id") == number, seconds
         )
 
     async def clear(self) -> None:

@@ -54,8 +54,8 @@ class Arm:
         results: list[Any] = []
         ended = threading.Event()
 
-        def result(found: Any) -> None:
-            results.append(found)
+        def result(content: Any) -> None:
+            results.append(content)
             ended.set()
 
         def progress(_found: Any) -> None:
@@ -65,10 +65,10 @@ class Arm:
         return number, results, ended
 
     def call(self, service: str) -> dict[str, Any]:
-        found = roslibpy.Service(self.ros, service, "std_srvs/srv/Trigger").call(
+        answer = roslibpy.Service(self.ros, service, "std_srvs/srv/Trigger").call(
             roslibpy.ServiceRequest(), timeout=10
         )
-        return dict(found)
+        return dict(answer)
 
 
 def wait(true: Callable[[], Any], seconds: float = 15.0) -> None:
@@ -85,20 +85,20 @@ def main(url: str) -> None:
     arm = Arm(url)
     arm.watch("/joint_states", "sensor_msgs/msg/JointState")
     arm.watch("/robot_description", "std_msgs/msg/String")
-    seen: dict[str, Any] = {
+    report: dict[str, Any] = {
         "topics": arm.ros.get_topics(),
         "description": arm.newest["/robot_description"]["data"][:60],
     }
     _, results, ended = arm.send(points((1, READY), (3, AWAY)))
     assert ended.wait(20), "no result"
-    seen["followed"] = results[0]["status"].value, results[0]["values"]["error_code"], arm.q
-    seen["feedback"] = arm.feedback
+    report["followed"] = results[0]["status"].value, results[0]["values"]["error_code"], arm.q
+    report["feedback"] = arm.feedback
 
     number, results, ended = arm.send(points((6, READY)))
     wait(lambda: abs(arm.q[0] - AWAY[0]) > 0.02)
     arm.follow.cancel_goal(number)
     assert ended.wait(20), "no result of the cancelled goal"
-    seen["cancelled"] = results[0]["status"].value, arm.q[0]
+    report["cancelled"] = results[0]["status"].value, arm.q[0]
 
     before = arm.q
     topic = roslibpy.Topic(
@@ -112,15 +112,15 @@ def main(url: str) -> None:
         topic.publish(roslibpy.Message({"header": header, "twist": twist}))
         time.sleep(0.03)
     time.sleep(1.5)
-    seen["jogged"] = max(abs(a - b) for a, b in zip(arm.q, before, strict=True))
+    report["jogged"] = max(abs(a - b) for a, b in zip(arm.q, before, strict=True))
 
     _, results, ended = arm.send(points((6, READY)))
     rest = arm.q
     wait(lambda: abs(arm.q[0] - rest[0]) > 0.02)
-    seen["stop"] = arm.call("/stop")
+    report["stop"] = arm.call("/stop")
     assert ended.wait(20), "no result of the stopped goal"
-    seen["stopped"] = results[0]["status"].value, results[0]["values"]["error_string"]
-    print(json.dumps(seen))
+    report["stopped"] = results[0]["status"].value, results[0]["values"]["error_string"]
+    print(json.dumps(report))
     arm.ros.close()
     arm.ros.terminate()
 

@@ -27,7 +27,7 @@ async def test_link_is_required_and_its_role_decides(tmp_path: Path) -> None:
                 assert "A token is required" in await client.refusal()
                 await client.socket.wait_closed()
                 assert client.socket.close_code == 4401
-        viewer, operator = (site.link(each.value, each) for each in (Role.VIEWER, Role.OPERATOR))
+        viewer, operator = (site.link(role.value, role) for role in (Role.VIEWER, Role.OPERATOR))
         headers = {"Authorization": f"Bearer {operator}"}
         async with (
             ros(url, f"?token={viewer}&name=Onlooker") as onlooker,

@@ -40,10 +40,10 @@ async def offers(client: ClientConnection) -> tuple[Offers, Offers, list[str]]:
     services: Offers = {}
     capabilities: list[str] = []
     while len(topics) < 3 or not services:
-        told = json.loads(await client.recv())
-        capabilities += told.get("capabilities", [])
-        topics |= {each["topic"]: each for each in told.get("channels", [])}
-        services |= {each["name"]: each for each in told.get("services", [])}
+        message = json.loads(await client.recv())
+        capabilities += message.get("capabilities", [])
+        topics |= {channel["topic"]: channel for channel in message.get("channels", [])}
+        services |= {service["name"]: service for service in message.get("services", [])}
     return topics, services, capabilities
 
 
@@ -75,7 +75,7 @@ async def test_foxglove_sees_and_stops_the_arm(monkeypatch: pytest.MonkeyPatch) 
             stop = services["/stop"]
             assert topics["/tf"]["schemaName"] == "foxglove.FrameTransforms"
             assert topics["/joint_states"]["schemaName"] == "foxglove.JointStates"
-            wanted = {k: topics[each]["id"] for k, each in enumerate(topics)}
+            wanted = {k: topics[topic]["id"] for k, topic in enumerate(topics)}
             listed = [{"id": k, "channelId": channel} for k, channel in wanted.items()]
             await client.send(json.dumps({"op": "subscribe", "subscriptions": listed}))
             counts = dict.fromkeys(wanted, 0)

@@ -227,7 +227,7 @@ async def test_client_of_many_invalid_messages_is_disconnected_with_the_reason(
     async with ros(server.url, watches=False) as client:
         for _ in range(40):
             await client.say("teleport")
-        await client.until(lambda each: "Too many invalid" in each.get("msg", ""))
+        await client.until(lambda op: "Too many invalid" in op.get("msg", ""))
         await client.socket.wait_closed()
         assert client.socket.close_code == 1008
 

@@ -28,19 +28,19 @@ def test_roslibpy_drives_the_arm(server: AppServer, transport: str) -> None:
         seconds=90.0,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    seen = json.loads(done.stdout.strip().splitlines()[-1])
-    assert {"/joint_states", "/tf", "/robot_description"} <= set(seen["topics"])
-    assert seen["description"].startswith("<?xml")
-    status, code, q = seen["followed"]
+    report = json.loads(done.stdout.strip().splitlines()[-1])
+    assert {"/joint_states", "/tf", "/robot_description"} <= set(report["topics"])
+    assert report["description"].startswith("<?xml")
+    status, code, q = report["followed"]
     assert (status, code) == (4, 0)
     assert q == pytest.approx([0.4, -1.1, 1.4, 0.2, 0.3], abs=1e-3)
-    assert seen["feedback"] >= 10
-    status, pan = seen["cancelled"]
+    assert report["feedback"] >= 10
+    status, pan = report["cancelled"]
     assert status == 5
     assert 0.0 < pan < 0.4
-    assert seen["jogged"] > 0.01
-    assert seen["stop"] == {"success": True, "message": "requested"}
-    status, why = seen["stopped"]
+    assert report["jogged"] > 0.01
+    assert report["stop"] == {"success": True, "message": "requested"}
+    status, why = report["stopped"]
     assert status == 5
     assert "roslibpy pressed STOP" in why
     asyncio.run(cleared(server.url))

@@ -26,26 +26,26 @@ def pose(message: dict[str, Any]) -> np.ndarray[Any, Any]:
     """Return a geometry_msgs/Transform as a matrix (4, 4)."""
     T = np.eye(4)
     turned = message["rotation"]
-    T[:3, :3] = so3.from_quaternion([turned[each] for each in "wxyz"])
-    T[:3, 3] = [message["translation"][each] for each in "xyz"]
+    T[:3, :3] = so3.from_quaternion([turned[axis] for axis in "wxyz"])
+    T[:3, 3] = [message["translation"][axis] for axis in "xyz"]
     return T
 
 
 async def test_topics_describe_the_arm_as_it_is(client: RosClient, robot: Robot) -> None:
     at_home = await client.home()
-    found = {}
+    latest = {}
     for topic in ("/joint_states", "/tf", "/tf_static", "/robot_description"):
         await client.say("subscribe", topic=topic)
-        found[topic] = await client.message(topic)
-    joints = found["/joint_states"]
+        latest[topic] = await client.message(topic)
+    joints = latest["/joint_states"]
     assert joints["name"][:5] == JOINTS
     assert joints["position"][:5] == pytest.approx(at_home["q"])
     assert abs(joints["header"]["stamp"]["sec"] - time.time()) < 5.0
     # Frames on the way from the root to the tool give the pose that the API reports.
     edges = {
-        each["child_frame_id"]: (each["header"]["frame_id"], pose(each["transform"]))
+        transform["child_frame_id"]: (transform["header"]["frame_id"], pose(transform["transform"]))
         for topic in ("/tf", "/tf_static")
-        for each in found[topic]["transforms"]
+        for transform in latest[topic]["transforms"]
     }
     T, frame = np.eye(4), at_home["tool"]
     while frame != robot.links[0].name:
@@ -53,7 +53,7 @@ async def test_topics_describe_the_arm_as_it_is(client: RosClient, robot: Robot)
         T = step @ T
     T_base_shoulder = robot.require_arm().T_base_shoulder
     assert T_base_shoulder @ np.array(at_home["T"]) == pytest.approx(T, abs=1e-9)
-    assert f'<robot name="{robot.name}">' in found["/robot_description"]["data"]
+    assert f'<robot name="{robot.name}">' in latest["/robot_description"]["data"]
 
 
 async def test_topics_services_and_actions_are_listed(server: AppServer) -> None:

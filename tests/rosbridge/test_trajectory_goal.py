@@ -66,9 +66,9 @@ def test_start_time_is_now_or_refused() -> None:
     at(0)
     at(1000)
     for sec, code in ((990, ErrorCode.OLD_HEADER_TIMESTAMP), (1010, ErrorCode.INVALID_GOAL)):
-        with pytest.raises(GoalError) as found:
+        with pytest.raises(GoalError) as refused:
             at(sec)
-        assert found.value.code is code
+        assert refused.value.code is code
 
 
 @pytest.mark.parametrize(
