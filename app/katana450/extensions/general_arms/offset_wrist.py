@@ -58,9 +58,9 @@ DEGREE: Final = 8
 SAMPLES: Final = 32
 """Number of its samples: more than 2 DEGREE + 1 average the rounding."""
 
-NEAR_CIRCLE: Final = 0.3
-"""[1] Logarithm of the size of a root up to which its angle is moved by it: of a pair of roots that
-rounding has taken off the circle, both sides are tried."""
+NEAR_CIRCLE: Final = 0.05
+"""[1] Logarithm of the size of a root up to which rounding may have taken it off the circle. Both
+sides of such a pair of roots are tried."""
 
 SYMMETRIC: Final = 1e-9
 """[1] Relative difference of the equations of both signs of alpha1 that is rounding."""
@@ -69,11 +69,14 @@ CANDIDATE: Final = 1e-2
 """[1] Miss of the cosine of the wrist's angle up to which a posture is refined, away from axis 1.
 Near it alpha1 magnifies the error of a root."""
 
-CLUSTER: Final = 0.03
-"""[rad] Distance of two roots that are known poorly."""
+CLOSE: Final = 2e-3
+"""[1] Distance of W from axis 1, relative to the reach, below which it passes closely."""
 
-AROUND: Final = (-2.0, -1.5, -1.0, -0.5, 0.25, 0.5, 0.75, 1.5, 2.0, 2.5, 3.0)
-"""[1] Places at which postures near two close roots are searched, 0 and 1 being the roots."""
+AHEAD: Final = 0.05
+"""[rad] Angle from there to a root up to which this counts."""
+
+TURNS: Final = np.linspace(-1.5, 1.5, 61)
+"""[rad] Turns of alpha1 from there at which postures are then searched."""
 
 NEAR: Final = 0.3
 """[rad], [m] Error of the pose up to which a posture is refined."""
@@ -244,7 +247,7 @@ class OffsetWrist(GeneralKinematics):
         rows = links.T_1_S @ T @ links.T_tool_n
         R, place = rows[:, :3, :3], rows[:, :3, 3]
         with np.errstate(all="ignore"):
-            origin, theta = _with_clusters(self._roots(R, place))
+            origin, theta = self._tried(R, place)
             R = R[origin]
             plane = self._plane(R, place[origin], np.cos(theta), np.sin(theta), _real_root)
             a, b, c = plane.position
@@ -295,6 +298,31 @@ class OffsetWrist(GeneralKinematics):
         wrist = (first, second, theta) if self.locked == 5 else (theta, first, second)
         return np.stack((one, two, three, *wrist), axis=1)
 
+    def _tried(self, R: FloatArray, place: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return poses (M,) and locked angles (M, 1) [rad] at which postures are searched.
+
+        They are the `_roots`. Where these lead W past axis 1 closely, they are known poorly, and
+        alpha1 turns by half a turn at once: then angles are added over which it is spread.
+        """
+        roots = self._roots(R, place)
+        pose, root = np.nonzero(np.isfinite(roots))
+        theta = roots[pose, root]
+        if self.locked == 3:
+            return pose, theta[:, None]
+        cos, sin = np.cos(theta)[:, None], np.sin(theta)[:, None]
+        x, y, _ = _mapped(R[pose], _around(cos, -sin, self._centre_in_tool), place[pose])
+        wx, wy, _ = self._centre_in_tool
+        dx, dy, _ = _mapped(R[pose], _around(-sin, -cos, (wx, wy, 0.0)))
+        square = dx * dx + dy * dy
+        passing, offset = np.abs(x * dy - y * dx) / square, -(x * dx + y * dy) / square
+        is_close = (passing * np.sqrt(square) < CLOSE * self.links.reach) & (np.abs(offset) < AHEAD)
+        passes = np.flatnonzero(is_close)
+        _, first = np.unique(pose[passes], return_index=True)
+        passes = passes[first]
+        spread = (theta[:, None] + offset)[passes] + passing[passes] * np.tan(TURNS)
+        origin = np.concatenate((pose, np.repeat(pose[passes], len(TURNS))))
+        return origin, np.concatenate((theta, spread.ravel()))[:, None]
+
     def _roots(self, R: FloatArray, place: FloatArray) -> FloatArray:
         """Return the locked angles (N, 16) [rad] that may give postures.
 
@@ -304,21 +332,21 @@ class OffsetWrist(GeneralKinematics):
         plane = self._plane(R, place, np.cos(angles), np.sin(angles), _complex_root)
         (a, b, c), (a2, b2, c2) = plane.position, plane.wrist
         squares = (c * b2 - c2 * b) ** 2 + (a * c2 - a2 * c) ** 2 - (a * b2 - a2 * b) ** 2
-        square = np.broadcast_to(plane.square, squares.shape[1:])
-        front, back = squares / square
+        # Samples with W near axis 1 have large rounding: every other one is used.
+        square = np.broadcast_to(plane.square, squares.shape[1:]).reshape(-1, SAMPLES, 2)
+        half = square.min(axis=1).argmax(axis=1)
+        pairs = (squares / plane.square).reshape(2, -1, SAMPLES, 2)
+        front, back = np.take_along_axis(pairs, half[None, :, None, None], axis=3)[..., 0]
         if np.abs(front - back).max() <= SYMMETRIC * np.abs(front).max():
             # Each root has the posture in front of axis 1 and the same one turned about it.
             back = np.ones_like(front)
-        # Samples with W near axis 1 have large rounding: every other one is used.
-        halves = (front * back).real.reshape(-1, SAMPLES, 2)
-        half = square.reshape(-1, SAMPLES, 2).min(axis=1).argmax(axis=1)
-        values = np.take_along_axis(halves, half[:, None, None], axis=2)[:, :, 0]
+        values = (front * back).real
         orders = np.arange(-DEGREE, DEGREE + 1)
         turn = np.exp(-1j * (0.5 * math.tau / SAMPLES) * half[:, None] * orders) / SAMPLES
         coefficients = np.fft.fft(values)[:, orders] * turn
         sizes = np.abs(coefficients[:, DEGREE:])
         counts = np.where(sizes > NEGLIGIBLE * sizes.max(axis=1, keepdims=True), orders[DEGREE:], 0)
-        theta = np.zeros((len(values), 2 * DEGREE))
+        theta = np.full((len(values), 2 * DEGREE), math.nan)
         degrees = counts.max(axis=1)
         for degree in np.unique(degrees[degrees > 0]).tolist():
             rows = degrees == degree
@@ -340,11 +368,10 @@ class OffsetWrist(GeneralKinematics):
         """
         links, flip = self.links, self._flip
         (s1, c1), _, (s3, c3), (s4, c4), (s5, c5) = self._twists
-        d5 = links.d[4]
         if self.locked == 5:
             cx, cy, cz = wrist_centre(links)
             # From axis 6, W and axis 5.
-            x, y, z = _mapped(R, _around(cos, -sin, (-links.a[4], -s5 * d5, -c5 * d5)), place)
+            x, y, z = _mapped(R, _around(cos, -sin, self._centre_in_tool), place)
             n1, n2, n3 = _mapped(R, _around(cos, -sin, (0.0, s5, c5)))
             m1, m2, m3, cosine = 0.0, -s3, c3, c4
         else:
@@ -377,6 +404,12 @@ class OffsetWrist(GeneralKinematics):
         d5 = links.d[4]
         x, y, z = _around(cos, sin, (links.a[3], -s4 * d5, links.d[3] + c4 * d5))
         return links.a[2] + x, c3 * y - s3 * z, links.d[2] + s3 * y + c3 * z
+
+    @cached_property
+    def _centre_in_tool(self) -> tuple[float, float, float]:
+        """The place of W [m] in the last frame, before the turn of axis 6."""
+        (s5, c5), d5 = self._twists[4], self.links.d[4]
+        return -self.links.a[4], -s5 * d5, -c5 * d5
 
     @cached_property
     def _twists(self) -> tuple[tuple[float, float], ...]:
@@ -448,8 +481,8 @@ def _turned(theta: FloatArray) -> FloatArray:
 def _angles_of_zeros(coefficients: npt.NDArray[np.complex128]) -> FloatArray:
     """Return the angles (N, m) [rad] at and near the zeros of Fourier series (N, m + 1).
 
-    A series begins with its lowest order. A zero away from the unit circle comes as a pair of the
-    same angle, on both sides of which the angles are.
+    A series begins with its lowest order. A zero near the unit circle comes as a pair of the same
+    angle, on both sides of which the angles are. Other zeros have none.
     """
     count = coefficients.shape[1] - 1
     companion = np.zeros((len(coefficients), count, count), dtype=np.complex128)
@@ -457,21 +490,9 @@ def _angles_of_zeros(coefficients: npt.NDArray[np.complex128]) -> FloatArray:
     companion[:, :, -1] = -coefficients[:, :-1] / coefficients[:, -1:]
     zeros = np.linalg.eigvals(companion)
     distance = np.log(np.abs(zeros))
-    return np.angle(zeros) + np.where(np.abs(distance) < NEAR_CIRCLE, distance, 0.0)
-
-
-def _with_clusters(theta: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Return the poses (M,) and angles (M, 1) [rad] of roots (N, m) [rad], and around clusters.
-
-    Roots that are close to each other, as with W near axis 1, are known poorly.
-    """
-    theta = np.sort(np.remainder(theta, math.tau), axis=1)
-    gaps = np.diff(theta, axis=1, append=theta[:, :1] + math.tau)
-    pose = np.repeat(np.arange(len(theta)), theta.shape[1])
-    close = np.flatnonzero((gaps > DISTINCT) & (gaps < CLUSTER))
-    around = theta.ravel()[close, None] + gaps.ravel()[close, None] * np.array(AROUND)
-    angles = np.concatenate((theta.ravel(), around.ravel()))
-    return np.concatenate((pose, np.repeat(pose[close], len(AROUND)))), angles[:, None]
+    angles: FloatArray = np.angle(zeros) + distance
+    angles[np.abs(distance) > NEAR_CIRCLE] = math.nan
+    return angles
 
 
 def _distinct(q: FloatArray, error: FloatArray, pose: IntArray) -> list[int]:

@@ -1,6 +1,6 @@
 """Newton's method on many postures at once, on the chain as its file describes it.
 
-A step solves (J'J + |e|^2) dq = J'e, where e is the twist from the tool to the pose and J is the
+A step solves (J'J + |e|^2 / 100) dq = J'e, where e is the twist from the tool to the pose and J the
 Jacobian, both in the frame of the tool. With this damping the error also falls quadratically at
 postures without a regular Jacobian (Yamashita and Fukushima 2001), where two solutions meet.
 """
@@ -19,6 +19,13 @@ STEPS: Final = 12
 
 DOUBLE: Final = 1e-14
 """[rad], [m] Error that needs no further step."""
+
+GAIN: Final = 0.5
+"""[1] Ratio of the errors after and before a step above which a posture leads to none that is
+exact. Where two postures meet, a step leaves a quarter."""
+
+ERROR_WEIGHT: Final = 0.01
+"""[1] Damping of a step, relative to the squared error."""
 
 DAMPING: Final = 1e-15
 """[1] Damping of a step at an exact posture, which keeps a singular matrix solvable."""
@@ -62,16 +69,16 @@ def refined(
         transposed = J.swapaxes(1, 2)
         A = transposed @ J
         square = np.einsum("ni,ni->n", error, error)
-        A.reshape(len(A), -1)[:, :: chain.n + 1] += square[:, None] + DAMPING
+        A.reshape(len(A), -1)[:, :: chain.n + 1] += ERROR_WEIGHT * square[:, None] + DAMPING
         dq = np.linalg.solve(A, transposed @ error[:, :, None])[:, :, 0]
         candidate = best.q[active] + dq
         error, J = _looked(chain, candidate, T[active])
         size = np.abs(error).max(axis=1)
-        better = size < best.error[active]
-        active, error = active[better], error[better]
-        best.q[active], best.error[active] = candidate[better], size[better]
-        best.J[active] = J[better]
-        going = best.error[active] > DOUBLE
+        before = best.error[active]
+        better = size < before
+        best.q[active[better]], best.error[active[better]] = candidate[better], size[better]
+        best.J[active[better]] = J[better]
+        going = (size < GAIN * before) & (size > DOUBLE)
         active, error = active[going], error[going]
     return best
 
