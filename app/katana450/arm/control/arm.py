@@ -44,8 +44,8 @@ class ArmModel:
 
     @property
     def slides(self) -> tuple[bool, ...]:
-        """Flags (n,) of the prismatic joints: all False."""
-        return (False,) * self.chain.n
+        """Flags (n,) of the prismatic joints."""
+        return self.chain.slides
 
     @cached_property
     def limits(self) -> Limits:

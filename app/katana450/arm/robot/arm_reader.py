@@ -14,7 +14,7 @@ from katana450.arm.control.objects.gripper_model import NO_GRIPPER, GripperModel
 from katana450.arm.control.tool_kinematics import FiveAxisTool, ToolKinematics
 from katana450.arm.robot.link import SLOW_SLIDE, SLOW_TURN
 from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.structure import Structure, structure_of
+from katana450.arm.robot.structure import SLIDING, Structure, structure_of
 from katana450.arm.robot.urdf import Urdf, UrdfJoint, driver_of
 from katana450.errors import InputError, RobotDescriptionError
 from katana450.maths.geometry import screws, se3
@@ -22,8 +22,6 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.exact_member import exact_member
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics
-
-SLIDING = "prismatic"
 
 PERPENDICULAR = 0.5
 """Cosine between two axes up to which they point neither in the same nor in opposite directions."""
@@ -258,10 +256,14 @@ def _gripper_note(fingers: Fingers, tool: str) -> str:
 
 
 def _shoulder_frame(frames: Mapping[str, FloatArray], joints: Sequence[UrdfJoint]) -> FloatArray:
-    """Return {S}: the link of that name, else parallel to the root where axis 1 passes axis 2."""
+    """Return {S}: the link of that name, else parallel to the root where axis 1 passes axis 2.
+
+    A rail or a lift before these axes does not count.
+    """
     if SHOULDER_FRAME in frames:
         return frames[SHOULDER_FRAME]
-    one, two = (_screw(joint, frames[joint.child]) for joint in joints[:2])
+    turning = [joint for joint in joints if joint.type != SLIDING]
+    one, two = (_screw(joint, frames[joint.child]) for joint in turning[:2])
     p1, p2 = screws.point_on(one), screws.point_on(two)
     # The foot on axis 1 of the common normal of the two lines.
     normal = np.cross(one[:3], two[:3])
@@ -274,6 +276,8 @@ def _screw(joint: UrdfJoint, T_shoulder_child: FloatArray) -> FloatArray:
     """Return the joint's screw axis (6,) in {S}; the axis passes through its child's origin."""
     direction = T_shoulder_child[:3, :3] @ joint.axis
     try:
+        if joint.type == SLIDING:
+            return screws.prismatic(direction)
         return screws.revolute(direction, T_shoulder_child[:3, 3])
     except InputError as error:
         raise RobotDescriptionError(

@@ -29,6 +29,9 @@ OWN_TOOL_FRAMES = ("tcp", "grasp", "flange")
 TURNING = ("revolute", "continuous")
 """Types of joints of an arm; a continuous one gets half a turn in each direction."""
 
+SLIDING = "prismatic"
+"""Type of the joint of a rail or a lift."""
+
 ARM_JOINTS = 5
 
 MIN_ARM_DEPTH = 3
@@ -52,7 +55,7 @@ class Structure:
     """The joints that matter for an arm.
 
     Attributes:
-        axes: the turning joints that carry the tool, from the root.
+        axes: the joints that carry the tool, from the root: turning ones, after a rail or a lift.
         tools: the tool links, the default one first.
         chosen: whether the default tool is found by the names of other makers or as the outermost
             link, so that fingers are assumed.
@@ -92,7 +95,7 @@ def structure_of(
     carried = {
         link: len(tree.joints_to(link))
         for link in urdf.links
-        if tree.movable_to(link) == axes and all(_carries(j) for j in tree.joints_to(link))
+        if tree.movable_to(link) == axes and all(_carries(j, axes) for j in tree.joints_to(link))
     }
     named = [link for frame in TOOL_FRAMES for link in carried if _is_called(link, frame)]
     if tool is not None:
@@ -169,8 +172,17 @@ def _drives(joint: UrdfJoint) -> bool:
     return _moves(joint) and joint.mimic is None
 
 
-def _carries(joint: UrdfJoint) -> bool:
-    return joint.type in (*TURNING, "fixed")
+def _carries(joint: UrdfJoint, axes: Sequence[UrdfJoint]) -> bool:
+    return joint.type in (*TURNING, "fixed") or joint is axes[0]
+
+
+def _is_driven(axes: Sequence[UrdfJoint], count: int | None) -> bool:
+    """Return whether a tool is driven by ``axes``: they turn, after a rail or a lift at most.
+
+    The family, with ``count`` axes, has none.
+    """
+    slides = count is None and axes[0].type == SLIDING and axes[0].limit is not None
+    return all(joint.type in TURNING for joint in axes[int(slides) :])
 
 
 def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
@@ -206,9 +218,10 @@ def _main_axes(tree: _Tree, path: Path, count: int | None) -> list[UrdfJoint]:
             f"Its joints are {_listed(tree.joints.values()) or 'none'}."
         )
     number = "1 axis" if len(axes) == 1 else f"{len(axes)} axes"
-    if not all(joint.type in TURNING for joint in axes):
+    if not _is_driven(axes, count):
         raise RobotDescriptionError(
-            f"{path.name} has {number} ({_listed(axes)}); a tool is driven only by turning axes. "
+            f"{path.name} has {number} ({_listed(axes)}); a tool is driven only by turning axes, "
+            "after one rail or lift at most. "
             "Name a link that only these carry with --tool, or drive it joint by joint."
         )
     if count is not None and len(axes) != count:
@@ -259,10 +272,11 @@ def _axes_to(tree: _Tree, tool: str, count: int | None) -> list[UrdfJoint]:
     """Return the axes that carry ``tool``. Raises RobotDescriptionError if not ``count``."""
     axes = tree.movable_to(tool)
     _refuse_followers(axes, repr(tool))
-    for joint in axes:
+    for joint in axes if axes and not _is_driven(axes, count) else ():
         if joint.type not in TURNING:
             raise RobotDescriptionError(
-                f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}."
+                f"Joint {joint.name!r} is {joint.type}; only turning joints can carry {tool!r}, "
+                "after one rail or lift at most."
             )
     if not axes or (count is not None and len(axes) != count):
         raise RobotDescriptionError(

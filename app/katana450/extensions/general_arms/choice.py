@@ -37,7 +37,9 @@ def kinematics_of(chain: Chain) -> Kinematics:
     """
     links = links_of(chain)
     why = f"there is no closed form for {chain.n} axes"
-    if chain.n == 5:
+    if any(chain.slides):
+        why = "a joint slides"
+    elif chain.n == 5:
         try:
             arm_of(chain)
         except RobotDescriptionError as error:

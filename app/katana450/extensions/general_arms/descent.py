@@ -176,7 +176,8 @@ class Descent:
 
     def look(self, goal: tuple[float, ...], q: Angles) -> Look:
         """Return the posture `q` as seen from ``goal``."""
-        follows = self.search.chain.n < 6
+        chain = self.search.chain
+        follows = chain.n < 6 and not chain.slides[0]
         now = self.search.step(_turned_with_axis_1(goal, q[0]) if follows else goal, q)
         J = np.array(now.J)
         matrix = self.regularity.matrix(J.T)

@@ -88,9 +88,11 @@ def _candidates(chain: Chain) -> FloatArray:
     """Return postures (N, n) [rad] inside the limits."""
     room = ROOM * (chain.upper - chain.lower)
     lower, upper = (chain.lower + room).tolist(), (chain.upper - room).tolist()
-    still = {0} if chain.n < 6 else {0, chain.n - 1}
+    # A rail or a lift before the arm stands still too.
+    first = sum(chain.slides)
+    still = {*range(first + 1)} if chain.n < 6 + first else {*range(first + 1), chain.n - 1}
     # The third of seven axes is the swivel: the arm stands in one plane without it.
-    still |= set(range(2, chain.n - 4))
+    still |= set(range(first + 2, chain.n - 4))
     choices = []
     for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
         inside = [angle for angle in ANGLES if low <= angle <= high]
@@ -357,7 +359,8 @@ class DrivenTool(ToolKinematics):
         lengths = [
             sum(map(math.hypot, a[k:], [0.0, *d[k + 1 : len(a)]])) + tool for k in range(links.n)
         ]
-        return np.array(lengths)
+        # A joint that slides moves the tool as fast as itself.
+        return np.where(self.chain.slides, 1.0, lengths)
 
     def ready(self, posture: Sequence[float], T_base_shoulder: FloatArray) -> FloatArray:  # noqa: ARG002
         """Return `ready_posture`."""
@@ -382,7 +385,7 @@ def solved_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     described wrongly.
     """
     structure = _structure(urdf, path, tool)
-    return None if structure is None else _arm(urdf, structure)
+    return None if structure is None else _arm(urdf, path, structure)
 
 
 def driven_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
@@ -390,7 +393,7 @@ def driven_arm(urdf: Urdf, path: Path, tool: str | None) -> OtherArm | None:
     structure = _structure(urdf, path, tool)
     if structure is None or (tool is None and any(j.mimic is None for j in structure.others)):
         return None
-    return _arm(urdf, structure)
+    return _arm(urdf, path, structure)
 
 
 def _structure(urdf: Urdf, path: Path, tool: str | None) -> Structure | None:
@@ -401,9 +404,18 @@ def _structure(urdf: Urdf, path: Path, tool: str | None) -> Structure | None:
     return structure if len(structure.axes) >= LEAST_AXES else None
 
 
-def _arm(urdf: Urdf, structure: Structure) -> OtherArm:
+def _arm(urdf: Urdf, path: Path, structure: Structure) -> OtherArm:
     described, T_base_shoulder = described_chain(urdf.frames(), structure)
     chain, notes = exact_arm(described)
+    if any(chain.slides):
+        tool = DrivenTool(chain)
+        q = tool.ready((), T_base_shoulder)
+        if tool.equations(q).least(q) < WALL:
+            raise RobotDescriptionError(
+                f"The tool in {path.name} is not driven: joint {chain.names[0]!r} slides in a "
+                "direction in which the turning axes move the tool already, and a freedom is "
+                "missing. Drive the robot joint by joint."
+            )
     kinematics = kinematics_of(chain)
     notes = (*notes, f"The kinematics are {kinematics.method}.", *kinematics.self_check)
     return OtherArm(structure, T_base_shoulder, chain, DrivenTool, notes)

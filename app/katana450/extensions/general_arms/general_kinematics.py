@@ -87,7 +87,7 @@ def in_order_for_people(branches: tuple[str, ...]) -> tuple[str, ...]:
 
 def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:
     """Return `q` (n,) [rad], each angle in the turn nearest to ``near`` inside its limits."""
-    q = q + math.tau * np.round((near - q) / math.tau)
+    q = np.where(chain.slides, q, q + math.tau * np.round((near - q) / math.tau))
     slack = tolerances.LIMIT_SLACK
     for turn in (math.tau, -math.tau):
         outside = (q < chain.lower - slack) | (q > chain.upper + slack)

@@ -56,6 +56,8 @@ class DHLinks:
         T_S_1, T_n_tool: poses (4, 4) of the first frame in {S} and of the tool in the last.
         rounding: the largest deviation [rad], [m] of a twist or length that was replaced by a
             quarter turn or 0.
+        slides: (n,) whether each joint slides: it has a fixed angle, and a length along its axis.
+            Empty if none does.
     """
 
     a: Numbers
@@ -66,6 +68,7 @@ class DHLinks:
     T_S_1: FloatArray
     T_n_tool: FloatArray
     rounding: tuple[float, float] = (0.0, 0.0)
+    slides: tuple[bool, ...] = ()
 
     @property
     def n(self) -> int:
@@ -139,7 +142,7 @@ def links_of(chain: Chain, *, exact: bool = True, gap: float = tolerances.FAMILY
     if not exact:
         angle, gap, almost = DOUBLE, tolerances.ROUNDING, ALMOST_PARALLEL
     n = chain.n
-    z = [chain.S[:3, i] for i in range(n)]
+    z = list(chain.axes.T)
     points = [screws.point_on(chain.S[:, i]) for i in range(n)]
     a, d, t, b, shift = [], [], [], [], [0.0]
     first = T = _start(z[0], points[0])
@@ -177,6 +180,7 @@ def links_of(chain: Chain, *, exact: bool = True, gap: float = tolerances.FAMILY
         shift=tuple(shift),
         T_S_1=frozen(first),
         T_n_tool=frozen(np.eye(4)),
+        slides=chain.slides if any(chain.slides) else (),
         rounding=(off_angle, off_length),
     )
     T_tool = se3.inverse(_home(links)) @ chain.M

@@ -1,4 +1,4 @@
-"""Numerical inverse kinematics for every chain of turning joints, within its limits.
+"""Numerical inverse kinematics for every chain of joints that turn or slide, within its limits.
 
 A step minimises |J dq - e|^2 + mu |dq|^2, where e is the twist from the tool to the target with its
 translation divided by the length of the arm: a damped Gauss-Newton step. The damping mu falls with
@@ -49,6 +49,7 @@ def tool_and_jacobian(
     n = links.n
     steps = [
         (
+            bool(links.slides) and links.slides[i],
             links.shift[i],
             *(
                 (links.a[i], links.d[i], *sine_and_cosine(links.t[i]), links.b[i])
@@ -61,13 +62,17 @@ def tool_and_jacobian(
     tool = links.T_n_tool
     (t11, t12, t13, tx), (t21, t22, t23, ty), (t31, t32, t33, tz) = tool[:3].tolist()
     cos, sin = math.cos, math.sin
+    sliding = [k for k, slides in enumerate(links.slides) if slides]
 
     def state(q: Sequence[float]) -> Motion:
         xx, xy, xz, yx, yy, yz, zx, zy, zz = 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0
         px = py = pz = 0.0
         axes = []
-        for theta, (shift, a, d, st, ct, tilt) in zip(q, steps, strict=True):
+        for theta, (slides, shift, a, d, st, ct, tilt) in zip(q, steps, strict=True):
             axes.append((zx, zy, zz, px, py, pz))
+            if slides:
+                px, py, pz = px + theta * zx, py + theta * zy, pz + theta * zz
+                theta = 0.0  # noqa: PLW2901
             c, s = cos(theta + shift), sin(theta + shift)
             xx, yx = c * xx + s * yx, c * yx - s * xx
             xy, yy = c * xy + s * yy, c * yy - s * xy
@@ -105,6 +110,8 @@ def tool_and_jacobian(
         for ax, ay, az, ox, oy, oz in axes:
             rx, ry, rz = px - ox, py - oy, pz - oz
             moved.append((ax, ay, az, ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx))
+        for k in sliding:
+            moved[k] = (0.0, 0.0, 0.0, *axes[k][:3])
         return pose, moved
 
     return state
@@ -301,7 +308,10 @@ class Numerical(GeneralKinematics):
     def _limits(self) -> tuple[list[float], list[float]]:
         """The limits [rad] that a search keeps: none for a joint that can take every direction."""
         ends = list(zip(self.chain.lower.tolist(), self.chain.upper.tolist(), strict=True))
-        whole = [b - a >= math.tau - tolerances.LIMIT_SLACK for a, b in ends]
+        whole = [
+            b - a >= math.tau - tolerances.LIMIT_SLACK and not slides
+            for (a, b), slides in zip(ends, self.chain.slides, strict=True)
+        ]
         return (
             [-math.inf if w else a for (a, _), w in zip(ends, whole, strict=True)],
             [math.inf if w else b for (_, b), w in zip(ends, whole, strict=True)],

@@ -104,7 +104,7 @@ class PoseEquations:
         chain = self.chain
         axes: list[tuple[FloatArray, FloatArray]] = []
         T: FloatArray = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-        s, versine = np.sin(q), 2.0 * np.sin(0.5 * q) ** 2
+        s, versine = chain.sines(q), 2.0 * np.sin(0.5 * q) ** 2
         for k, (X, XX) in enumerate(zip(chain.generators, chain.generators_squared, strict=True)):
             w = T[:, :3, :3] @ chain.S[:3, k]
             axes.append((w, T[:, :3, :3] @ chain.S[3:, k] + np.cross(T[:, :3, 3], w)))
@@ -213,6 +213,7 @@ class PoseEquations:
             wx, wy, wz, vx, vy, vz = chain.S[:, k].tolist()
             w = wx, wy, wz
             s, c = sin_cos(q[k])
+            s = q[k] if chain.slides[k] else s
             versine = 1.0 - c
             ax, ay, az = wy * z - wz * y + vx, wz * x - wx * z + vy, wx * y - wy * x + vz
             x = x + s * ax + versine * (wy * az - wz * ay)

@@ -1,4 +1,6 @@
-"""Screw axes S = (omega, v) (6,) of revolute joints: |omega| = 1 and omega . v = 0 (no pitch).
+"""Screw axes S = (omega, v) (6,) of joints that turn or slide.
+
+Of revolute joints |omega| = 1 and omega . v = 0 (no pitch), of prismatic ones omega = 0, |v| = 1.
 
 Sources: Lynch & Park, Modern Robotics (2017), ch. 3.3.2 and 4.1; Murray, Li & Sastry (1994),
 ch. 2.3.
@@ -29,6 +31,14 @@ def revolute(direction: npt.ArrayLike, point: npt.ArrayLike) -> FloatArray:
         raise InputError("The direction of the axis is zero; give the axis a direction.")
     omega /= length
     return np.concatenate((omega, np.cross(r, omega)))
+
+
+def prismatic(direction: npt.ArrayLike) -> FloatArray:
+    """Return the screw axis of a sliding joint along `direction` (3,), of any length.
+
+    Raises InputError when the direction is zero or a number is not finite.
+    """
+    return np.roll(revolute(direction, np.zeros(3)), 3)
 
 
 def point_on(S: FloatArray) -> FloatArray:

@@ -163,9 +163,10 @@ def arm_of(chain: Chain) -> FiveAxisArm:
     Raises RobotDescriptionError when the chain is not in the family. The message names every axis
     at fault, its deviation and the condition.
     """
-    if chain.n != 5:
+    if chain.n != 5 or any(chain.slides):
         raise RobotDescriptionError(
-            f"The closed-form kinematics need five joints; this arm has {chain.n}."
+            "The closed-form kinematics need five joints that turn; this arm has "
+            f"{chain.n - sum(chain.slides)}."
         )
     omega = [chain.S[:3, i] for i in range(5)]
     skew = _refuse_skewed(omega)

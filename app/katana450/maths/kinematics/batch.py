@@ -86,7 +86,7 @@ def forward_columns(chain: Chain, q: FloatArray) -> FloatArray:
         flat = T.reshape(4, -1)
         turned = (chain.generators[i] @ flat).reshape(T.shape)
         twice = (chain.generators_squared[i] @ flat).reshape(T.shape)
-        turned *= np.sin(q[i])
+        turned *= q[i] if chain.slides[i] else np.sin(q[i])
         twice *= 2.0 * np.sin(0.5 * q[i]) ** 2
         T += turned
         T += twice

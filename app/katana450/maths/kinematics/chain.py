@@ -22,7 +22,7 @@ _SWEEPS: Final = 50
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A chain of revolute joints in the fixed frame {S}.
+    """A chain of joints that turn, or slide, in the fixed frame {S}.
 
     Arrays are copied and read-only. Raises RobotDescriptionError when the values do not describe a
     chain.
@@ -30,7 +30,7 @@ class Chain:
     Attributes:
         M: home configuration T_S_tool (4, 4) at q = 0.
         S: screw axes (omega, v) (6, n) in {S} at q = 0.
-        lower, upper: joint limits (n,) [rad].
+        lower, upper: joint limits (n,) [rad]; all angles are lengths [m] where a joint slides.
         speed: maximum joint speeds (n,) [rad/s].
         names: the n joint names.
     """
@@ -60,7 +60,7 @@ class Chain:
             raise RobotDescriptionError("The arm has no joints; name at least one.")
         object.__setattr__(self, "names", tuple(self.names))
         for i, label in enumerate(self._labels()):
-            length = float(np.linalg.norm(self.S[:3, i]))
+            length = float(np.linalg.norm(self.axes[:, i]))
             travel = screws.pitch(self.S[:, i])
             if abs(length - 1.0) > tolerances.SCREW:
                 raise RobotDescriptionError(
@@ -69,7 +69,7 @@ class Chain:
             if abs(travel) > tolerances.SCREW:
                 raise RobotDescriptionError(
                     f"The screw of {label} advances by {travel:.3g} m/rad; "
-                    "only turning joints are supported."
+                    "only joints that turn or slide are supported."
                 )
             if not self.lower[i] < self.upper[i]:
                 raise RobotDescriptionError(
@@ -97,6 +97,23 @@ class Chain:
         return len(self.names)
 
     @cached_property
+    def slides(self) -> tuple[bool, ...]:
+        """Flags (n,) of the prismatic joints."""
+        return tuple(not axis.any() for axis in self.S[:3].T)
+
+    @cached_property
+    def axes(self) -> FloatArray:
+        """(3, n) Directions in {S} about which the joints turn, or along which they slide."""
+        return np.where(self.slides, self.S[3:], self.S[:3])
+
+    def sines(self, q: FloatArray) -> FloatArray:
+        """Return the factors (..., n) of the generators in the motion by `q` (..., n).
+
+        They are the sines of angles, and the lengths by which joints slide.
+        """
+        return np.where(self.slides, q, np.sin(q)) if any(self.slides) else np.sin(q)
+
+    @cached_property
     def reach(self) -> float:
         """An upper bound [m] on the distance of the tool point from the start of axis 1.
 
@@ -104,7 +121,7 @@ class Chain:
         distances is a bound, and the points are those with the least sum: each lies where a string
         between its neighbours would pass the axis.
         """
-        axes = self.S[:3].T
+        axes = self.axes.T
         points = [screws.point_on(S) for S in self.S.T] + [self.M[:3, 3]]
         for _ in range(_SWEEPS):
             for i in range(1, self.n):
@@ -113,7 +130,8 @@ class Chain:
                 away = np.linalg.norm(sides - along[:, None] * axes[i], axis=1)
                 weights = away[::-1] if away.any() else np.ones(2)
                 points[i] = points[i] + axes[i] * float(along @ weights / weights.sum())
-        return sum(map(math.dist, points, points[1:]))
+        travel = np.maximum(np.abs(self.lower), np.abs(self.upper)) @ self.slides
+        return sum(map(math.dist, points, points[1:])) + float(travel)
 
     def with_tool(self, M: npt.ArrayLike) -> Chain:
         """Return the same arm with another tool: `M` (4, 4) is the tool's pose in {S} at q = 0."""

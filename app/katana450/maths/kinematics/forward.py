@@ -17,10 +17,11 @@ _IDENTITY = np.eye(4)
 
 def _exponentials(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     """Return exp(hat(S_i) q_i) of every joint, (n, 4, 4)."""
-    q = chain.check_q(q)[:, None, None]
+    q = chain.check_q(q)
     # This form of 1 - cos q keeps its digits near 0.
-    versine = 2.0 * np.sin(0.5 * q) ** 2
-    E: FloatArray = np.sin(q) * chain.generators + versine * chain.generators_squared
+    versine = (2.0 * np.sin(0.5 * q) ** 2)[:, None, None]
+    E: FloatArray = chain.sines(q)[:, None, None] * chain.generators
+    E += versine * chain.generators_squared
     E += _IDENTITY
     return E
 

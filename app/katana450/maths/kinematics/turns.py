@@ -33,7 +33,8 @@ def in_turn(theta: float, lower: float, upper: float) -> float:
 
 def in_limits_turns(chain: Chain, q: FloatArray) -> FloatArray:
     """Return `q` (..., n) [rad], each angle in the turn inside its limits, else in [-pi, pi]."""
-    q = q - math.tau * np.round(q / math.tau)
+    turns = np.round(q / math.tau)
+    q = q - math.tau * (np.where(chain.slides, 0.0, turns) if any(chain.slides) else turns)
     lower, upper = chain.lower - tolerances.LIMIT_SLACK, chain.upper + tolerances.LIMIT_SLACK
     if max(-lower.min(), upper.max()) <= math.pi:
         return q
@@ -50,7 +51,7 @@ def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatA
     Only limits of a turn and wider leave this choice. An angle without such a turn stays.
     """
     slack = tolerances.LIMIT_SLACK
-    wide = chain.upper - chain.lower >= math.tau - slack
+    wide = (chain.upper - chain.lower >= math.tau - slack) & ~np.array(chain.slides)
     if hint is None or not wide.any():
         return q
     first = np.ceil((chain.lower - slack - q) / math.tau)

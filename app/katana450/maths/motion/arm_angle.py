@@ -78,7 +78,7 @@ class ElbowPath(NamedTuple):
 
 def has_arm_angle(chain: Chain) -> bool:
     """Return whether the elbow of the arm can move with the tool at rest."""
-    return chain.n == AXES
+    return chain.n == AXES and not any(chain.slides)
 
 
 def self_motion(chain: Chain, q: FloatArray) -> SelfMotion:

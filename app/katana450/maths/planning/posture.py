@@ -68,11 +68,14 @@ def point_by_exponentials(chain: Chain, q: JointJets) -> ThreeJets:
     """Return the tool point [m] in {S} of any chain at the joint angles `q` [rad].
 
     The product of exponentials acts on the point from the tool to the base: a turn by q about
-    (omega, v) moves p by sin q (omega x p + v) + (1 - cos q) omega x (omega x p + v).
+    (omega, v) moves p by sin q (omega x p + v) + (1 - cos q) omega x (omega x p + v). A joint that
+    slides moves it by q v.
     """
     x, y, z = (Jet.constant(float(coordinate)) for coordinate in chain.M[:3, 3])
-    for angle, (wx, wy, wz, vx, vy, vz) in zip(q[::-1], chain.S.T[::-1].tolist(), strict=True):
+    joints = zip(q[::-1], chain.S.T[::-1].tolist(), chain.slides[::-1], strict=True)
+    for angle, (wx, wy, wz, vx, vy, vz), slides in joints:
         s, c = sin_cos(angle)
+        s = angle if slides else s
         ax, ay, az = wy * z - wz * y + vx, wz * x - wx * z + vy, wx * y - wy * x + vz
         x = x + s * ax + (1.0 - c) * (wy * az - wz * ay)
         y = y + s * ay + (1.0 - c) * (wz * ax - wx * az)

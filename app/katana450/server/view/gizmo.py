@@ -204,7 +204,8 @@ class Gizmo:
             R = forward(chain, state.goal)[:3, :3]
             if chain.n == PITCHING:
                 y = joint_frames(chain, state.goal)[3][:3, :3] @ chain.S[:3, 3]
-                x = np.cross(y, chain.S[:3, 0])
+                x = np.cross(y, chain.axes[:, 0])
+                x = x / np.linalg.norm(x) if x.any() else R[:, int(np.abs(y @ R).argmin())]
                 R = np.column_stack((x, y, np.cross(x, y)))
         return np.asarray(self._arm.T_base_shoulder[:3, :3] @ R)
 

@@ -36,6 +36,14 @@ LIMIT_DISTANCE = math.radians(0.5)
 """[rad] Distance to a limit within which a joint holds up a jog."""
 
 
+def of_limit(slides: tuple[bool, ...], axis: int, end: float) -> Finding:
+    """Return the finding that ``axis`` is at its limit ``end`` [rad or m].
+
+    slides: (n,) whether each joint is prismatic.
+    """
+    return Finding(Reason.SLIDE_LIMIT if slides[axis] else Reason.AXIS_LIMIT, end, axis)
+
+
 def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[Finding, ...]:
     """Return a finding for each joint of ``q`` (n,) [rad or m] that is beyond a limit.
 
@@ -47,11 +55,7 @@ def of_joints(limits: Limits, slides: tuple[bool, ...], q: FloatArray) -> tuple[
     )
     # A slider at its end is converted to degrees and back: the slack covers the rounding.
     return tuple(
-        Finding(
-            Reason.SLIDE_LIMIT if slides[axis] else Reason.AXIS_LIMIT,
-            float(limits.lower[axis] if below[axis] else limits.upper[axis]),
-            axis,
-        )
+        of_limit(slides, axis, float((limits.lower if below[axis] else limits.upper)[axis]))
         for axis in np.flatnonzero(below | above).tolist()
     )
 
@@ -94,7 +98,7 @@ def causes_of(chain: Chain, best: Projection, *, at_edge: bool = False) -> Itera
         yield Finding(Reason.SINGULAR)
     for axis in best.limits:
         ends = float(chain.lower[axis]), float(chain.upper[axis])
-        yield Finding(Reason.AXIS_LIMIT, min(ends, key=lambda end: abs(end - best.q[axis])), axis)
+        yield of_limit(chain.slides, axis, min(ends, key=lambda end: abs(end - best.q[axis])))
 
 
 def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
@@ -110,8 +114,7 @@ def of_jog(chain: Chain, q: FloatArray, V: FloatArray) -> tuple[Finding, ...]:
         return ()
     ends = np.where(q - chain.lower < chain.upper - q, chain.lower, chain.upper)
     return tuple(
-        Finding(Reason.AXIS_LIMIT, float(ends[axis]), axis)
-        for axis in np.flatnonzero(near).tolist()
+        of_limit(chain.slides, axis, float(ends[axis])) for axis in np.flatnonzero(near).tolist()
     )
 
 
