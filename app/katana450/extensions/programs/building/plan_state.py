@@ -333,6 +333,7 @@ class PlanState:
     def joints_at(self, place: StepTarget) -> FloatArray:
         """Return the joints (n,) [rad] for ``place``. Raises InputError if it cannot be reached."""
         if place.joints is not None:
+            require_turning(self.chain)
             self.plan_context.session.check(Joints(place.joints))
             q = self.plan_context.arm.chain.check_q(place.joints)
             _check_range(self.chain, q)
@@ -376,6 +377,15 @@ class PlanState:
         """Return the branches to try, in their order; only ``wanted`` if it is given."""
         planning = self.planning
         return planning.branches(self.q) if wanted is None else (planning.branch(wanted),)
+
+
+def require_turning(chain: Chain) -> None:
+    """Raise InputError if an axis slides: the joints of scripts are angles."""
+    if any(chain.slides):
+        raise InputError(
+            f"Axis {chain.slides.index(True) + 1} slides, and the joints of a script are angles. "
+            "Give the place of the tool by x, y and z."
+        )
 
 
 def _check_range(chain: Chain, q: FloatArray) -> None:

@@ -23,6 +23,7 @@ from katana450.arm.control.state.scene_objects import (
 from katana450.arm.control.state.solid import MIN_OPACITY, Colour, ObjectAppearance, Solid
 from katana450.arm.control.state.state import State
 from katana450.errors import InputError
+from katana450.extensions.programs.building.plan_state import require_turning
 from katana450.extensions.programs.language import kinds
 from katana450.extensions.programs.language.attached_files import attached_file, is_file_name
 from katana450.extensions.programs.language.declaration import ALONE, Declared, Kind, record
@@ -416,6 +417,7 @@ def check_scene(session: Session, scene: Scene) -> None:
                 "them out."
             )
         chain = session.arm.chain
+        require_turning(chain)
         if not chain.within_limits(chain.check_q(scene.joints)):
             raise InputError("The joints lie outside the limits of this arm.")
     if scene.water is not None and all(scene_object.name != CUP for scene_object in scene.objects):

@@ -10,7 +10,12 @@ import numpy as np
 from katana450.arm.control.session.session import TOOL_SPEED
 from katana450.errors import BlockedError, InputError
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.building.plan_state import CARRY, PlanState, UntimedPath
+from katana450.extensions.programs.building.plan_state import (
+    CARRY,
+    PlanState,
+    UntimedPath,
+    require_turning,
+)
 from katana450.extensions.programs.building.step import Step
 from katana450.extensions.programs.language.declaration import Kind
 from katana450.extensions.programs.language.kinds import (
@@ -123,6 +128,7 @@ class FollowTrajectory(Step, word="trajectory"):
         Raises BlockedError with the time at which two parts would meet, and InputError for a
         posture beyond the limits, or of another number of joints.
         """
+        require_turning(plan.chain)
         times, postures = frozen(self.through[:, 0]), frozen(self.through[:, 1:])
         joints, columns = plan.chain.n, postures.shape[1]
         if columns != joints:
