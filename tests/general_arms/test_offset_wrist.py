@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import time
@@ -28,10 +29,13 @@ from tests.general_arms import singular_postures as singular
 from tests.general_arms.driven import pose, session_of, settled
 from tests.general_arms.published_arms import (
     CRX_10IA,
+    JACO_2,
     NEAR_MISS,
     OFFSET,
+    QUARTER,
     UF_850,
     XARM_6,
+    craig,
 )
 
 LONG = "KATANA450_LONG" in os.environ
@@ -118,6 +122,59 @@ def test_postures_are_those_of_a_search_from_many_starts(name: str) -> None:
         f"{np.equal(counts, searched_counts).sum()} as many as the search; "
         f"{1e3 * worst:.1e} mm, {1e6 * float(np.median(seconds)):.0f} us"
     )
+
+
+def random_arm(rng: np.random.Generator) -> Chain:
+    """Return an arm whose axes 2 and 3 are parallel, and whose axis 5 meets axis 4 or 6."""
+
+    def twist() -> float:
+        return float(rng.choice((QUARTER, -QUARTER, 0.8, -1.1, 2.2)))
+
+    def length() -> float:
+        return float(rng.choice((0.0, 1.0)) * rng.uniform(-0.15, 0.15))
+
+    offsets = [0.1 * rng.uniform(), 0.0]
+    rng.shuffle(offsets)
+    return craig(
+        [
+            (0.0, 0.0, 0.3, 0.2),
+            (twist(), length(), length(), rng.uniform(-1.0, 1.0)),
+            (rng.choice((0.0, math.pi)), rng.uniform(0.15, 0.5), length(), rng.uniform(-1.0, 1.0)),
+            (twist(), length(), rng.uniform(0.1, 0.5), 0.0),
+            (twist(), offsets[0], length(), 0.0),
+            (twist(), offsets[1], 0.1, 0.0),
+        ],
+        [-math.pi] * 6,
+        [math.pi] * 6,
+    )
+
+
+def test_arms_of_any_dimensions_are_solved() -> None:
+    rng = np.random.default_rng(9)
+    for _ in range(300 if LONG else 12):
+        chain = random_arm(rng)
+        solver = offset_wrist(chain)
+        assert len(set(solver.branches)) == len(solver.branches)
+        q = rng.uniform(-math.pi, math.pi, (4, 6))
+        for posture, row in zip(q, solver.inverse_batch(forward_batch(chain, q)), strict=True):
+            postures = row[np.isfinite(row[:, 0])]
+            assert apart(posture, postures).min() <= SAME
+            assert len(postures) % 2 == 0
+
+
+def test_rounding_of_a_file_changes_no_name() -> None:
+    """The maker writes right angles as 1.5708."""
+    for chain in (XARM_6, JACO_2):
+        S = np.array(chain.S)
+        S[:3, 1:] += np.random.default_rng(10).uniform(-4e-6, 4e-6, (3, 5))
+        S[:3] /= np.linalg.norm(S[:3], axis=0)
+        S[3:] -= S[:3] * np.einsum("ij,ij->j", S[:3], S[3:])
+        rounded = dataclasses.replace(chain, S=S)
+        assert offset_wrist(rounded).branches == offset_wrist(chain).branches
+        q = np.array([0.3, 1.2, 1.0, 0.4, 0.9, 0.6])
+        found = kinematics_of(rounded).inverse(forward(rounded, q))
+        assert min(float(apart(q, s.q[None])[0]) for s in found) <= SAME
+        assert max(s.position_error for s in found) <= EXACT
 
 
 def test_pose_has_sixteen_postures() -> None:

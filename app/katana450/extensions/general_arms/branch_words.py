@@ -225,6 +225,7 @@ class BranchWords:
         offset = abs(look.ahead(0, 1, look.p[1]))
         aside = float(look.z[1] @ (wrist - look.p[0]))
         upright = abs(float(look.z[0] @ look.z[1])) < ZERO and self._is_parallel(1)
+        upright &= self.offset != 3
         return aside if upright and abs(aside) > max(offset, ZERO) else 0.0
 
     def _from_tool(self, look: _Look) -> tuple[str, ...]:

@@ -40,7 +40,7 @@ from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import ORDINALS, BranchWords
 from katana450.extensions.general_arms.functions import Number
 from katana450.extensions.general_arms.general_kinematics import GeneralKinematics, near_turns
-from katana450.extensions.general_arms.links import DHLinks, sine_and_cosine
+from katana450.extensions.general_arms.links import DHLinks, exact_chain, sine_and_cosine
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.refinement import refined
 from katana450.extensions.general_arms.spherical_wrist import wrist_centre
@@ -166,7 +166,9 @@ class OffsetWrist(GeneralKinematics):
     @cached_property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, see branch_words.py; those of second postures follow the first."""
-        words = BranchWords(self.chain, tuple(range(6)), offset=self.locked)
+        # Rounding in the file changes no word.
+        exact = exact_chain(self.chain, self.links)
+        words = BranchWords(exact, tuple(range(6)), offset=self.locked)
         rng = np.random.default_rng(450)
         q = rng.uniform(-math.pi, math.pi, (512, 6))
         _, places = np.unique(self._numbers(q), return_index=True)
