@@ -242,6 +242,14 @@ class SevenAxes(GeneralKinematics):
 
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> Iterator[Angles]:
         """Yield the joint angles (7,) [rad] of the best swivel of each branch."""
+        postures = self._best(T, hint)
+        if self.rounding.is_corrected:
+            q = self._refined(np.array([*postures]), np.broadcast_to(T, (8, 4, 4)))
+            postures = map(tuple, self._turned(q.T, hint).T.tolist())
+        yield from postures
+
+    def _best(self, T: FloatArray, hint: FloatArray | None) -> Iterator[Angles]:
+        """Yield `best` of the exact arm."""
         rows, solved, nearest = self._rows(T), self._on_grid, None
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
@@ -262,8 +270,6 @@ class SevenAxes(GeneralKinematics):
                 targets = np.broadcast_to(T, (SWIVELS, 4, 4))
                 position, rotation = errors_of(self.chain, nearest[:, branch, None], targets)
                 q = nearest[int((position + rotation).argmin()), branch]
-            elif self.rounding.is_corrected:
-                q = self._turned(self._refined(q[None], T[None]).T, hint)[:, 0]
             yield tuple(q.tolist())
 
     @cached_property
