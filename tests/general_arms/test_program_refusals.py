@@ -155,5 +155,5 @@ def test_limit_of_a_joint_on_a_line_is_named() -> None:
     T = pose(session, state)
     roll, pitch, yaw = np.degrees(so3.to_rpy(T[:3, :3] @ so3.rotation_z(0.5))).tolist()
     text = f"frame: base\nsteps:\n  - line: {{roll: {roll}, pitch: {pitch}, yaw: {yaw}}}\n"
-    with pytest.raises(ScriptError, match=r"axis 6, joint6, over its limit of 350.0 deg \d+.* %"):
+    with pytest.raises(ScriptError, match=r"axis 6, joint 6, over its limit of 350.0 deg \d+.* %"):
         compiled(parse(text), context, state)
