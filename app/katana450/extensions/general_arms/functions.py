@@ -35,13 +35,12 @@ class Operations(NamedTuple):
     Attributes:
         atan2, hypot, cos, sin: as in `math`.
         root: sqrt(x), and 0 where x < 0.
-        select: (condition, a, b) to a where the condition holds, else b. The condition is that of
-            the rare case, or both are the same number.
+        select: (condition, a, b) to a where the condition holds, else b.
+        where_free: the same, for the condition that a pose leaves an angle free.
         bounded: the nearest number in [-1, 1].
         is_scalar: whether the numbers are floats. A formula may then take a shorter way where a
             condition holds, and has further ways for rare poses. Arrays take the way that is right
             for all poses but the rare ones.
-        is_regular: whether no pose is at a singularity, so that arrays take the shorter way too.
     """
 
     atan2: Callable[[Number, Number], Number]
@@ -50,9 +49,9 @@ class Operations(NamedTuple):
     sin: Callable[[Number], Number]
     root: Callable[[Number], Number]
     select: Callable[[Number, Number, Number], Number]
+    where_free: Callable[[Number, Number, Number], Number]
     bounded: Callable[[Number], Number]
     is_scalar: bool
-    is_regular: bool = False
 
 
 def _root(x: float) -> float:
@@ -74,6 +73,7 @@ FLOATS: Final = Operations(
     math.sin,
     _root,
     _select,
+    _select,
     _bounded,
     is_scalar=True,
 )
@@ -84,6 +84,7 @@ ARRAYS: Final = Operations(
     np.cos,
     np.sin,
     lambda x: np.sqrt(np.maximum(x, 0.0)),
+    np.where,
     np.where,
     lambda x: np.clip(x, -1.0, 1.0),
     is_scalar=False,
@@ -99,17 +100,19 @@ def facing(f: Operations) -> Callable[[Number, Number, Number, Number], Facing]:
     subproblem 4, -x sin + y cos = d. A point within |d| of axis 1 gets the turn that brings it
     nearest. A point on axis 1 leaves the turn to ``free`` [rad], if d is 0.
     """
-    hypot, root, select, bounded, cos, sin = f.hypot, f.root, f.select, f.bounded, f.cos, f.sin
-    is_scalar, is_regular = f.is_scalar, f.is_regular
+    hypot, root, where_free, cos, sin = f.hypot, f.root, f.where_free, f.cos, f.sin
+    bounded = f.bounded
+    is_scalar = f.is_scalar
 
     def turns(x: Number, y: Number, d: Number, free: Number) -> Facing:
         rho = hypot(x, y)
-        if is_regular or (is_scalar and rho > FREE):
+        if is_scalar and rho > FREE:
             cx, cy, sine = x / rho, y / rho, bounded(d / rho)
         else:
             on_axis = rho <= FREE
-            scale = select(on_axis, 1.0, rho)
-            cx, cy = select(on_axis, cos(free), x / scale), select(on_axis, sin(free), y / scale)
+            scale = where_free(on_axis, 1.0, rho)
+            cx = where_free(on_axis, cos(free), x / scale)
+            cy = where_free(on_axis, sin(free), y / scale)
             sine = bounded(d / scale)
         cosine = root((1.0 - sine) * (1.0 + sine))
         xc, yc, xs, ys = cx * cosine, cy * cosine, cx * sine, cy * sine
@@ -162,9 +165,9 @@ def three_turns(
     (s, c), (s2, c2) = sine_and_cosine(t), sine_and_cosine(t2)
     if c == c2 == 0.0:
         return _square_turns(f, s, s2, frees_last=frees_last)
-    atan2, hypot, root, select, cos, sin = f.atan2, f.hypot, f.root, f.select, f.cos, f.sin
+    atan2, hypot, root, cos, sin = f.atan2, f.hypot, f.root, f.cos, f.sin
     total, rest, sign = 0.5 * (t + t2), 0.5 * (t - t2), math.copysign(1.0, s * s2)
-    is_scalar, is_regular, cosines, sines = f.is_scalar, f.is_regular, c * c2, s * s2
+    is_scalar, cosines, sines = f.is_scalar, c * c2, s * s2
     bound = abs(sines) * math.sqrt(1.0 - BENT * BENT)
 
     def distinct(q13: float, q23: float, q31: float, q32: float, q33: float) -> tuple[Turns, Turns]:
@@ -184,7 +187,7 @@ def three_turns(
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
         (q11, _, q13), (q21, _, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-        if is_regular or (is_scalar and radius > DISTINCT and abs(q33 - cosines) < bound):
+        if is_scalar and radius > DISTINCT and abs(q33 - cosines) < bound:
             return *distinct(q13, q23, q31, q32, q33), radius
         half = 0.5 * atan2(radius, q33)
         sine = root(sign * sin(total + half) * sin(total - half))
@@ -202,7 +205,7 @@ def three_turns(
 
             a = atan2(q23, q13) - atan2(-c * s2 * cb - s * c2, s2 * sb)
             free_turn = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
-            a = select(radius <= FREE, free_turn, a)
+            a = f.where_free(radius <= FREE, free_turn, a)
             turns.append((a, b, left(cos(a), sin(a)), cos(a), sin(a)))
         return turns[0], turns[1], radius
 
@@ -223,13 +226,13 @@ def _square_turns(
     begins with s sin b (cos c, -sin c). Where sin b is small, c follows from what Rz(-a) leaves of
     Q: its second row is -s s2 (sin c, cos c, 0).
     """
-    atan2, hypot, select, cos, sin = f.atan2, f.hypot, f.select, f.cos, f.sin
-    sign, pi, is_scalar, is_regular = -s * s2, math.pi, f.is_scalar, f.is_regular
+    atan2, hypot, where_free, cos, sin = f.atan2, f.hypot, f.where_free, f.cos, f.sin
+    sign, pi, is_scalar = -s * s2, math.pi, f.is_scalar
 
     def split(first: Row, second: Row, third: Row, free: Number) -> tuple[Turns, Turns, Number]:
         (q11, q12, q13), (q21, q22, q23), (q31, q32, q33) = first, second, third
         radius = hypot(q13, q23)
-        if is_regular or (is_scalar and radius > DISTINCT):
+        if is_scalar and radius > DISTINCT:
             a, c = atan2(s2 * q23, s2 * q13), atan2(-s * q32, s * q31)
             ca, sa = s2 * q13 / radius, s2 * q23 / radius
         else:
@@ -240,9 +243,9 @@ def _square_turns(
             is_free = radius <= FREE
             free_turn = _first(f, q33, left(1.0, 0.0), free) if frees_last else free
             # Of a direction any length gives the angles.
-            x = select(is_free, cos(free_turn), s2 * q13)
-            y = select(is_free, sin(free_turn), s2 * q23)
-            length = select(is_free, 1.0, radius)
+            x = where_free(is_free, cos(free_turn), s2 * q13)
+            y = where_free(is_free, sin(free_turn), s2 * q23)
+            length = where_free(is_free, 1.0, radius)
             a, c, ca, sa = atan2(y, x), left(x, y), x / length, y / length
         b = atan2(radius, sign * q33)
         return (a, b, c, ca, sa), (a + pi, -b, c + pi, -ca, -sa), radius

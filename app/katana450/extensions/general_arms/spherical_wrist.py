@@ -122,7 +122,7 @@ def crossing_shoulder(
     hz = g13 * gx + g23 * gy + g33 * gz
     fixed = cx * cx + cy * cy + cz * cz + gx * gx + gy * gy + gz * gz + 2.0 * hz * cz
     along, across = 2.0 * (hx * cx + hy * cy), 2.0 * (hy * cx - hx * cy)
-    atan2, hypot, root, select, cos, sin = f.atan2, f.hypot, f.root, f.select, f.cos, f.sin
+    atan2, hypot, root, cos, sin, where_free = f.atan2, f.hypot, f.root, f.cos, f.sin, f.where_free
     amplitude, middle = hypot(along, across), atan2(across, along)
     split = three_turns(f, links.t[3], links.t[4])
 
@@ -143,14 +143,16 @@ def crossing_shoulder(
             rho = hypot(vx, vy)
             level = (z - c1 * vz) / s1
             offset = c1 * level - s1 * vz
-            length = root((radius - offset) * (radius + offset))
-            if not f.is_regular:
-                # Both are the same number; the smaller radius keeps more of its digits.
-                length = select(rho < radius, root((rho - level) * (rho + level)), length)
+            # Both are the same number; the smaller radius keeps more of its digits.
+            length = f.select(
+                rho < radius,
+                root((rho - level) * (rho + level)),
+                root((radius - offset) * (radius + offset)),
+            )
             bearing, is_above = atan2(vy, vx), rho <= FREE
             for side in (length, -length):
-                two = select(is_above, free2, atan2(level, side) - bearing)
-                one = select(on_axis, free1, heading - atan2(offset, side))
+                two = where_free(is_above, free2, atan2(level, side) - bearing)
+                one = where_free(on_axis, free1, heading - atan2(offset, side))
                 c, s = cos(one), sin(one)
                 cb, sb = cos(two), sin(two)
                 q = []

@@ -19,6 +19,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -55,7 +56,7 @@ SWIVELS: Final = 128
 """Number of swivels on the grid."""
 
 REACHED: Final = ARRAYS._replace(
-    root=np.sqrt, bounded=lambda x: x, select=lambda _condition, _a, b: b, is_regular=True
+    root=np.sqrt, bounded=lambda x: x, where_free=lambda _condition, _a, b: b
 )
 """Operations whose angles are not numbers where no posture takes the pose, nor at a singularity."""
 
@@ -250,7 +251,7 @@ class SevenAxes(GeneralKinematics):
 
     def _best(self, T: FloatArray, hint: FloatArray | None) -> Iterator[Angles]:
         """Yield `best` of the exact arm."""
-        rows, solved, nearest = self._rows(T), self._on_grid, None
+        rows, solved = self._rows(T), self._on_grid
         if hint is not None:
             # The posture next to the hint may lie where the swivel hardly changes along the curve.
             neighbour = search_of(self.chain).solve(T, hint, seeds=0)
@@ -265,11 +266,11 @@ class SevenAxes(GeneralKinematics):
             q = q[:, best]
             if cost[best] == math.inf:
                 # No swivel takes the pose: the one that comes nearest.
-                if nearest is None:
-                    nearest = self.at_swivels(T, self._grid)
+                with np.errstate(all="ignore"):
+                    q = next(islice(self._near_grid(rows), branch, None))
                 targets = np.broadcast_to(T, (SWIVELS, 4, 4))
-                position, rotation = errors_of(self.chain, nearest[:, branch, None], targets)
-                q = nearest[int((position + rotation).argmin()), branch]
+                position, rotation = errors_of(self.chain, q.T[:, None], targets)
+                q = self._turned(q, hint)[:, int((position + rotation).argmin())]
             yield tuple(q.tolist())
 
     @cached_property
@@ -280,6 +281,10 @@ class SevenAxes(GeneralKinematics):
     @cached_property
     def _on_grid(self) -> Callable[[FloatArray], Iterator[FloatArray]]:
         return self._at(self._grid, REACHED)
+
+    @cached_property
+    def _near_grid(self) -> Callable[[FloatArray], Iterator[FloatArray]]:
+        return self._at(self._grid, ARRAYS)
 
     @cached_property
     def _range(self) -> tuple[float, float]:
