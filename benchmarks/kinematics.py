@@ -51,7 +51,6 @@ class Entry:
 
 ONE_BY_ONE = (
     Entry(OWN, "katana450 `arm.ik`"),
-    Entry("katana450-bare", "katana450 `Solver`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("roboticstoolbox", "roboticstoolbox `ik_LM`, limits kept", "roboticstoolbox-python"),
     Entry("roboticstoolbox-free", "roboticstoolbox `ik_LM`", "roboticstoolbox-python"),

@@ -1,6 +1,6 @@
 """Inverse kinematics of arms with six and seven axes: the app beside other libraries.
 
-As `benchmarks.kinematics`, with the arms UR5e, KUKA KR 6, Panda and iiwa from their published
+As `benchmarks.kinematics`, with the arms UR5e, KUKA KR 6 and Panda from their published
 dimensions. A second task of the arms with six axes has poses at singularities: a wrist in line, a
 stretched elbow, and both within 1e-9 to 1e-3 rad.
 """
@@ -32,11 +32,10 @@ END = "<!-- kinematics of arms: end -->"
 
 CLOSED = (
     Entry(OWN, "katana450 `arm.ik`"),
-    Entry("katana450-general-bare", "katana450 `solve`"),
     Entry("eaik", "EAIK", "EAIK"),
     Entry("ik-geo", "ik-geo", "ik-geo"),
 )
-BATCH = (CLOSED[0], CLOSED[2])
+BATCH = CLOSED[:2]
 NUMERICAL = (
     Entry("katana450-numerical", "katana450, numerical, limits kept"),
     Entry("trac-ik", "TRAC-IK, limits kept, 5 ms", "pytracik"),
@@ -94,7 +93,7 @@ UR5E = ArmData(
     ],
     [TURN] * 6,
 )
-UR5E_FILE = replace(UR5E, name="UR5e with the digits of its maker's file", tilt=2.0510349e-10)
+UR5E_FILE = replace(UR5E, name="UR5e, its maker's digits", tilt=2.0510349e-10)
 """Its right angles are written 1.570796327."""
 KR_6 = ArmData(
     "KUKA KR 6",
@@ -122,15 +121,6 @@ PANDA = ArmData(
             *((-2.8973, 2.8973), (-3.7525, 0.0175), (-2.8973, 2.8973)),
         ]
     ).tolist(),
-)
-IIWA = ArmData(
-    "iiwa 7",
-    "zyzyzyz",
-    [
-        *((0.0, 0.0, 0.0), (0.0, 0.0, 0.34), (0.0, 0.0, 0.5), (0.0, 0.0, 0.74)),
-        *((0.0, 0.0, 0.9), (0.0, 0.0, 1.14), (0.0, 0.0, 1.2), (0.0, 0.0, 1.266)),
-    ],
-    [(-end, end) for end in (170.0, 120.0, 170.0, 120.0, 170.0, 120.0, 175.0)],
 )
 
 
@@ -183,15 +173,16 @@ def tables(poses: int, blocks: int, peers: Path) -> str:
     """Return all tables with the conditions of the measurement."""
     before = os.getloadavg()[0]
     parts: list[str] = []
-    arms = ((UR5E, SIX), (UR5E_FILE, CLOSED), (KR_6, SIX), (PANDA, SEVEN), (IIWA, SEVEN))
+    batch: list[Row] = []
+    arms = ((UR5E, SIX), (UR5E_FILE, CLOSED), (KR_6, CLOSED), (PANDA, SEVEN))
     for arm, entries in arms:
         task = arm.task(random_postures(poses))
         rows = measured(arm, entries, task, blocks, peers)
         parts += [f"{arm.name}, one pose a call:", "", *report.single_table(rows), ""]
         if entries is not SEVEN:
             rows = measured(arm, BATCH, task, blocks, peers, in_batch=True)
-            parts += [f"{arm.name}, all {poses} poses in one call:", ""]
-            parts += [*report.batch_table(rows, "katana450"), ""]
+            batch += [replace(row, title=f"{arm.name}: {row.title}") for row in rows]
+    parts += [f"All {poses} poses in one call:", "", *report.batch_table(batch, "katana450"), ""]
     for arm in (UR5E, KR_6):
         task = arm.task(singular_postures(poses, arm.elbow))
         rows = measured(arm, CLOSED, task, blocks, peers)

@@ -14,16 +14,12 @@ import numpy as np
 
 from benchmarks.kinematics_task import FloatArray, Task, urdf
 from katana450 import tolerances
-from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.library.loading import load
 from katana450.maths.geometry import screws
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.solver import Solver
 
 FLOOR_SOURCE = Path(__file__).with_name("kinematics_floor.c")
 FLOOR_FLAGS = ("-O3", "-shared", "-fPIC")
@@ -77,48 +73,6 @@ class Public:
         exact = solutions.position_error <= tolerances.SAME_POSITION
         exact &= solutions.rotation_error <= tolerances.SAME_ROTATION
         return [angles[chosen] for angles, chosen in zip(q, exact, strict=True)]
-
-
-class Bare:
-    """`Solver`: the same without checks, as a loop over many poses uses it."""
-
-    package = "katana450"
-
-    def __init__(self, task: Task) -> None:
-        self._solve = Solver.of(chain_of(task)).solve
-
-    def solve(self, T: FloatArray) -> Any:
-        """Return all solutions for the pose ``T`` (4, 4)."""
-        return self._solve(T.tolist())
-
-    def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (k, 5) [rad] of ``found``."""
-        return np.array(found)
-
-
-class GeneralBare:
-    """`ClosedForm.solve`: the same without checks, as a loop over many poses uses it."""
-
-    package = "katana450"
-
-    def __init__(self, task: Task) -> None:
-        self._chain = chain_of(task)
-        kinematics = kinematics_of(self._chain)
-        assert isinstance(kinematics, ClosedForm)
-        self._solve = kinematics.solve
-
-    def solve(self, T: FloatArray) -> Any:
-        """Return the pose ``T`` (4, 4) with all solutions, exact or nearest."""
-        return T, self._solve(T)
-
-    def joints(self, found: Any) -> FloatArray:
-        """Return the joint angles (k, n) [rad] of the exact solutions in ``found``."""
-        T, solutions = found
-        q: FloatArray = np.array(solutions)
-        distance, angle = errors_of(self._chain, q[None], T[None])
-        exact = (distance[0] <= tolerances.SAME_POSITION) & (angle[0] <= tolerances.SAME_ROTATION)
-        right: FloatArray = q[exact]
-        return right
 
 
 class Search:

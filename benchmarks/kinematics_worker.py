@@ -42,8 +42,6 @@ def _peer(name: str, **options: Any) -> Callable[[Task], Any]:
 
 SOLVERS: dict[str, Callable[[], Callable[[Task], Any]]] = {
     "katana450": lambda: _own("Public"),
-    "katana450-bare": lambda: _own("Bare"),
-    "katana450-general-bare": lambda: _own("GeneralBare"),
     "katana450-numerical": lambda: _own("Search"),
     "floor": lambda: _own("Floor"),
     "eaik": lambda: _peer("Eaik"),

@@ -40,7 +40,7 @@ PAGES = (
 # Titles of the pages of the reference, with the public names on each.
 REFERENCE = {
     "Arms": ("load", "Arm"),
-    "Kinematics": ("IKSolutions", "Solution", "Branch", "NearestPose"),
+    "Kinematics": ("IKSolutions", "SE3", "Solution", "Branch", "NearestPose"),
     "Plans": ("MotionPlan", "Trajectory", "Viewer"),
     "Reachability": ("ReachabilityMap",),
     "Recordings": ("open", "Recording"),
