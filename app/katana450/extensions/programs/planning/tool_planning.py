@@ -48,8 +48,8 @@ VERTICAL: Final = 1e-6
 SWINGS: Final = tuple(np.radians((15, -15, 30, -30, 60, -60, 90, -90)).tolist())
 """[rad] Turns of the swivel along a path, in the order in which they are tried."""
 
-LEAST_STEADY: Final = 0.1
-"""[1] Least turn of the joint that leads a path of the elbow, relative to that of the elbow."""
+LEAST_STEADY: Final = 0.25
+"""[1] Least part of the joint that leads a path of the elbow in the motion of all joints."""
 
 ELBOW_SLACK: Final = 1e-6
 """[deg] Turn of the elbow that counts as none."""
@@ -329,7 +329,13 @@ class ToolPlanning:
         paths: list[Path] = []
         for last, joint in _steady_joints(np.diff(postures, axis=0)):
             slope = np.array((postures[last, joint] - q[joint],))
-            paths.append(CurveSearch(tool.equations(q, joint), curve, q, slope).path())
+            try:
+                paths.append(CurveSearch(tool.equations(q, joint), curve, q, slope).path())
+            except PathError as error:
+                raise InputError(
+                    "The elbow comes to a singularity on its path, where more joints can turn "
+                    "while the tool rests. Turn it by less, or move the tool first."
+                ) from error
             q = paths[-1].end
         return paths
 
@@ -346,12 +352,13 @@ class ToolPlanning:
             limit = min(limits, key=lambda end: abs(end - float(postures[place, axis])))
             raise InputError(
                 f"Axis {axis + 1} comes to its limit of {math.degrees(limit):.1f} deg after "
-                f"{turned[max(place - 1, 0)]:.0f} of {whole:g} deg. Turn the elbow by less."
+                f"{abs(turned[max(place - 1, 0)]):.0f} of {abs(whole):.4g} deg. Turn the elbow by "
+                "less."
             )
         if abs(turned[-1]) < abs(whole) - ELBOW_SLACK:
             raise InputError(
-                f"The elbow turns no farther than {turned[-1]:.0f} of {whole:g} deg while the tool "
-                "rests. Turn it by less, or move the tool first."
+                f"The elbow turns no farther than {abs(turned[-1]):.3g} of {abs(whole):.4g} deg "
+                "while the tool rests. Turn it by less, or move the tool first."
             )
 
 
@@ -363,7 +370,8 @@ def _steady_joints(steps: FloatArray) -> Iterator[tuple[int, int]]:
     last = 0
     while last < len(steps):
         rest = steps[last:]
-        steady = (np.sign(rest) == np.sign(rest[0])) & (np.abs(rest) >= LEAST_STEADY * STEP)
+        parts = rest / np.linalg.norm(rest, axis=1, keepdims=True)
+        steady = parts * np.sign(rest[0]) >= LEAST_STEADY
         lengths = np.where(steady.all(axis=0), len(rest), steady.argmin(axis=0))
         joint = int(lengths.argmax())
         last += max(1, int(lengths[joint]))
