@@ -184,6 +184,7 @@ def test_pose_has_sixteen_postures() -> None:
     table = solver.inverse_batch(forward_batch(CRX_10IA, q))
     counts = np.isfinite(table[:, :, 0]).sum(axis=1)
     assert table.shape == (200, 32, 6)
+    assert solver.inverse_batch(np.zeros((0, 4, 4))).shape == (0, 32, 6)
     assert counts.max() == 16
     assert counts.min() >= 4
 

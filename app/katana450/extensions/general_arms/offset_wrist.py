@@ -58,30 +58,30 @@ DEGREE: Final = 8
 SAMPLES: Final = 32
 """Number of its samples: more than 2 DEGREE + 1 average the rounding."""
 
-NEAR_CIRCLE: Final = 0.05
+CIRCLE_DISTANCE: Final = 0.05
 """[1] Logarithm of the size of a root up to which rounding may have taken it off the circle. Both
 sides of such a pair of roots are tried."""
 
-SYMMETRIC: Final = 1e-9
+SYMMETRY: Final = 1e-9
 """[1] Relative difference of the equations of both signs of alpha1 that is rounding."""
 
-CANDIDATE: Final = 1e-2
+MAX_MISS: Final = 1e-2
 """[1] Miss of the cosine of the wrist's angle up to which a posture is refined, away from axis 1.
 Near it alpha1 magnifies the error of a root."""
 
-CLOSE: Final = 2e-3
+CLOSE_DISTANCE: Final = 2e-3
 """[1] Distance of W from axis 1, relative to the reach, below which it passes closely."""
 
-AHEAD: Final = 0.05
+CLOSE_ANGLE: Final = 0.05
 """[rad] Angle from there to a root up to which this counts."""
 
-TURNS: Final = np.linspace(-1.5, 1.5, 61)
+SPREAD_TURNS: Final = np.linspace(-1.5, 1.5, 61)
 """[rad] Turns of alpha1 from there at which postures are then searched."""
 
-NEAR: Final = 0.3
+MAX_ERROR: Final = 0.3
 """[rad], [m] Error of the pose up to which a posture is refined."""
 
-NEGLIGIBLE: Final = 1e-10
+NEGLIGIBLE_SIZE: Final = 1e-10
 """[1] Relative size of the last coefficients of the polynomial that are left out. An almost
 spherical wrist has small ones, whose zeros are far from the circle."""
 
@@ -223,7 +223,10 @@ class OffsetWrist(GeneralKinematics):
         pose.
         """
         poses = validated_poses(T)
-        return np.concatenate([self._table(poses[rows]) for rows in chunks(len(poses))])
+        table = np.empty((len(poses), len(self.branches), 6))
+        for rows in chunks(len(poses)):
+            table[rows] = self._table(poses[rows])
+        return table
 
     def _table(self, T: FloatArray, near: FloatArray | None = None) -> FloatArray:
         """Return `inverse_batch` of poses (N, 4, 4), without checks; ``near`` as in `_solved`."""
@@ -258,7 +261,7 @@ class OffsetWrist(GeneralKinematics):
             a, b, c = plane.wrist
             missed = np.abs(a * np.cos(beta) + b * np.sin(beta) - c) / plane.square
             near_axis = (tolerances.NEAR_AXIS_1 * links.reach) ** 2 / plane.square
-        elbow, side, root, _ = np.nonzero(missed < CANDIDATE * (1.0 + near_axis))
+        elbow, side, root, _ = np.nonzero(missed < MAX_MISS * (1.0 + near_axis))
         beta = beta[elbow, side, root, 0]
         x, y, u, v, cx, cy = (
             np.broadcast_to(number, missed.shape[1:])[side, root, 0] for number in plane[:6]
@@ -270,7 +273,7 @@ class OffsetWrist(GeneralKinematics):
         pose, q = origin[root], alpha - links.shift
         if near is not None:
             pose, q = np.append(pose, 0), np.concatenate((q, near[None]))
-        postures = refined(self.chain, q, T[pose], NEAR)
+        postures = refined(self.chain, q, T[pose], MAX_ERROR)
         numbers = self._numbers(postures.q, postures.J)
         places = _distinct(postures.q, postures.error, pose)
         q = in_limits_turns(self.chain, postures.q[places])
@@ -317,12 +320,14 @@ class OffsetWrist(GeneralKinematics):
         dx, dy, _ = _mapped(R[pose], _around(-sin, -cos, (wx, wy, 0.0)))
         square = dx * dx + dy * dy
         passing, offset = np.abs(x * dy - y * dx) / square, -(x * dx + y * dy) / square
-        is_close = (passing * np.sqrt(square) < CLOSE * self.links.reach) & (np.abs(offset) < AHEAD)
+        is_close = (passing * np.sqrt(square) < CLOSE_DISTANCE * self.links.reach) & (
+            np.abs(offset) < CLOSE_ANGLE
+        )
         passes = np.flatnonzero(is_close)
         _, first = np.unique(pose[passes], return_index=True)
         passes = passes[first]
-        spread = (theta[:, None] + offset)[passes] + passing[passes] * np.tan(TURNS)
-        origin = np.concatenate((pose, np.repeat(pose[passes], len(TURNS))))
+        spread = (theta[:, None] + offset)[passes] + passing[passes] * np.tan(SPREAD_TURNS)
+        origin = np.concatenate((pose, np.repeat(pose[passes], len(SPREAD_TURNS))))
         return origin, np.concatenate((theta, spread.ravel()))[:, None]
 
     def _roots(self, R: FloatArray, place: FloatArray) -> FloatArray:
@@ -339,7 +344,7 @@ class OffsetWrist(GeneralKinematics):
         half = square.min(axis=1).argmax(axis=1)
         pairs = (squares / plane.square).reshape(2, -1, SAMPLES, 2)
         front, back = np.take_along_axis(pairs, half[None, :, None, None], axis=3)[..., 0]
-        if np.abs(front - back).max() <= SYMMETRIC * np.abs(front).max():
+        if np.abs(front - back).max() <= SYMMETRY * np.abs(front).max():
             # Each root has the posture in front of axis 1 and the same one turned about it.
             back = np.ones_like(front)
         values = (front * back).real
@@ -347,7 +352,9 @@ class OffsetWrist(GeneralKinematics):
         turn = np.exp(-1j * (0.5 * math.tau / SAMPLES) * half[:, None] * orders) / SAMPLES
         coefficients = np.fft.fft(values)[:, orders] * turn
         sizes = np.abs(coefficients[:, DEGREE:])
-        counts = np.where(sizes > NEGLIGIBLE * sizes.max(axis=1, keepdims=True), orders[DEGREE:], 0)
+        counts = np.where(
+            sizes > NEGLIGIBLE_SIZE * sizes.max(axis=1, keepdims=True), orders[DEGREE:], 0
+        )
         theta = np.full((len(values), 2 * DEGREE), math.nan)
         degrees = counts.max(axis=1)
         for degree in np.unique(degrees[degrees > 0]).tolist():
@@ -493,7 +500,7 @@ def _angles_of_zeros(coefficients: npt.NDArray[np.complex128]) -> FloatArray:
     zeros = np.linalg.eigvals(companion)
     distance = np.log(np.abs(zeros))
     angles: FloatArray = np.angle(zeros) + distance
-    angles[np.abs(distance) > NEAR_CIRCLE] = math.nan
+    angles[np.abs(distance) > CIRCLE_DISTANCE] = math.nan
     return angles
 
 

@@ -75,11 +75,12 @@ def refined(
         error, J = _looked(chain, candidate, T[active])
         size = np.abs(error).max(axis=1)
         before = best.error[active]
-        better = size < before
-        best.q[active[better]], best.error[active[better]] = candidate[better], size[better]
-        best.J[active[better]] = J[better]
-        going = (size < GAIN * before) & (size > DOUBLE)
-        active, error = active[going], error[going]
+        is_better = size < before
+        places = active[is_better]
+        best.q[places], best.error[places] = candidate[is_better], size[is_better]
+        best.J[places] = J[is_better]
+        continues = (size < GAIN * before) & (size > DOUBLE)
+        active, error = active[continues], error[continues]
     return best
 
 
