@@ -108,7 +108,7 @@ def test_an_arm_of_four_joints_is_refused(chain: Chain) -> None:
     four = Chain(
         chain.M, chain.S[:, :4], chain.lower[:4], chain.upper[:4], chain.speed[:4], chain.names[:4]
     )
-    with pytest.raises(RobotDescriptionError, match="five joints; this arm has 4"):
+    with pytest.raises(RobotDescriptionError, match="five joints that turn; this arm has 4"):
         inverse(four, np.eye(4))
 
 
