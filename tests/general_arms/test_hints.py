@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 
 from katana450.extensions.general_arms.choice import kinematics_of
+from katana450.extensions.general_arms.nearest import nearest_pose
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.turns import nearest_turn
@@ -41,6 +42,21 @@ def test_posture_that_is_the_hint_comes_back_in_its_turns() -> None:
             usable = [x.q for x in solutions if x.exact and x.within_limits]
             if not usable or np.abs(np.array(usable) - q).max(axis=1).min() > NEAR:
                 lost.append(f"{name} at {q}")
+    assert not lost
+
+
+def test_nearest_pose_is_in_the_turns_of_the_hint() -> None:
+    lost = []
+    for name in ("UR5e", "xArm6", "xArm7"):
+        chain = ARMS[name]
+        hint = np.where(chain.upper > 6.0, 5.0, 0.5 * (chain.lower + chain.upper))
+        T = forward(chain, hint)
+        T[:3, 3] *= 3.0
+        best = nearest_pose(kinematics_of(chain), T, q_hint=hint)
+        lead = float(np.abs(best.q - hint)[chain.upper > 6.0].max())
+        # The upper limit is nearer than half a turn.
+        if best.position_error < 0.1 or lead > 2.0 * np.pi - (6.28 - 5.0):
+            lost.append(f"{name}: {lead}")
     assert not lost
 
 

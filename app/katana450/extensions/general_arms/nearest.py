@@ -31,6 +31,7 @@ from katana450.maths.kinematics.projection import (
     project,
 )
 from katana450.maths.kinematics.solution import Solution, scaled_jacobian
+from katana450.maths.kinematics.turns import nearest_turn
 
 POSITION_FIRST = 100.0
 """Weight of the position relative to the orientation if a pose cannot be reached."""
@@ -139,8 +140,8 @@ def nearest_posture(
     solutions = kinematics.inverse(T, q_hint)
     usable = [solution for solution in solutions if solution.within_limits or not within_limits]
     exact = [solution for solution in usable if solution.exact]
+    hint = None if q_hint is None else chain.check_q(q_hint)
     if exact:
-        hint = None if q_hint is None else chain.check_q(q_hint)
         best = min(exact, key=lambda solution: _cost(chain, solution.q, hint))
     else:
         if within_limits:
@@ -149,7 +150,8 @@ def nearest_posture(
             usable,
             key=lambda solution: (round(solution.position_error, 6), solution.rotation_error),
         )
-    return projected(chain, best.q, T, best.branch, Priority.POSE, bounded=within_limits)
+    q = nearest_turn(chain, best.q, hint)
+    return projected(chain, q, T, best.branch, Priority.POSE, bounded=within_limits)
 
 
 def _searched(
