@@ -12,6 +12,7 @@ import pytest
 import katana450
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.margins import margins
 from katana450.arm.control.state.messages import sentence
 from katana450.arm.control.state.state import Reason, State, Status
 from katana450.assembly.robot_session import find_robot
@@ -116,6 +117,9 @@ def test_limit_of_the_axis_that_slides_is_a_length(name: str, tmp_path: Path) ->
     assert state.findings[0].reason is Reason.SLIDE_LIMIT
     end = {"rail": "4000.0 mm", "lift": "500.0 mm"}[name]
     assert sentence(state) == f"Axis 1 at its limit of {end}."
+    # Its distance from there is no angle.
+    x = np.append(state.q, 0.0)
+    assert margins(session.require_arm().chain, None, x).axis > 0
 
 
 def test_only_the_first_axis_may_slide(tmp_path: Path) -> None:
@@ -135,6 +139,8 @@ def test_script_moves_the_tool_and_gives_no_lengths_as_angles(tmp_path: Path) ->
     places = forward_batch(session.require_arm().chain, np.array([start.q, *ends]))[:, :3, 3]
     np.testing.assert_allclose(places[1] - places[0], (0.05, 0.0, 0.03), atol=1e-9)
     np.testing.assert_allclose(places[2] - places[1], (0.0, 0.02, 0.0), atol=1e-9)
+    with pytest.raises(ScriptError, match=r"axis 1, .*, over its limit of -1000.0 mm .* %"):
+        compiled(parse("steps:\n  - line: {by: {x: -1900}}\n"), context, start)
     for step in ("joints: [0, 0, -90, -135, 45, -90, 0]", "nudge: {axis: 1, by: 5}"):
         with pytest.raises(ScriptError, match="Axis 1 slides"):
             compiled(parse(f"steps:\n  - {step}\n"), context, start)

@@ -77,6 +77,11 @@ def limit_distances(chain: Chain, q: npt.ArrayLike) -> FloatArray:
     return np.minimum(q - chain.lower, chain.upper - q)
 
 
+def nearest_limit(chain: Chain, distances: FloatArray) -> int:
+    """Return the axis, from 0, of the least of `limit_distances`, of those that are angles."""
+    return int(np.where(chain.slides, math.inf, distances).argmin())
+
+
 def jog(
     chain: Chain,
     q: npt.ArrayLike,

@@ -95,10 +95,11 @@ class Margins(msgspec.Struct, frozen=True, kw_only=True):
     """Distances to joint limits, singularity and contact.
 
     Attributes:
-        limit: Distance of the joint nearest to one of its limits from that limit [rad]; negative
-            beyond it.
+        limit: Distance of the turning joint nearest to one of its limits from that limit [rad];
+            negative beyond it.
         axis: Number of that joint, counted from 1.
-        limits: (n,) Distance of each joint from its nearer limit [rad]; negative beyond it.
+        limits: (n,) Distance of each joint from its nearer limit [rad], or [m] for a joint that
+            slides; negative beyond it.
         smallest_singular_value: Smallest singular value of the Jacobian over the characteristic
             length of the arm [1]; 0 in a singularity.
         condition_number: Largest over smallest singular value [1]; null from 1e6, in a singularity.

@@ -16,7 +16,7 @@ from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.maths.kinematics.velocity import limit_distances
+from katana450.maths.kinematics.velocity import limit_distances, nearest_limit
 from katana450.resources import STATIC
 
 ROWS = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -36,7 +36,7 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
         for name, a, b in zip(ROWS, now, goal, strict=True)
     )
     distances = limit_distances(chain, state.q)
-    nearest = int(distances.argmin())
+    nearest = nearest_limit(chain, distances)
     limit = limit_text(nearest, axis_names(chain.names)[nearest], float(distances[nearest]))
     return (
         f"<div class='k450'><table><thead><tr><th>{escape(state.tool)} in {display.frame_name}</th>"

@@ -8,7 +8,11 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import CollisionWorld
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.velocity import limit_distances, singular_values
+from katana450.maths.kinematics.velocity import (
+    limit_distances,
+    nearest_limit,
+    singular_values,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,19 +21,16 @@ class Margins:
 
     Attributes:
         limits: (n,) the distance of each axis to its nearer limit [rad]; negative beyond it.
+        axis: the axis nearest to one of its limits, counted from 0, of those that turn.
         singular_values: (n,) those of the Jacobian over the characteristic length [1], in falling
             order.
         nearest: the nearest pair of parts; None if contacts are not checked.
     """
 
     limits: FloatArray
+    axis: int
     singular_values: FloatArray
     nearest: Contact | None
-
-    @property
-    def axis(self) -> int:
-        """The axis nearest to one of its limits, counted from 0."""
-        return int(self.limits.argmin())
 
 
 def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margins:
@@ -42,4 +43,5 @@ def margins(chain: Chain, world: CollisionWorld | None, x: FloatArray) -> Margin
     """
     q = x[: chain.n]
     nearest = None if world is None else world.nearest(x)
-    return Margins(limit_distances(chain, q), singular_values(chain, q), nearest)
+    limits = limit_distances(chain, q)
+    return Margins(limits, nearest_limit(chain, limits), singular_values(chain, q), nearest)

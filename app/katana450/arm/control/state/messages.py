@@ -24,6 +24,11 @@ def millimetres(length: float, digits: int = 1) -> str:
     return signed(1e3 * length, digits) + " mm"
 
 
+def joint_unit(*, slides: bool) -> tuple[float, str]:
+    """Return how many units of people one rad or m of a joint has, and their name in scripts."""
+    return (1e3, "mm") if slides else (math.degrees(1.0), "deg")
+
+
 def signed(value: float, digits: int) -> str:
     """Return a number with ``digits`` decimals, a true minus sign and no negative zero."""
     text = f"{abs(value):.{digits}f}"

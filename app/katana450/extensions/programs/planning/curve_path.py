@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from katana450 import tolerances
-from katana450.arm.control.state.messages import axis_names
+from katana450.arm.control.state.messages import axis_names, joint_unit
 from katana450.errors import InputError, PathError
 from katana450.extensions.general_arms.descent import WALL
 from katana450.extensions.general_arms.pose_equations import PoseEquations, RegularPosture
@@ -240,9 +240,10 @@ def limit_refusal(
     if place > 0 and beyond[place, axis] > slack:
         passed = beyond[place, axis] / (beyond[place] - beyond[place - 1])[axis]
         first -= float(passed) * (first - float(sigma[place - 1]))
+    factor, unit = joint_unit(slides=chain.slides[axis])
     return first, (
         f"The path takes axis {axis + 1}, {axis_names(chain.names)[axis]}, over its limit of "
-        f"{np.degrees(limit):.1f} deg {at_place(first)}, by up to {np.degrees(worst):.3g} deg "
+        f"{factor * limit:.1f} {unit} {at_place(first)}, by up to {factor * worst:.3g} {unit} "
         "later on."
     )
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from katana450.arm.control.state.messages import axis_names
+from katana450.arm.control.state.messages import axis_names, joint_unit
 from katana450.errors import BlockedError, InputError, PathError
 from katana450.extensions.programs.language.kinds import XYZ
 from katana450.extensions.programs.language.step_target import ScriptFrame
@@ -185,9 +185,10 @@ def binding(planning: ToolPlanning, nearest: NearestPlace) -> str:
     best, chain, causes = nearest.projection, planning.chain, []
     for axis in _binding_axes(planning, nearest):
         angle, lower, upper = best.q[axis], chain.lower[axis], chain.upper[axis]
-        limit = math.degrees(lower if angle - lower < upper - angle else upper)
+        factor, unit = joint_unit(slides=chain.slides[axis])
+        limit = factor * (lower if angle - lower < upper - angle else upper)
         name = axis_names(chain.names)[axis]
-        causes.append(f"axis {axis + 1}, {name}, is at its limit of {round(limit, 2):g} deg")
+        causes.append(f"axis {axis + 1}, {name}, is at its limit of {round(limit, 2):g} {unit}")
     if best.axis1:
         causes.append("axis 1 is in the way")
     if not causes or best.reach:
