@@ -62,8 +62,8 @@ def test_dimensions_describe_the_chain(name: str) -> None:
         (PUMA_560, "six axes with a spherical wrist"),
         (KR_6, "six axes with a spherical wrist"),
         (reversed_chain(KR_6), "spherical wrist, seen from the tool"),
-        (PANDA, "seven axes with axis 7 as the swivel"),
-        (IIWA_7, "seven axes with axis 3 as the swivel"),
+        (PANDA, "seven axes whose arm angle is set by axis 7"),
+        (IIWA_7, "seven axes whose arm angle is set by axis 3"),
     ],
 )
 def test_closed_form_is_chosen_by_the_axes(chain: Chain, method: str) -> None:

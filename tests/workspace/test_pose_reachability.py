@@ -134,5 +134,5 @@ def test_map_has_fractions(chain: Chain) -> None:
 
 
 def test_map_that_would_take_too_long_is_refused_with_what_to_do() -> None:
-    with pytest.raises(InputError, match=r"would take .*axis 7 as the swivel.*larger voxels"):
+    with pytest.raises(InputError, match=r"would take .*arm angle is set by axis 7.*larger voxels"):
         reachability_map(PANDA, STAND, voxel=0.01)

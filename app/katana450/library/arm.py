@@ -183,7 +183,7 @@ class Arm:
         """Return a solution for each branch of the pose (4, 4), or of poses (N, 4, 4).
 
         In closed form four and five axes have 4 branches, six and seven axes 8. Seven axes take the
-        swivel of each branch with the most room to the limits, or nearest to the hint. Six axes
+        arm angle of each branch with the most room to the limits, or nearest to the hint. Six axes
         with an offset wrist have up to 16 postures: a single pose gets those that exist, and of
         several poses the others are NaN. A numerical solution is one posture inside the limits.
 

@@ -153,7 +153,7 @@ class SevenAxes(GeneralKinematics):
     @property
     def method(self) -> str:
         """The method in words."""
-        return f"closed form for seven axes with axis {self.swivel + 1} as the swivel"
+        return f"closed form for seven axes whose arm angle is set by axis {self.swivel + 1}"
 
     @cached_property
     def branches(self) -> tuple[str, ...]:
