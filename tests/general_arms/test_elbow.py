@@ -162,6 +162,14 @@ def test_elbow_keeps_clear_of_a_ball_beside_it(tmp_path: Path) -> None:
     assert (contact.reason, "ball" in (contact.parts or ())) == (Reason.CONTACT, True)
     assert 0.005 < contact.amount < 0.03
     assert 0.1 < turned(chain, states) < 0.45
+    check_tool_rests(session, states)
+    # A jog that is held there leaves the elbow at rest.
+    held = [states[-1]]
+    for _ in range(20):
+        held.append(run(session, held[-1], [cmd.Jog(UP)]))
+    check_tool_rests(session, held)
+    assert abs(turned(chain, held)) < 0.01
+    assert held[-1].findings[0].reason is Reason.CONTACT
 
 
 def test_turn_that_the_arm_cannot_do_is_refused_with_the_reason() -> None:

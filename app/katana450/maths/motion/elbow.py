@@ -8,13 +8,15 @@ rounding, and all joints keep their proportion.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.motion.arm_angle import at_pose, elbow_path, self_motion
+from katana450.maths.motion.arm_angle import ElbowPath, at_pose, elbow_path, self_motion
 from katana450.maths.motion.limiter import STILL, JointMotion, Limiter, Limits
 
 SPEED_PART, RATE_PART, BEND_PART = 0.9, 0.7, 0.1
@@ -59,22 +61,16 @@ def elbow_moved(
     room = min(ROOM_PART * min(float(path.rooms.min()), path.end), MAX_PATH)
     room = room if room > LEAST_ROOM else 0.0
     with np.errstate(divide="ignore"):
-        speed, acceleration, jerk = (
-            float(np.min(limit / np.abs(path.v)))
-            for limit in (limits.speed, limits.acceleration, limits.jerk)
-        )
+        speed = float(np.min(limits.speed / np.abs(path.v)))
         bend = math.sqrt(BEND_PART * float(np.min(limits.acceleration / np.abs(path.bend))))
     wanted = min(SPEED_PART * speed, bend)
     if path.turn > 0.0:
         wanted, room = min(wanted, abs(rate) / path.turn), min(room, angle / path.turn)
+    along, line = _line(path, limits, now, wanted)
     moves = wanted > STILL and room > 0.0
-    bounds = (-MAX_PATH, MAX_PATH, max(wanted, STILL), RATE_PART * acceleration, RATE_PART * jerk)
-    along = Limiter(Limits(*(np.array((bound,)) for bound in bounds)))
-    present = (0.0, float(now.qd @ path.v), float(now.qdd @ path.v))
-    line = JointMotion(*(np.array((number,)) for number in present))
     line = along.towards(line, np.array((room,)), dt) if moves else along.stop(line, dt)
     length, speed, change = (float(values[0]) for values in (line.q, line.qd, line.qdd))
-    q = at_pose(chain, now.q + length * path.v + 0.5 * length * length * path.bend, T)
+    q = _place(chain, now.q, path, length, T)
     if not chain.within_limits(q):
         return None
     if line.at_rest:
@@ -85,3 +81,56 @@ def elbow_moved(
     if (np.abs(qd) > limits.speed).any() or (np.abs(qdd) > limits.acceleration).any():
         return None
     return JointMotion(frozen(chain.clamp(q)), frozen(qd), frozen(qdd))
+
+
+@dataclass(frozen=True, eq=False)
+class ElbowBrake:
+    """The brake of an elbow that moves while the tool rests, as `Limiter` has that of each joint.
+
+    Attributes:
+        chain: the arm, with seven axes.
+        limits: those of its joints.
+        T: (4, 4) pose of the tool in {S}.
+    """
+
+    chain: Chain
+    limits: Limits
+    T: FloatArray
+
+    def stopping_point(self, now: JointMotion) -> FloatArray:
+        """Return the joint angles (7,) [rad] at which the elbow comes to rest if it brakes now."""
+        return self.stopping_path(now, math.inf, lambda _: 0.0)[-1]
+
+    def stopping_path(
+        self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
+    ) -> list[FloatArray]:
+        """Return places (7,) [rad] on the braking path; see `Limiter.stopping_path`."""
+        path = elbow_path(self.chain, now.q, 1.0)
+        along, line = _line(path, self.limits, now, STILL)
+        end = float(along.stopping_point(line)[0])
+        pieces = max(1, math.ceil(2.0 * length(end * path.v) / longest))
+        ways = (end * k / pieces for k in range(1, pieces + 1))
+        return [now.q, *(_place(self.chain, now.q, path, way, self.T) for way in ways)]
+
+
+def _line(
+    path: ElbowPath, limits: Limits, now: JointMotion, speed: float
+) -> tuple[Limiter, JointMotion]:
+    """Return the limiter of the length of ``path``, and the motion ``now`` on it from 0 on."""
+    with np.errstate(divide="ignore"):
+        acceleration, jerk = (
+            float(np.min(limit / np.abs(path.v))) for limit in (limits.acceleration, limits.jerk)
+        )
+    bounds = (-MAX_PATH, MAX_PATH, max(speed, STILL), RATE_PART * acceleration, RATE_PART * jerk)
+    present = (0.0, float(now.qd @ path.v), float(now.qdd @ path.v))
+    return (
+        Limiter(Limits(*(np.array((bound,)) for bound in bounds))),
+        JointMotion(*(np.array((number,)) for number in present)),
+    )
+
+
+def _place(
+    chain: Chain, q: FloatArray, path: ElbowPath, length: float, T: FloatArray
+) -> FloatArray:
+    """Return the joint angles (7,) [rad] after ``length`` [rad] of ``path`` from `q` (7,)."""
+    return at_pose(chain, q + length * path.v + 0.5 * length * length * path.bend, T)

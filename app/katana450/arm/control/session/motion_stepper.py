@@ -33,7 +33,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.velocity import JogFrame, coasted, jog
-from katana450.maths.motion.elbow import elbow_moved
+from katana450.maths.motion.elbow import ElbowBrake, elbow_moved
 from katana450.maths.motion.limiter import (
     LIMIT_TOLERANCE,
     STILL,
@@ -50,7 +50,7 @@ arm would only come back to where it was."""
 
 
 def met_before_rest(
-    world: CollisionWorld, limiter: Limiter, x: FloatArray, next_motion: JointMotion
+    world: CollisionWorld, limiter: Limiter | ElbowBrake, x: FloatArray, next_motion: JointMotion
 ) -> Contact | None:
     """Return the contact on the path to ``next_motion`` and on to rest; None if it is clear.
 
@@ -193,7 +193,8 @@ class MotionStepper:
         if state.blocked and state.motion.at_rest and self._may_go_on(state):
             state = replace(state, blocked=False)
         # A brake continues to rest: at the edge of the clear path the arm would only quiver.
-        braking = state.blocked and state.jogging is None
+        jogging = state.jogging
+        braking = state.blocked and (jogging is None or jogging.turn is not None)
         next_motion, along = self._brake(state, dt) if braking else self._ahead(state, dt)
         if self._world is None:
             return with_place(replace(state, motion=next_motion, gripper_setpoint=fingers), along)
@@ -401,9 +402,33 @@ class MotionStepper:
     def _brake(self, state: State, dt: float) -> tuple[JointMotion, Following | None]:
         """Return the same step to rest that the tick before found clear."""
         if state.following is None:
-            return self.limiter(state).stop(state.motion, dt), None
+            return self._elbow_braking(state, dt) or self.limiter(state).stop(
+                state.motion, dt
+            ), None
         along = self._follower.braking(state.following, dt)
         return along.motion(), along
+
+    def _elbow_brake(self, state: State) -> ElbowBrake | None:
+        """Return the brake of an elbow that moves while the tool rests; None if it does not."""
+        jogging, tool = state.jogging, self._tool(state)
+        if tool is None or jogging is None or jogging.kept is None:
+            return None
+        return ElbowBrake(tool.chain, self._any.limits, jogging.kept)
+
+    def _elbow_braking(self, state: State, dt: float) -> JointMotion | None:
+        """Return the next motion of an elbow that comes to rest and keeps its tool.
+
+        None without one from which the joints, each by itself, have a clear path to rest.
+        """
+        brake = self._elbow_brake(state)
+        if brake is None:
+            return None
+        moved = elbow_moved(brake.chain, brake.limits, state.motion, brake.T, 0.0, 0.0, dt)
+        if moved is None or self._world is None:
+            return moved
+        x = np.append(state.setpoint, state.gripper_setpoint)
+        contact = met_before_rest(self._world, self.limiter(state), x, moved)
+        return moved if contact is None else None
 
     def _fraction(self, tool: ToolKinematics, state: State) -> float:
         """Return the fraction of the joint speeds at which the tool keeps its limit to the goal."""
@@ -435,7 +460,12 @@ class MotionStepper:
                 return None
             return measured(self._world, contact, np.append(state.setpoint, fingers))
         x = np.append(state.setpoint, fingers)
-        return met_before_rest(self._world, self.limiter(state), x, next_motion)
+        contact = met_before_rest(self._world, self.limiter(state), x, next_motion)
+        brake = self._elbow_brake(state)
+        # The elbow comes to rest with the tool at its pose, and on STOP each joint by itself.
+        if contact is not None or brake is None:
+            return contact
+        return met_before_rest(self._world, brake, x, next_motion)
 
     def _may_go_on(self, state: State) -> bool:
         """Return whether the first part of the path of a waiting arm is clear again."""
