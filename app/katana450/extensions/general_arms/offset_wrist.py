@@ -85,8 +85,8 @@ NEGLIGIBLE_SIZE: Final = 1e-10
 """[1] Relative size of the last coefficients of the polynomial that are left out. An almost
 spherical wrist has small ones, whose zeros are far from the circle."""
 
-EXACT: Final = 5e-13
-"""[rad], [m] Component of the error of a posture up to which it takes the pose."""
+EXACT: Final = 9e-13
+"""[rad], [m] Error of a posture up to which it takes the pose."""
 
 DISTINCT: Final = 1e-6
 """[rad] Difference of two postures from which on they are two."""

@@ -21,6 +21,7 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.descent import Descent, Look, Regularity
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.batch import jacobian_batch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, sin_cos
@@ -101,17 +102,9 @@ class PoseEquations:
 
         An axis has its direction, and the velocity [m/rad] that it gives to the tool point.
         """
-        chain = self.chain
-        axes: list[tuple[FloatArray, FloatArray]] = []
-        T: FloatArray = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-        s, versine = chain.sines(q), 2.0 * np.sin(0.5 * q) ** 2
-        for k, (X, XX) in enumerate(zip(chain.generators, chain.generators_squared, strict=True)):
-            w = T[:, :3, :3] @ chain.S[:3, k]
-            axes.append((w, T[:, :3, :3] @ chain.S[3:, k] + np.cross(T[:, :3, 3], w)))
-            T = T @ (np.eye(4) + s[:, k, None, None] * X + versine[:, k, None, None] * XX)
-        p = (T @ chain.M)[:, :3, 3]
-        moved = [np.concatenate((w, v + np.cross(w, p)), axis=1) for w, v in axes]
-        return np.stack(moved, axis=2)
+        T, J = jacobian_batch(self.chain, q)
+        R = T[:, None, :3, :3]
+        return (R @ J.reshape(len(q), 2, 3, -1)).reshape(J.shape)
 
     def _matrix(self, q: FloatArray) -> FloatArray:
         """Return the matrix (N, m, m) of the equations at `q` (N, n) [rad]; lengths in `length`."""

@@ -245,7 +245,9 @@ class SevenAxes(GeneralKinematics):
         """Yield the joint angles (7,) [rad] of the best swivel of each branch."""
         postures = self._best(T, hint)
         if self.rounding.is_corrected:
-            q = self._refined(np.array([*postures]), np.broadcast_to(T, (8, 4, 4)))
+            poses = np.broadcast_to(T, (8, 4, 4))
+            # With the elbow almost straight, another swivel may take the pose.
+            q = self.rounding.corrected(self._refined(np.array([*postures]), poses), poses)
             postures = map(tuple, self._turned(q.T, hint).T.tolist())
         yield from postures
 

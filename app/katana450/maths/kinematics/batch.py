@@ -75,10 +75,22 @@ def number_array(value: npt.ArrayLike, shape: tuple[int, ...], name: str) -> Flo
     return array.astype(np.float64, copy=False)
 
 
-def forward_columns(chain: Chain, q: FloatArray) -> FloatArray:
+def jacobian_batch(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return T_S_tool (N, 4, 4) and the Jacobian (N, 6, n) of the tool at `q` (N, n), unchecked.
+
+    The Jacobian is in the frame of the tool, as that of `jacobian_body`.
+    """
+    J = np.empty((6, chain.n, len(q)))
+    T = forward_columns(chain, q.T, J)
+    return T.transpose(2, 0, 1), J.transpose(2, 0, 1)
+
+
+def forward_columns(chain: Chain, q: FloatArray, J: FloatArray | None = None) -> FloatArray:
     """Return T_S_tool (4, 4, C) at q (n, C).
 
-    Each factor is exp(hat(S_i) q_i) = I + sin X + (1 - cos) X^2.
+    Each factor is exp(hat(S_i) q_i) = I + sin X + (1 - cos) X^2. Before the factor of a joint, T is
+    the pose of the tool with this joint at the base, where X gives the velocity of the tool point.
+    `J` (6, n, C) takes the Jacobian from there.
     """
     T: FloatArray = np.empty((4, 4, q.shape[1]))
     T[:] = chain.M[:, :, None]
@@ -86,6 +98,9 @@ def forward_columns(chain: Chain, q: FloatArray) -> FloatArray:
         flat = T.reshape(4, -1)
         turned = (chain.generators[i] @ flat).reshape(T.shape)
         twice = (chain.generators_squared[i] @ flat).reshape(T.shape)
+        if J is not None:
+            J[:3, i] = np.einsum("jin,j->in", T[:3, :3], chain.S[:3, i])
+            J[3:, i] = np.einsum("jin,jn->in", T[:3, :3], turned[:3, 3])
         turned *= q[i] if chain.slides[i] else np.sin(q[i])
         twice *= 2.0 * np.sin(0.5 * q[i]) ** 2
         T += turned
