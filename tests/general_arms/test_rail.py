@@ -144,3 +144,15 @@ def test_script_moves_the_tool_and_gives_no_lengths_as_angles(tmp_path: Path) ->
     for step in ("joints: [0, 0, -90, -135, 45, -90, 0]", "nudge: {axis: 1, by: 5}"):
         with pytest.raises(ScriptError, match="Axis 1 slides"):
             compiled(parse(f"steps:\n  - {step}\n"), context, start)
+
+
+def test_continuous_wrist_keeps_the_closed_form(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    name = '<joint name="wrist_3_joint" type='
+    path.write_text(ur5e().replace(f'{name}"revolute"', f'{name}"continuous"'), encoding="utf-8")
+    arm = katana450.load(path)
+    assert "closed form" in arm.method
+    q = arm.ready + 0.1
+    solutions = list(arm.ik(arm.fk(q)))
+    assert len(solutions) == 8
+    assert min(float(np.abs(solution.q - q).max()) for solution in solutions) < 1e-9
