@@ -113,6 +113,11 @@ def test_nudges_are_recorded_one_by_one() -> None:
     ]
 
 
+def test_drag_of_the_ring_at_the_elbow_is_recorded_once() -> None:
+    (turn,) = made(*(command(n / 20, cmd.TurnElbow(0.01)) for n in range(5)))
+    assert (turn["what"]["command"], turn["what"]["by"]) == ("TurnElbow", 0.01)
+
+
 @pytest.mark.parametrize("early", [False, True])
 def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
     """The thread of the link may be quicker than the one that gave the command."""

@@ -206,13 +206,12 @@ class RecordMaker:
 def _stream_key(note: Note, command: Command) -> StreamKey | None:
     """Return what the commands of one stream have in common; None for a single command.
 
-    A slider or a held key sends such commands many times a second.
+    A slider, a held key or a dragged ring sends such commands many times a second.
     """
-    if not all(
-        part.traits.stream or part.traits.passive or not part.traits.while_paused
-        for part in command.parts
-    ):
-        return None
+    for traits in (part.traits for part in command.parts):
+        dragged = traits.stream or (traits.relative and traits.gesture)
+        if not (dragged or traits.passive or not traits.while_paused):
+            return None
     actor = note.actor or SERVER
     subject = tuple(
         (type(part), *(getattr(part, attribute, None) for attribute in SUBJECT))
