@@ -32,8 +32,8 @@ def numbered(count: int) -> list[Record]:
 
 def records(folder: Path) -> list[Record]:
     """Return all records of the log."""
-    found = [line.record for line in lines_of(folder)]
-    return [each for each in found if each is not None]
+    entries = [line.record for line in lines_of(folder)]
+    return [entry for entry in entries if entry is not None]
 
 
 def newest(folder: Path) -> Path:

@@ -68,7 +68,7 @@ def test_lost_records_stand_between_those_before_and_after_them(
     room[0] = 100
     writer.close(requested=True, timeout=CLOSING)
     start, *early, lost, end = records(tmp_path)
-    assert [found["what"]["value"] for found in early] == [0, 1]
+    assert [entry["what"]["value"] for entry in early] == [0, 1]
     assert (start["kind"], lost["what"]["count"], end["kind"]) == ("start", 4, "end")
 
 
@@ -110,7 +110,7 @@ def test_second_writer_of_a_folder_waits_for_the_first(
     first.close(requested=True, timeout=CLOSING)
     # The place is free now.
     second.close(requested=True, timeout=CLOSING)
-    assert [found["kind"] for found in records(tmp_path)] == ["start", "end", "lost", "end"]
+    assert [entry["kind"] for entry in records(tmp_path)] == ["start", "end", "lost", "end"]
 
 
 def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_server_drives_and_stops_while_the_disk_is_full(tmp_path: Path) -> None:
         device.unlink()
         until(lambda: "is written again" in server.output)
         arm.clear_stop()
-    assert {"lost", "clear", "end"} <= {found["kind"] for found in records(folder)}
+    assert {"lost", "clear", "end"} <= {entry["kind"] for entry in records(folder)}
 
 
 @pytest.mark.long

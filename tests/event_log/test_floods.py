@@ -71,10 +71,10 @@ def test_refusals_by_limits_name_their_sender(tmp_path: Path) -> None:
         asyncio.run(many_sockets(server.url, token))
         many_lines(server, token)
         many_requests(server, token)
-    found = [each for each in records(tmp_path / "log") if each["kind"] == "refusal"]
-    told = {(each["what"]["request"], each["who"]["channel"], each["why"]) for each in found}
-    assert ("connection", "websocket", TOO_MANY_SOCKETS) in told
-    assert any(what == "connection" and channel == "TCP" for what, channel, _ in told)
-    assert ("request", "HTTP", TOO_MANY_REQUESTS) in told
-    assert {each["who"]["address"] for each in found} == {"127.0.0.1"}
-    assert {each["who"]["name"].partition(",")[0] for each in found} == {"Vera"}
+    log = [row for row in records(tmp_path / "log") if row["kind"] == "refusal"]
+    refusals = {(row["what"]["request"], row["who"]["channel"], row["why"]) for row in log}
+    assert ("connection", "websocket", TOO_MANY_SOCKETS) in refusals
+    assert any(what == "connection" and channel == "TCP" for what, channel, _ in refusals)
+    assert ("request", "HTTP", TOO_MANY_REQUESTS) in refusals
+    assert {row["who"]["address"] for row in log} == {"127.0.0.1"}
+    assert {row["who"]["name"].partition(",")[0] for row in log} == {"Vera"}

@@ -42,7 +42,7 @@ def test_log_continues_over_files_and_starts(tmp_path: Path) -> None:
     assert len(files) >= 3
     assert files[-1].name == PRESENT
     assert max(path.stat().st_size for path in files) <= 1500
-    values = [found["what"]["value"] for found in records(tmp_path) if found["kind"] == "command"]
+    values = [entry["what"]["value"] for entry in records(tmp_path) if entry["kind"] == "command"]
     assert values == 3 * list(range(10))
 
 
@@ -59,7 +59,7 @@ def test_line_that_a_kill_has_torn_stays_alone(folder: Path) -> None:
         file.write(b'{"kind":"st')
     write(folder, [])
     assert lines(folder)[12] == b'{"kind":"st\n'
-    assert [found["kind"] for found in records(folder)[-3:]] == ["end", "start", "end"]
+    assert [entry["kind"] for entry in records(folder)[-3:]] == ["end", "start", "end"]
 
 
 def test_numbered_files_of_an_earlier_version_are_shown_first(
@@ -74,11 +74,11 @@ def test_numbered_files_of_an_earlier_version_are_shown_first(
     assert shown[0].startswith("2026-01-31T12:00:00.000Z")
 
 
-@pytest.mark.parametrize("each", [*BREAKS, "\ud800", "\udfff\ud800", "😀"])
+@pytest.mark.parametrize("text", [*BREAKS, "\ud800", "\udfff\ud800", "😀"])
 def test_hostile_text_stays_in_its_line(
-    tmp_path: Path, each: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    forged = f'x{each}{{"seq":1}}'
+    forged = f'x{text}{{"seq":1}}'
     write(tmp_path, [record("refusal", {forged: forged}, who={"name": forged}, why=forged)])
     content = newest(tmp_path).read_bytes()
     assert content.count(b"\n") == 3
@@ -92,15 +92,15 @@ def test_hostile_text_stays_in_its_line(
 
 def test_record_of_a_megabyte_is_replaced_by_its_length(tmp_path: Path) -> None:
     write(tmp_path, [record("refusal", {"request": "x" * 1_000_000})])
-    _, found, _ = records(tmp_path)
-    assert found["what"]["omitted_bytes"] > 1_000_000
+    _, entry, _ = records(tmp_path)
+    assert entry["what"]["omitted_bytes"] > 1_000_000
     assert max(map(len, lines(tmp_path))) <= MAX_LINE_BYTES
 
 
 def test_end_that_nobody_requested_is_recorded_as_a_failure(tmp_path: Path) -> None:
     for requested in (True, False):
         DiskLog(tmp_path, 8080).close(requested=requested)
-    causes = [each["what"]["cause"] for each in records(tmp_path) if each["kind"] == "end"]
+    causes = [entry["what"]["cause"] for entry in records(tmp_path) if entry["kind"] == "end"]
     assert causes == ["requested", "the server could not start, or failed"]
 
 

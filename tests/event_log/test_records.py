@@ -57,8 +57,8 @@ def made(*notes: Note, end: float = 1000.0) -> list[Record]:
     return RecordMaker().made(list(notes), end, closing=True)
 
 
-def what(found: list[Record]) -> list[tuple[str, str]]:
-    return [(each["kind"], each["what"]["command"]) for each in found]
+def what(log: list[Record]) -> list[tuple[str, str]]:
+    return [(row["kind"], row["what"]["command"]) for row in log]
 
 
 def test_stream_makes_a_record_of_its_first_command() -> None:
@@ -70,33 +70,33 @@ def test_stream_makes_a_record_of_its_first_command() -> None:
 
 def test_pause_another_joint_and_another_participant_begin_new_streams() -> None:
     later = 0.1 + STREAM_GAP * 1.01
-    found = made(
+    log = made(
         command(0.0, cmd.Joint(1, 0.1)),
         command(0.1, cmd.Joint(1, 0.2)),
         command(0.1, cmd.Joint(2, 0.2)),
         command(later, cmd.Joint(1, 0.3)),
         command(later, cmd.Joint(1, 0.4), actor=BERT),
     )
-    assert what(found) == 4 * [("command", "Joint")]
-    assert [each["what"].get("axis") for each in found] == [1, 2, 1, 1]
+    assert what(log) == 4 * [("command", "Joint")]
+    assert [row["what"].get("axis") for row in log] == [1, 2, 1, 1]
 
 
 def test_stop_ends_a_stream() -> None:
     jogs = [command(n / 10, cmd.Jog(np.array([0.1, 0, 0, 0, 0]))) for n in range(5)]
     stop = Note(0.25, "stop", BERT, {"stop": "pressed"}, always=True)
-    found = made(*jogs[:3], stop, *jogs[3:])
-    assert [each["kind"] for each in found] == ["command", "stop", "command"]
+    log = made(*jogs[:3], stop, *jogs[3:])
+    assert [row["kind"] for row in log] == ["command", "stop", "command"]
 
 
 def test_released_key_ends_the_stream_of_jogs() -> None:
     jogs = [cmd.Jog(np.array([0.1, 0, 0, 0, 0])), cmd.Jog(np.zeros(5))]
-    found = made(*(command(n / 10, each) for n, each in enumerate((*jogs, *jogs))))
-    assert [each["t"] for each in found] == [0.0, 0.2]
+    log = made(*(command(n / 10, jog) for n, jog in enumerate((*jogs, *jogs))))
+    assert [row["t"] for row in log] == [0.0, 0.2]
 
 
 def test_long_stream_makes_records_on_the_way() -> None:
     notes = [command(n / 2, cmd.Servo(np.zeros(5))) for n in range(300)]
-    assert [each["t"] for each in made(*notes)] == [0.0, 60.5, 121.0]
+    assert [row["t"] for row in made(*notes)] == [0.0, 60.5, 121.0]
 
 
 def test_streams_that_have_ended_are_forgotten() -> None:
@@ -107,8 +107,8 @@ def test_streams_that_have_ended_are_forgotten() -> None:
 
 
 def test_nudges_are_recorded_one_by_one() -> None:
-    found = made(*(command(n / 50, cmd.Nudge(3, 0.1 * n)) for n in range(5)))
-    assert [(each["what"]["axis"], each["what"]["by"]) for each in found] == [
+    log = made(*(command(n / 50, cmd.Nudge(3, 0.1 * n)) for n in range(5)))
+    assert [(row["what"]["axis"], row["what"]["by"]) for row in log] == [
         (3, pytest.approx(0.1 * n)) for n in range(5)
     ]
 
@@ -125,8 +125,8 @@ def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
         command(1.0, cmd.Nudge(1, 9.0), 7),
         Note(1.01, "outcome", None, LIMITED, ticket=7),
     ]
-    given, outcome = made(*(notes[::-1] if early else notes))
-    assert given["what"]["ticket"] == outcome["what"]["ticket"] == 7
+    record, outcome = made(*(notes[::-1] if early else notes))
+    assert record["what"]["ticket"] == outcome["what"]["ticket"] == 7
     assert (outcome["who"]["name"], outcome["outcome"]) == ("Anna", "limited")
     assert "Axis 1" in outcome["why"]
 
@@ -134,21 +134,21 @@ def test_outcome_that_is_not_accepted_is_recorded(early: bool) -> None:
 @pytest.mark.parametrize("last", [cmd.EndDrag(), cmd.Jog(np.zeros(5))])
 def test_outcome_after_the_end_of_its_stream_is_recorded(last: Command) -> None:
     jogs = [command(n / 50, cmd.Jog(np.array([0.1, 0, 0, 0, 0])), n + 1) for n in range(5)]
-    found = made(*jogs, command(0.1, last, 6), Note(0.11, "outcome", None, LIMITED, ticket=5))
-    (outcome,) = (each for each in found if each["kind"] == "outcome")
+    log = made(*jogs, command(0.1, last, 6), Note(0.11, "outcome", None, LIMITED, ticket=5))
+    (outcome,) = (row for row in log if row["kind"] == "outcome")
     assert outcome["what"] == {"command": "Jog", "ticket": 5}
     assert (outcome["who"]["name"], outcome["outcome"]) == ("Anna", "limited")
 
 
 def test_participant_is_described_without_its_key() -> None:
-    (found,) = made(command(1.0, cmd.Home()))
-    assert found["who"] == {
+    (record,) = made(command(1.0, cmd.Home()))
+    assert record["who"] == {
         "name": "Anna",
         "role": "operator",
         "channel": "page",
         "address": "10.0.0.7",
     }
-    assert "secret" not in str(found)
+    assert "secret" not in str(record)
 
 
 def test_values_are_bounded_and_without_secrets() -> None:
@@ -157,9 +157,9 @@ def test_values_are_bounded_and_without_secrets() -> None:
     assert content_of(cmd.Tool("x\n" * 500_000))["name"].startswith("x\n" * (MAX_TEXT // 2))
     batch = cmd.Batch(tuple(cmd.Tool("x" * 1000) for _ in range(1000)))
     person = replace(ANNA.person, name="A\n\u2028\x1b[31m\ud800" * 200_000)
-    (found,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
-    assert found["what"]["count"] == 1000
-    assert len(encoded(found)) <= MAX_LINE_BYTES
+    (record,) = made(Note(1.0, "refusal", replace(ANNA, person=person), batch, why="y" * 1_000_000))
+    assert record["what"]["count"] == 1000
+    assert len(encoded(record)) <= MAX_LINE_BYTES
     assert content_of(cmd.Pose(np.eye(4)))["T"] == np.eye(4).ravel().tolist()
 
 
@@ -174,16 +174,16 @@ def test_flood_of_one_participant_is_counted_and_leaves_room_for_others() -> Non
     flood = [Note(n / 1000, "refusal", BERT, {"request": "Home"}) for n in range(20_000)]
     drive = [command(n / 2, cmd.Nudge(1, 0.1)) for n in range(40)]
     maker = RecordMaker()
-    found: list[Record] = []
+    log: list[Record] = []
     for note in sorted((*flood, *drive), key=lambda note: note.t):
-        found += maker.made([note], note.t)
-    found += maker.made([], 1000.0, closing=True)
-    kinds = [each["kind"] for each in found]
+        log += maker.made([note], note.t)
+    log += maker.made([], 1000.0, closing=True)
+    kinds = [row["kind"] for row in log]
     assert kinds.count("command") == 40
     assert kinds.count("refusal") <= LIMITS["refusal"][0] + 20.0 * LIMITS["refusal"][1] + 1
-    more = [each for each in found if each["kind"] == "more"]
+    more = [row for row in log if row["kind"] == "more"]
     assert len(more) <= 3
-    assert sum(each["what"]["count"] for each in more) + kinds.count("refusal") == 20_000
+    assert sum(row["what"]["count"] for row in more) + kinds.count("refusal") == 20_000
     assert list(more[0]["what"]["of"]) == ["Bert: refusal Home"]
 
 
@@ -192,27 +192,27 @@ def test_flood_of_many_strangers_is_counted() -> None:
         replace(BERT, person=Person("", "Somebody", Role.VIEWER, address=f"10.0.{n % 250}.{n}"))
         for n in range(5000)
     ]
-    found = made(*(Note(1.0, "sign-in", each, outcome="refused") for each in people))
-    written = sum(each["kind"] == "sign-in" for each in found)
-    counted = sum(each["what"]["count"] for each in found if each["kind"] == "more")
+    log = made(*(Note(1.0, "sign-in", person, outcome="refused") for person in people))
+    written = sum(row["kind"] == "sign-in" for row in log)
+    counted = sum(row["what"]["count"] for row in log if row["kind"] == "more")
     assert written <= 4 * LIMITS["sign-in"][0]
     assert written + counted == 5000
-    assert len(found) < 1000
+    assert len(log) < 1000
 
 
 def test_first_stop_is_recorded_whatever_came_before() -> None:
     flood = [Note(1.0, "stop", BERT, {"stop": "pressed", "repeated": True}) for _ in range(1000)]
-    found = made(*flood, Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True))
-    assert found[-2]["what"] == {"stop": "pressed"}
-    assert found[-1]["kind"] == "more"
+    log = made(*flood, Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True))
+    assert log[-2]["what"] == {"stop": "pressed"}
+    assert log[-1]["kind"] == "more"
 
 
 def test_only_a_clear_that_follows_a_stop_is_recorded_whatever_came_before() -> None:
     flood = [command(1.0, cmd.ClearStop()) for _ in range(1000)]
     stop = Note(1.0, "stop", BERT, {"stop": "pressed"}, always=True)
-    found = made(*flood, stop, *flood[:2])
-    assert [each["kind"] for each in found[-3:]] == ["stop", "clear", "more"]
-    assert sum(each["kind"] == "clear" for each in found) == LIMITS["clear"][0] + 1
+    log = made(*flood, stop, *flood[:2])
+    assert [row["kind"] for row in log[-3:]] == ["stop", "clear", "more"]
+    assert sum(row["kind"] == "clear" for row in log) == LIMITS["clear"][0] + 1
 
 
 def test_notes_that_nobody_reads_do_not_pile_up() -> None:
@@ -251,11 +251,11 @@ def test_lease_of_a_driver_who_left_is_recorded_as_free(closed: bool) -> None:
         hub.close(people[0], "page")
     hub.recorder.enabled = True
     hub.take(anna)
-    (found,) = made(hub.recorder.notes.get_nowait() or Note(0.0, ""))
-    assert (found["what"]["lease"], found["grounds"]) == (
+    (record,) = made(hub.recorder.notes.get_nowait() or Note(0.0, ""))
+    assert (record["what"]["lease"], record["grounds"]) == (
         ("acquired", "the lease was free") if closed else ("taken", "an admin may take the lease")
     )
-    assert (found["what"]["from"], found["what"]["to"]) == ("Bert", "Anna")
+    assert (record["what"]["from"], record["what"]["to"]) == ("Bert", "Anna")
 
 
 @pytest.mark.long
@@ -268,11 +268,11 @@ def test_flood_of_stops_on_a_server_is_counted(tmp_path: Path) -> None:
             arm.clear_stop()
             arm.ask(requests.Nudge(axis=1, by=0.1))
         server.stop()
-    found = records(tmp_path)
-    stops = [each for each in found if each["kind"] == "stop" and each["who"]["name"] == "Flood"]
-    more = [each for each in found if each["kind"] == "more"]
+    log = records(tmp_path)
+    stops = [row for row in log if row["kind"] == "stop" and row["who"]["name"] == "Flood"]
+    more = [row for row in log if row["kind"] == "more"]
     assert len(stops) < 100
-    assert len(stops) + sum(each["what"]["of"]["Flood: stop"] for each in more) == 400
+    assert len(stops) + sum(row["what"]["of"]["Flood: stop"] for row in more) == 400
     assert "repeated" not in stops[0]["what"]
-    commands = [each["what"]["command"] for each in found if each["kind"] in ("command", "clear")]
+    commands = [row["what"]["command"] for row in log if row["kind"] in ("command", "clear")]
     assert commands == ["Speed", "ClearStop", "Nudge"]

@@ -136,19 +136,19 @@ async def refused(control: Control, do: str) -> None:
     await control.notice("refused")
 
 
-def story(found: list[Record]) -> list[str]:
+def story(log: list[Record]) -> list[str]:
     """Return the records in short: who, channel, kind, content, grounds and outcome."""
     short = []
-    for each in found:
-        who, what = each.get("who", {}), each.get("what", {})
+    for entry in log:
+        who, what = entry.get("who", {}), entry.get("what", {})
         content = " ".join(
             str(what[key])
             for key in ("command", "request", "count", "axis", "by", "value", "lease", "to", "stop")
             if key in what
         )
         content += " ".join(str(what[key]) for key in ("order", "program", "ended") if key in what)
-        parts = (each["kind"], who.get("name"), who.get("channel"), content)
-        rest = (each.get("grounds"), each.get("outcome"))
+        parts = (entry["kind"], who.get("name"), who.get("channel"), content)
+        rest = (entry.get("grounds"), entry.get("outcome"))
         short.append(" | ".join(str(part or "-") for part in (*parts, *rest)))
     return short
 
@@ -217,14 +217,14 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, s
 def test_every_action_is_recorded_once_and_in_order(
     session: tuple[Path, dict[str, str], str],
 ) -> None:
-    found = [each for each in records(session[0]) if each["kind"] not in UNORDERED]
-    assert story(found) == STORY
+    log = [entry for entry in records(session[0]) if entry["kind"] not in UNORDERED]
+    assert story(log) == STORY
 
 
 def test_arrivals_and_departures_are_recorded(session: tuple[Path, dict[str, str], str]) -> None:
-    found = [each for each in records(session[0]) if each["kind"] in ("join", "leave")]
-    joined = [each["who"]["name"] for each in found if each["kind"] == "join"]
-    left = {each["who"]["name"] for each in found if each["kind"] == "leave"}
+    log = [entry for entry in records(session[0]) if entry["kind"] in ("join", "leave")]
+    joined = [entry["who"]["name"] for entry in log if entry["kind"] == "join"]
+    left = {entry["who"]["name"] for entry in log if entry["kind"] == "leave"}
     programs = ["Otto, Script", "Otto, Liner", "Otto, Poster"]
     assert joined == ["Otto", "Vera", "Ada", *programs, "Otto, Poster"]
     # The front end was killed before the others left.
@@ -232,14 +232,14 @@ def test_arrivals_and_departures_are_recorded(session: tuple[Path, dict[str, str
 
 
 def test_values_and_findings_are_recorded(session: tuple[Path, dict[str, str], str]) -> None:
-    found = records(session[0])
-    (drag,) = (each for each in found if each.get("what", {}).get("command") == "Position")
+    log = records(session[0])
+    (drag,) = (entry for entry in log if entry.get("what", {}).get("command") == "Position")
     assert drag["what"]["p"][0] == pytest.approx(0.45)
-    (follow,) = (each for each in found if each.get("what", {}).get("command") == "Follow")
+    (follow,) = (entry for entry in log if entry.get("what", {}).get("command") == "Follow")
     assert 0.1 < follow["what"]["plan"]["seconds"] < 5.0
-    stops = [each for each in found if each.get("what", {}).get("reason") == "stopped"]
+    stops = [entry for entry in log if entry.get("what", {}).get("reason") == "stopped"]
     assert [stop["what"]["began"] for stop in stops[:2]] == [True, False]
-    (restart,) = (each for each in found if each["kind"] == "restart")
+    (restart,) = (entry for entry in log if entry["kind"] == "restart")
     assert restart["what"] == {"process": "katana450 front", "status": -signal.SIGKILL}
 
 
@@ -250,12 +250,12 @@ def test_participants_are_named_by_role_link_and_address(
     (number,) = (
         number for number, grant in AccessFile.open(path).grants.items() if grant.name == "Otto"
     )
-    for each in records(session[0]):
-        who = each.get("who", {})
+    for entry in records(session[0]):
+        who = entry.get("who", {})
         if who.get("name", "").startswith("Otto"):
             assert (who["role"], who["link"], who["address"]) == ("operator", number, "127.0.0.1")
     # The presser on the port of STOP too.
-    stops = [each["who"] for each in records(session[0]) if each["kind"] == "stop"]
+    stops = [entry["who"] for entry in records(session[0]) if entry["kind"] == "stop"]
     assert [(who.get("role"), who["channel"]) for who in stops] == [
         ("viewer", "page"),
         ("viewer", "HTTP"),

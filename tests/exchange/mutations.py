@@ -29,28 +29,28 @@ NUMBERS = [b"nan", b"-1", b"1e999", b"2147483648", b"4294967295", b"9" * 30, b"[
 
 def mutated(data: bytes, chance: random.Random) -> bytes:
     """Return ``data`` with some bytes, pieces or numbers changed, or with its end cut off."""
-    found = bytearray(data)
+    changed = bytearray(data)
     for _ in range(chance.randint(1, 4)):
-        at = chance.randrange(len(found))
-        piece = slice(at, at + chance.randint(1, 40))
+        start = chance.randrange(len(changed))
+        piece = slice(start, start + chance.randint(1, 40))
         match chance.randrange(7):
             case 0:
-                found[at] ^= 1 << chance.randrange(8)
+                changed[start] ^= 1 << chance.randrange(8)
             case 1:
-                found[at] = chance.choice((0, 1, 127, 128, 255))
+                changed[start] = chance.choice((0, 1, 127, 128, 255))
             case 2:
-                del found[at:]
+                del changed[start:]
             case 3:
-                del found[piece]
+                del changed[piece]
             case 4:
-                found[at:at] = found[piece] * chance.choice((1, 1, 1000))
+                changed[start:start] = changed[piece] * chance.choice((1, 1, 1000))
             case 5:
-                found[at : at + 4] = struct.pack("<I", chance.choice((0, 2**31, 2**32 - 1)))
+                changed[start : start + 4] = struct.pack("<I", chance.choice((0, 2**31, 2**32 - 1)))
             case _:
-                found[at : at + chance.randrange(8)] = b" %s " % chance.choice(NUMBERS)
-        if not found:
+                changed[start : start + chance.randrange(8)] = b" %s " % chance.choice(NUMBERS)
+        if not changed:
             break
-    return bytes(found)
+    return bytes(changed)
 
 
 def looked_at(data: bytes, format: Format) -> ShapeFile | None:

@@ -26,7 +26,7 @@ def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.T
     """Return link and mesh of every visual in the root's frame, at the values of all joints."""
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
     urdf.update_cfg({name: joints[name] for name in urdf.actuated_joint_names})
-    found = []
+    meshes = []
     for name, link in urdf.link_map.items():
         for visual in link.visuals:
             shape = visual.geometry
@@ -44,8 +44,8 @@ def placed(path: Path, joints: Mapping[str, float]) -> list[tuple[str, trimesh.T
                 mesh = trimesh.creation.icosphere(subdivisions=3, radius=shape.sphere.radius)
             mesh.apply_transform(np.eye(4) if visual.origin is None else visual.origin)
             mesh.apply_transform(urdf.get_transform(name))
-            found.append((name, mesh))
-    return found
+            meshes.append((name, mesh))
+    return meshes
 
 
 def silhouette(meshes: list[tuple[str, trimesh.Trimesh]], view: InitialCamera) -> Mask:

@@ -31,9 +31,9 @@ def is_closed(shape: ShapeFile) -> bool:
 
 def triangles(vertices: Numbers, faces: npt.NDArray[np.int64], digits: int) -> Counter[object]:
     """Return each triangle by its rounded corners, the smallest corner first."""
-    found: Counter[object] = Counter()
+    counts: Counter[object] = Counter()
     # Adding zero turns -0 into 0.
     for corners in (np.round(vertices[faces], digits) + 0.0).tolist():
         least = corners.index(min(corners))
-        found[str(corners[least:] + corners[:least])] += 1
-    return found
+        counts[str(corners[least:] + corners[:least])] += 1
+    return counts

@@ -58,9 +58,9 @@ class StrictReader(Reader):
 
     def world(self) -> World:
         """Return the content of the file. Raises InputError with the line of an error."""
-        found = self.nodes()
-        nodes = tuple(node for node in found if isinstance(node, Node))
-        if len(nodes) < len(found):
+        content = self.nodes()
+        nodes = tuple(node for node in content if isinstance(node, Node))
+        if len(nodes) < len(content):
             raise self._error("USE is not allowed at the top level")
         return World(nodes)
 

@@ -19,6 +19,7 @@ from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 from katana450.maths.kinematics.solver import inverse
+from katana450.resources import URDF_PATH
 from tests.docs.code_blocks import code_block
 from tests.exchange.conftest import GANTRY_POSE
 from tests.exchange.tools import needs, run
@@ -73,10 +74,10 @@ class Compiled:
         return J
 
     def solutions(self, T: FloatArray, theta1: float = 0.0) -> tuple[int, list[Solution]]:
-        found = (Solution * 4)()
+        solutions = (Solution * 4)()
         T = np.ascontiguousarray(T)
-        count = self._library.robot_ik(_pointer(T), ctypes.c_double(theta1), found)
-        return int(count), list(found)
+        count = self._library.robot_ik(_pointer(T), ctypes.c_double(theta1), solutions)
+        return int(count), list(solutions)
 
     def frames(self, q: FloatArray, links: int) -> FloatArray:
         T = np.empty((links, 4, 4))
@@ -138,17 +139,12 @@ def compare(compiled: Compiled, chain: Chain, poses: int, seed: int) -> dict[str
 
 @needs("gcc")
 @pytest.mark.parametrize("poses", [200, pytest.param(10_000, marks=pytest.mark.long)])
-def test_katana_has_the_same_answers(katana: Robot, katana_in_c: Compiled, poses: int) -> None:
-    worst = compare(katana_in_c, katana.require_arm().chain, poses, 450)
-    assert max(worst.values()) <= SAME
-
-
-@needs("gcc")
-def test_a_real_arm_with_offsets_has_the_same_answers(tmp_path: Path) -> None:
-    """Its axes have both signs, its limits are not symmetric, its tool frame is turned."""
-    robot = load(YOUBOT)
+@pytest.mark.parametrize("path", [URDF_PATH, YOUBOT], ids=lambda path: path.stem)
+def test_an_arm_has_the_same_answers(tmp_path: Path, path: Path, poses: int) -> None:
+    """The axes of the youBot have both signs, and its tool frame is turned."""
+    robot = load(path)
     compiled = Compiled(tmp_path, kinematics_files(robot))
-    assert max(compare(compiled, robot.require_arm().chain, 100, 4).values()) <= SAME
+    assert max(compare(compiled, robot.require_arm().chain, poses, 450).values()) <= SAME
 
 
 @needs("gcc")
@@ -238,10 +234,10 @@ def test_links_have_the_same_poses(
     )
     for robot, compiled, pose in pairs:
         frames = robot.frames(robot.values(pose))
-        found = compiled.frames(np.array(pose), len(robot.links))
+        compiled_frames = compiled.frames(np.array(pose), len(robot.links))
         for number, (link, T) in enumerate(frames.items()):
             assert compiled.link_name(number) == link
-            np.testing.assert_allclose(found[number], T, atol=1e-12, err_msg=link)
+            np.testing.assert_allclose(compiled_frames[number], T, atol=1e-12, err_msg=link)
         assert compiled.link_name(len(robot.links)) is None
 
 
@@ -271,7 +267,7 @@ def test_printed_program_runs(tmp_path: Path, katana: Robot) -> None:
     tool, count, *postures = run(tmp_path / "a.out").splitlines()
     chain = katana.require_arm().chain
     T = forward(chain, (0.0, -1.187, 1.484, 0.14, 0.0))
-    possible = [each for each in inverse(chain, T) if each.exact and each.within_limits]
+    possible = [answer for answer in inverse(chain, T) if answer.exact and answer.within_limits]
     assert tool == "tool at {:.4f} {:.4f} {:.4f} m".format(*T[:3, 3])
     assert (count, len(postures)) == (f"{len(possible)} postures", 4)
 

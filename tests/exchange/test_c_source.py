@@ -75,8 +75,8 @@ def test_clang_and_cmake_build_any_mechanism(tmp_path: Path, gantry: Robot) -> N
 def test_linux_preset_builds_the_kinematics_and_the_viewer(tmp_path: Path, gantry: Robot) -> None:
     folder = written(tmp_path / "c", gantry, GANTRY_POSE)
     presets = json.loads((folder / "CMakePresets.json").read_text())["configurePresets"]
-    windows = [each for each in presets if each["generator"].startswith("Visual Studio")]
-    assert all(each["condition"]["rhs"] == "Windows" for each in windows)
+    windows = [preset for preset in presets if preset["generator"].startswith("Visual Studio")]
+    assert all(preset["condition"]["rhs"] == "Windows" for preset in windows)
     assert len(windows) == 2
     # Those of Windows are read too, and not offered.
     listed = run("cmake", "--list-presets", folder=folder)
@@ -101,10 +101,10 @@ def test_kinematics_build_without_opengl(tmp_path: Path, katana: Robot) -> None:
 def test_it_follows_a_running_server(tmp_path: Path, viewer: Path, katana: Robot) -> None:
     with AppServer((*APP, "--lines", "0")) as server:
         deadline = time.monotonic() + 20.0
-        while not (found := re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)):
+        while not (match := re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)):
             assert time.monotonic() < deadline
             time.sleep(0.05)
-        theirs = seen(shot(viewer, tmp_path / "a.ppm", "--follow", found[1]))
+        theirs = seen(shot(viewer, tmp_path / "a.ppm", "--follow", match[1]))
     ours = silhouette(placed(URDF_PATH, katana.values(Settings.ready)), camera(katana))
     assert overlap(theirs, ours) >= 0.98
 

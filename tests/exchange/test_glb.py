@@ -48,8 +48,8 @@ def test_trimesh_finds_every_link_at_its_place_in_the_urdf(
     assert sum(len(mesh.faces) for mesh in scene.geometry.values()) == sum(
         len(shape.faces) for shape in shapes
     )
-    found = {mesh.visual.material.name for mesh in scene.geometry.values()}
-    assert found == {shape.material.name for shape in shapes}
+    names = {mesh.visual.material.name for mesh in scene.geometry.values()}
+    assert names == {shape.material.name for shape in shapes}
 
 
 def test_colours_and_normals_are_preserved(katana: Robot) -> None:
@@ -114,5 +114,5 @@ def test_validator_of_gltf_finds_nothing(tmp_path: Path, urdf: Path) -> None:
     script = GLTF_VALIDATOR.file
     assert script is not None
     issues = json.loads(run("node", "-e", VALIDATE, script.parent, path))
-    assert {each["code"] for each in issues["messages"]} <= {"NODE_EMPTY"}
+    assert {issue["code"] for issue in issues["messages"]} <= {"NODE_EMPTY"}
     assert issues["numErrors"] == issues["numWarnings"] == 0

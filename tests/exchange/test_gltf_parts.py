@@ -19,7 +19,7 @@ from tests.exchange.test_broken_shapes import glb
 def read(document: dict[str, Any], **files: bytes) -> ShapeFile:
     """Return the shape of a document, with other files of its folder by their names."""
     content = json.dumps(document).encode()
-    others = {name.replace("__", "/").replace("_bin", ".bin"): each for name, each in files.items()}
+    others = {name.replace("__", "/").replace("_bin", ".bin"): part for name, part in files.items()}
     data = packed("a.gltf", {"a.gltf": content} | others)
     return read_shape(data, Format.ZIP, "a.zip")
 

@@ -42,7 +42,7 @@ SEEDS = {
     "colours.obj": OBJ,
     "colours.ply": PAINTED,
     "joint.wrl": f"{HEADER}\n{JOINT} Joint {{ children Joint {{ }} }}".encode(),
-    "robot.zip": packed("robot.wrl", {name: each.encode() for name, each in ARTICULATED.items()}),
+    "robot.zip": packed("robot.wrl", {name: text.encode() for name, text in ARTICULATED.items()}),
     "draco.glb": draco_glb(),
 }
 
@@ -55,11 +55,11 @@ def test_mutated_files_are_read_or_refused(seed: str) -> None:
 @settings(max_examples=MUTATIONS)
 @given(st.sampled_from(Format), st.binary(max_size=200), st.integers(0, 150))
 def test_random_bytes_after_any_header_are_read_or_refused(
-    format: Format, data: bytes, kept: int
+    format: Format, data: bytes, count: int
 ) -> None:
     beginnings = {Format.WRL: "castle.wrl", Format.STL: "vtk.stl", Format.OBJ: "vtk.obj"}
     beginning = beginnings.get(format, "meshlab.ply" if format is Format.PLY else "assimp.glb")
-    looked_at((FOREIGN / beginning).read_bytes()[:kept] + data, format)
+    looked_at((FOREIGN / beginning).read_bytes()[:count] + data, format)
 
 
 def deeply() -> bytes:

@@ -82,16 +82,16 @@ def test_drivable_mechanisms_can_be_exported(tmp_path: Path, seed: int) -> None:
     path = saved(tmp_path, tree(seed))
     robot = load(path)
     values = robot.joint_values(robot.joint_group.upper, 0.0)
-    made = (
+    exports = (
         vrml_files(robot, world_of(robot, values)),
         c_files(robot, values),
         glb_files(robot, values),
         package_files(path),
     )
-    for files in made:
+    for files in exports:
         assert files
         assert all(files.values())
-    world = read_world(made[0]["tree.wrl"].decode())
+    world = read_world(exports[0]["tree.wrl"].decode())
     assert set(robot.joint_group.names) <= set(world.named())
 
 
@@ -104,10 +104,10 @@ def test_arm_with_a_skewed_axis_is_solved_numerically_for_a_reason(tmp_path: Pat
     path = tmp_path / "skewed.urdf"
     path.write_text(before + re.sub(r'<axis xyz="[^"]*"/>', skewed, after, count=1))
     reason = "axis 3 must be parallel to axis 2 and is 12 deg off"
-    found = find_robot(Settings(), path, None)
-    assert found.robot.arm is not None
-    assert f"The kinematics are numerical, because {reason}." in found.notes
-    found.session.check(cmd.Pose(np.eye(4)))
+    described = find_robot(Settings(), path, None)
+    assert described.robot.arm is not None
+    assert f"The kinematics are numerical, because {reason}." in described.notes
+    described.session.check(cmd.Pose(np.eye(4)))
     # Without the extension of such arms only its joints are driven.
     joints = load(path)
     assert joints.arm is None

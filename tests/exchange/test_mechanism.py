@@ -106,8 +106,8 @@ def test_mesh_files_keep_their_colours_and_a_mirror_its_outside(tmp_path: Path) 
     (cart,), (thumb,) = shapes["cart"], shapes["thumb"]
     assert cart.material.colour == pytest.approx((0.8, 0.1, 0.2), abs=0.01)
     assert thumb.material.colour == pytest.approx((0.1, 0.4, 0.7), abs=0.01)
-    made = trimesh.Trimesh(thumb.vertices, thumb.faces, process=False)
-    assert made.volume == pytest.approx(2.0 * box.volume)
+    solid = trimesh.Trimesh(thumb.vertices, thumb.faces, process=False)
+    assert solid.volume == pytest.approx(2.0 * box.volume)
     outward = np.einsum("nk,nk->n", thumb.vertices, thumb.normals)
     assert outward.min() > 0.0
 
@@ -166,5 +166,5 @@ def test_missing_mesh_is_reported(tmp_path: Path) -> None:
 
 
 def test_names_become_identifiers_and_stay_apart() -> None:
-    made = distinct(["a b", "a_b", "A b", "for", "3d", "", "größe", "plain"], {"for"})
-    assert made == ["a_b", "a_b_2", "A_b_3", "for_2", "n3d", "n", "gr__e", "plain"]
+    names = distinct(["a b", "a_b", "A b", "for", "3d", "", "größe", "plain"], {"for"})
+    assert names == ["a_b", "a_b_2", "A_b_3", "for_2", "n3d", "n", "gr__e", "plain"]

@@ -94,9 +94,9 @@ def test_every_link_is_where_our_kinematics_have_it(model: mujoco.MjModel, katan
         set_values(model, data, values)
         frames = katana.frames(values)
         for link, T in frames.items():
-            there = data.site(link) if link in sites(model) else data.body(link)
-            np.testing.assert_allclose(there.xpos, T[:3, 3], atol=1e-9, err_msg=link)
-            np.testing.assert_allclose(there.xmat.reshape(3, 3), T[:3, :3], atol=1e-9)
+            body = data.site(link) if link in sites(model) else data.body(link)
+            np.testing.assert_allclose(body.xpos, T[:3, 3], atol=1e-9, err_msg=link)
+            np.testing.assert_allclose(body.xmat.reshape(3, 3), T[:3, :3], atol=1e-9)
 
 
 def test_surfaces_are_where_ours_are(model: mujoco.MjModel, katana: Robot) -> None:
@@ -230,11 +230,11 @@ def weighed(urdf: str, masses: list[float], efforts: list[float]) -> str:
     """Return ``urdf`` with the masses [kg] of its links with shapes, and efforts [N m]."""
     link, joint = count(), count()
 
-    def inertial(found: re.Match[str]) -> str:
+    def inertial(match: re.Match[str]) -> str:
         mass = masses[next(link)]
         moments = " ".join(f'{name}="{0.01 * mass}"' for name in ("ixx", "iyy", "izz"))
         return (
-            f'{found[0]}<inertial><mass value="{mass}"/>'
+            f'{match[0]}<inertial><mass value="{mass}"/>'
             f'<inertia {moments} ixy="0" ixz="0" iyz="0"/></inertial>'
         )
 

@@ -42,9 +42,9 @@ def test_a_star_in_any_orientation_is_covered_once(
     normal = R[:, 2]
     if turned:
         points, normal = points[::-1].copy(), -normal
-    found = areas(points, normal)
-    assert found.min() > -1e-12
-    assert found.sum() == pytest.approx(shoelace(flat), rel=1e-9)
+    sizes = areas(points, normal)
+    assert sizes.min() > -1e-12
+    assert sizes.sum() == pytest.approx(shoelace(flat), rel=1e-9)
 
 
 def test_a_hole_that_a_bridge_joins_stays_open() -> None:
@@ -52,9 +52,9 @@ def test_a_hole_that_a_bridge_joins_stays_open() -> None:
     hole = [(1, 1), (1, 3), (3, 3), (3, 1)]
     flat = np.array([*outer, outer[0], *hole, hole[0]], dtype=float)
     points = np.column_stack((flat, np.full(len(flat), 2.0)))
-    found = areas(points, np.array((0.0, 0.0, 1.0)))
-    assert found.min() >= 0.0
-    assert found.sum() == pytest.approx(12.0)
+    sizes = areas(points, np.array((0.0, 0.0, 1.0)))
+    assert sizes.min() >= 0.0
+    assert sizes.sum() == pytest.approx(12.0)
 
 
 def test_a_comb_is_covered_once() -> None:
@@ -64,9 +64,9 @@ def test_a_comb_is_covered_once() -> None:
     bottom = np.column_stack((x, np.zeros(2 * teeth)))[::-1]
     flat = np.concatenate((top, bottom))[::-1]
     points = np.column_stack((flat, np.zeros(len(flat))))
-    found = areas(points, np.array((0.0, 0.0, 1.0)))
-    assert found.min() >= 0.0
-    assert found.sum() == pytest.approx(shoelace(flat))
+    sizes = areas(points, np.array((0.0, 0.0, 1.0)))
+    assert sizes.min() >= 0.0
+    assert sizes.sum() == pytest.approx(shoelace(flat))
 
 
 def test_a_polygon_that_crosses_itself_gives_as_many_triangles() -> None:

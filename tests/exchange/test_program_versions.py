@@ -32,7 +32,7 @@ NOT_TESTED = ("MATLAB, Simulink, LabVIEW",)
 
 def rows() -> list[dict[str, str]]:
     """Return the rows of the tables of programs by the names of their columns."""
-    found: list[dict[str, str]] = []
+    table: list[dict[str, str]] = []
     head: list[str] | None = None
     for line in PAGE.splitlines():
         cells = [cell.strip() for cell in line.split("|")[1:-1]]
@@ -41,8 +41,8 @@ def rows() -> list[dict[str, str]]:
         elif not cells:
             head = None
         elif head is not None and "---" not in cells:
-            found.append(dict(zip(head, cells, strict=True)))
-    return found
+            table.append(dict(zip(head, cells, strict=True)))
+    return table
 
 
 def test_every_program_has_a_test() -> None:

@@ -162,7 +162,7 @@ def test_scene_of_a_script_is_read_with_its_meshes(mesh: Mesh, tmp_path: Path) -
     zipfile.ZipFile(io.BytesIO(scene_zip(scene_of(mesh), T_PALM_TOOL))).extractall(tmp_path / "a")
     script.write_text("scene: a/scene.yaml\nsteps: [home]\n", encoding="utf-8")
     back = read_scene_folder(script, T_PALM_TOOL)
-    assert [each.name for each in back.scene.objects] == ["ring", "camera"]
+    assert [scene_object.name for scene_object in back.scene.objects] == ["ring", "camera"]
     assert back.meshes[0].key == mesh.key
     script.write_text("steps: [home]\n", encoding="utf-8")
     with pytest.raises(InputError, match="a script without a `scene`"):

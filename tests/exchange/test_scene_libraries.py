@@ -91,9 +91,9 @@ def exported(folder: Path, pose: tuple[float, ...]) -> Path:
 def test_coin_places_every_triangle(tmp_path: Path, katana: Robot, pose: tuple[float, ...]) -> None:
     """Its pictures stay black without a graphics card, so its triangles are compared."""
     (tmp_path / "triangles.py").write_text(OPENED + TRIANGLES)
-    found = tmp_path / "triangles.bin"
-    run(PYTHON, tmp_path / "triangles.py", exported(tmp_path, pose), found)
-    points = np.fromfile(found).reshape(-1, 3)
+    output = tmp_path / "triangles.bin"
+    run(PYTHON, tmp_path / "triangles.py", exported(tmp_path, pose), output)
+    points = np.fromfile(output).reshape(-1, 3)
     points = np.column_stack((points[:, 0], -points[:, 2], points[:, 1]))
     expected = np.concatenate(
         [mesh.triangles.reshape(-1, 3) for _, mesh in placed(URDF_PATH, katana.values(pose))]
@@ -114,10 +114,10 @@ def test_coin_places_the_tool_and_every_link_by_name(
     links = [link.name for link in katana.links]
     assert {"tcp", "flange"} < set(links)
     printed = run(PYTHON, tmp_path / "places.py", exported(tmp_path, pose), *links)
-    found = json.loads(printed.splitlines()[-1])
+    places = json.loads(printed.splitlines()[-1])
     upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     for link, T in katana.frames(katana.values(pose)).items():
         # Coin multiplies rows by matrices, in single precision.
-        theirs = np.array(found[link]).T
+        theirs = np.array(places[link]).T
         np.testing.assert_allclose(theirs[:3, 3], upright @ T[:3, 3], atol=2e-6, err_msg=link)
         np.testing.assert_allclose(theirs[:3, :3], upright @ T[:3, :3], atol=5e-6, err_msg=link)

@@ -133,10 +133,10 @@ INVALID: list[tuple[Callable[[], bytes], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("made", "said"), INVALID)
-def test_invalid_archives_are_refused(made: Callable[[], bytes], said: str) -> None:
+@pytest.mark.parametrize(("archive", "said"), INVALID)
+def test_invalid_archives_are_refused(archive: Callable[[], bytes], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        read_shape(made(), Format.ZIP, "a.zip")
+        read_shape(archive(), Format.ZIP, "a.zip")
 
 
 def test_a_changed_file_of_a_zip_is_refused() -> None:
@@ -186,17 +186,17 @@ def test_files_of_a_folder_are_bounded(tmp_path: Path) -> None:
 
 def test_files_beyond_the_limit_are_not_read() -> None:
     """Each file alone is small enough; together they would be 9 GB."""
-    names, asked = [f"{number}.wrl" for number in range(450)], []
+    names, reads = [f"{number}.wrl" for number in range(450)], []
 
     def beside(name: str, maximum: int) -> bytes:
-        asked.append((name, maximum))
+        reads.append((name, maximum))
         return bytes(min(8_000_000, maximum + 1))
 
     world = HEADER + "".join(f'\nInline {{ url "{name}" }}' for name in names)
     with pytest.raises(InputError, match="and the files that it names have over 20 MB"):
         read_mesh(world.encode(), "a.wrl", companion=beside)
     left = 20_000_000 - len(world)
-    assert asked == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
+    assert reads == [(names[0], left), (names[1], left - 8_000_000), (names[2], left - 16_000_000)]
 
 
 @pytest.mark.long
@@ -211,9 +211,9 @@ def test_a_scene_keeps_all_files_of_an_object(tmp_path: Path) -> None:
     again = read_scene_zip(scene_zip(stored, None), None)
     assert [mesh.format for mesh in again.meshes] == ["zip"]
     np.testing.assert_array_equal(again.meshes[0].vertices, stored.meshes[0].vertices)
-    beside = zipped({"scene.yaml": text} | {f"meshes/{n}": c for n, c in ARTICULATED.items()})
-    assert len(read_scene_zip(beside, None).meshes[0].faces) == 36
+    archive = zipped({"scene.yaml": text} | {f"meshes/{n}": c for n, c in ARTICULATED.items()})
+    assert len(read_scene_zip(archive, None).meshes[0].faces) == 36
     big = read_mesh(f"{HEADER}\nShape {{ geometry Box {{ size 3000 1 1 }} }}".encode(), "big.wrl")
     scaled = SceneObject("big", Shape.MESH, (), np.eye(4), solid=big.solid, scale=big.scale)
-    kept = read_scene_zip(scene_zip(StoredScene(Scene((scaled,)), (big,)), None), None)
-    assert kept.scene.objects[0].scale == 0.5
+    stored_scene = read_scene_zip(scene_zip(StoredScene(Scene((scaled,)), (big,)), None), None)
+    assert stored_scene.scene.objects[0].scale == 0.5

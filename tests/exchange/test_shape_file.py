@@ -149,8 +149,8 @@ def placed(mechanism: Robot, values: dict[str, float]) -> tuple[Numbers, int]:
         for link in mechanism.links
         for shape in link.shapes
     ]
-    found = np.concatenate(rows).reshape(-1, 9)
-    return found, len(found)
+    corners = np.concatenate(rows).reshape(-1, 9)
+    return corners, len(corners)
 
 
 @pytest.mark.parametrize("which", ["arm", "gantry"])
@@ -295,7 +295,7 @@ def test_gltf_of_2_m_is_placed_and_a_longer_one_with_a_scale() -> None:
 
 
 def test_formats_follow_from_the_suffix() -> None:
-    assert [Format.of(f"a.{each.value.upper()}") for each in Format] == list(Format)
+    assert [Format.of(f"a.{format.value.upper()}") for format in Format] == list(Format)
     assert Format.of("a.b.WRL") is Format.WRL
     for name in ("wrl", "a.step", "a.x3dv", "a", ""):
         with pytest.raises(InputError, match=r"\.wrl, \.stl"):
@@ -305,14 +305,14 @@ def test_formats_follow_from_the_suffix() -> None:
 def test_a_guarded_reading_is_the_same() -> None:
     for file, unit, up in (("castle.wrl", None, Up.Z), ("gmsh.stl", 1e-3, None)):
         data = (FOREIGN / file).read_bytes()
-        here = read_shape(data, Format.of(file), f"-{file}", unit, up)
-        there, body = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
-        assert (there.name, there.unit, there.text) == (here.name, here.unit, here.text)
-        np.testing.assert_array_equal(there.vertices, here.vertices)
-        np.testing.assert_array_equal(there.faces, here.faces)
-        np.testing.assert_array_equal(there.colours, here.colours)
-        assert there.vertices.dtype == np.float64
-        np.testing.assert_array_equal(body.corners, convex_body(here.vertices).corners)
+        shape = read_shape(data, Format.of(file), f"-{file}", unit, up)
+        guarded, body = read_shape_guarded(data, Format.of(file), f"-{file}", unit, up)
+        assert (guarded.name, guarded.unit, guarded.text) == (shape.name, shape.unit, shape.text)
+        np.testing.assert_array_equal(guarded.vertices, shape.vertices)
+        np.testing.assert_array_equal(guarded.faces, shape.faces)
+        np.testing.assert_array_equal(guarded.colours, shape.colours)
+        assert guarded.vertices.dtype == np.float64
+        np.testing.assert_array_equal(body.corners, convex_body(shape.vertices).corners)
 
 
 def test_a_guarded_reading_fails_with_a_message(monkeypatch: pytest.MonkeyPatch) -> None:

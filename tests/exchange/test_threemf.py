@@ -100,8 +100,8 @@ def laughing_archive() -> bytes:
 def bomb() -> bytes:
     """Return an archive that declares a smaller size than it unpacks to."""
     data = bytearray(threemf(files={"big": bytes(50_000_000)}))
-    for at in (data.index(b"big") - 46 + 24, data.rindex(b"big") - 46 + 24):
-        data[at : at + 4] = (100).to_bytes(4, "little")
+    for place in (data.index(b"big") - 46 + 24, data.rindex(b"big") - 46 + 24):
+        data[place : place + 4] = (100).to_bytes(4, "little")
     return bytes(data)
 
 

@@ -35,19 +35,19 @@ def urdf(folder: Path) -> Path:
 
 
 def test_yourdfpy_finds_the_same_robot_in_it(urdf: Path) -> None:
-    there = yourdfpy.URDF.load(str(urdf))
-    here = yourdfpy.URDF.load(str(URDF_PATH))
-    assert set(there.link_map) == set(here.link_map)
-    pose = np.full(len(here.actuated_joint_names), 0.1)
-    for robot in (there, here):
+    packaged = yourdfpy.URDF.load(str(urdf))
+    original = yourdfpy.URDF.load(str(URDF_PATH))
+    assert set(packaged.link_map) == set(original.link_map)
+    pose = np.full(len(original.actuated_joint_names), 0.1)
+    for robot in (packaged, original):
         robot.update_cfg(pose)
     # Coordinates in OBJ are rounded to 0.01 mm.
-    np.testing.assert_allclose(there.scene.bounds, here.scene.bounds, atol=0.51e-5)
-    for link in here.link_map:
-        np.testing.assert_allclose(there.get_transform(link), here.get_transform(link))
-    for name, joint in here.joint_map.items():
-        assert there.joint_map[name].limit == joint.limit
-        assert there.joint_map[name].mimic == joint.mimic
+    np.testing.assert_allclose(packaged.scene.bounds, original.scene.bounds, atol=0.51e-5)
+    for link in original.link_map:
+        np.testing.assert_allclose(packaged.get_transform(link), original.get_transform(link))
+    for name, joint in original.joint_map.items():
+        assert packaged.joint_map[name].limit == joint.limit
+        assert packaged.joint_map[name].mimic == joint.mimic
 
 
 def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
@@ -56,8 +56,8 @@ def test_every_mesh_is_in_the_package_and_of_a_format_that_all_read(
     names = [mesh.get("filename", "") for mesh in ET.parse(urdf).getroot().iter("mesh")]
     files = [name.removeprefix("package://katana450_description/") for name in names]
     assert {Path(file).suffix for file in files} == {".obj"}
-    there = {f"meshes/{path.name}" for path in (folder / "meshes").iterdir()}
-    assert there == {*files, "meshes/materials.mtl"}
+    paths = {f"meshes/{path.name}" for path in (folder / "meshes").iterdir()}
+    assert paths == {*files, "meshes/materials.mtl"}
 
 
 def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Robot) -> None:
@@ -77,17 +77,17 @@ def test_visuals_have_the_surfaces_and_colours_of_the_arm(urdf: Path, katana: Ro
             assert mesh is not None
             assert material is not None
             name = mesh.get("filename", "").rpartition("/")[2]
-            found: Any = trimesh.load_mesh(urdf.parents[1] / "meshes" / name, process=False)
-            assert found.visual.material.name == material.get("name")
+            loaded: Any = trimesh.load_mesh(urdf.parents[1] / "meshes" / name, process=False)
+            assert loaded.visual.material.name == material.get("name")
             np.testing.assert_allclose(
-                found.visual.material.diffuse[:3] / 255.0, shape.material.colour, atol=0.005
+                loaded.visual.material.diffuse[:3] / 255.0, shape.material.colour, atol=0.005
             )
             np.testing.assert_allclose(
                 written[material.get("name")], [*shape.material.colour, 1.0], atol=1e-4
             )
-            assert found.area == pytest.approx(shape.area, rel=2e-3)
+            assert loaded.area == pytest.approx(shape.area, rel=2e-3)
             np.testing.assert_allclose(
-                found.bounds,
+                loaded.bounds,
                 [shape.vertices.min(axis=0), shape.vertices.max(axis=0)],
                 atol=0.51e-5,
             )
@@ -154,8 +154,8 @@ def test_meshes_of_another_robot_keep_their_places_names_and_colours(tmp_path: P
     assert colours == {"red": "1 0 0 1", "red_2": "0 0 1 1", "blue": "0 1 0 1"}
     assert frame.find("inertial/mass[@value='0']") is not None
     assert moving.find("inertial") is None
-    there = yourdfpy.URDF.load(str(path))
-    np.testing.assert_allclose(there.scene.bounds, [[-0.2, -0.2, -0.1], [2.2, 0.2, 1.2]])
+    loaded = yourdfpy.URDF.load(str(path))
+    np.testing.assert_allclose(loaded.scene.bounds, [[-0.2, -0.2, -0.1], [2.2, 0.2, 1.2]])
     assert [mesh.get("filename") for mesh in base.iterfind("collision/geometry/mesh")] == [
         f"package://two_description/meshes/{tmp_path.name}_{name}"
         for name in ("both.obj", "plain.obj")

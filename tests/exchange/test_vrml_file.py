@@ -104,8 +104,8 @@ def test_the_sides_of_solids_can_be_left_out() -> None:
 )
 def test_faces_have_their_colours(fields: str, colours: list[list[int]] | None) -> None:
     shape = shown(SQUARE % fields)
-    found = None if shape.colours is None else shape.colours.tolist()
-    assert (len(shape.faces), found) == (2, colours)
+    shape_colours = None if shape.colours is None else shape.colours.tolist()
+    assert (len(shape.faces), shape_colours) == (2, colours)
 
 
 def test_clockwise_faces_are_turned_over() -> None:

@@ -49,8 +49,8 @@ def nodes(robot: Robot, rules: Session) -> VrmlNodes:
 @pytest.fixture(scope="module")
 def state(rules: Session) -> State:
     cube = SceneObject("left/cube", Shape.BOX, (0.1, 0.1, 0.1), np.eye(4))
-    begun = rules.begin(rules.ready, 0.2, 0.0)
-    return replace(begun, objects=(cube, replace(cube, name="pan link look")))
+    beginning = rules.begin(rules.ready, 0.2, 0.0)
+    return replace(beginning, objects=(cube, replace(cube, name="pan link look")))
 
 
 def setting(node: str, field: str, value: Any) -> requests.FieldSetting:
@@ -163,10 +163,10 @@ def test_setting_a_joint_is_a_motion_command(
 ) -> None:
     command = nodes.command(
         state,
-        [setting(each, "rotation", rotation(each, angle)) for each, angle in wanted.items()],
+        [setting(node, "rotation", rotation(node, angle)) for node, angle in wanted.items()],
     )
     assert isinstance(command, cmd.SetAxes)
-    assert dict(command.values) == {int(each[-1]): angle for each, angle in wanted.items()}
+    assert dict(command.values) == {int(node[-1]): angle for node, angle in wanted.items()}
     # The length of the axis does not matter.
     huge = [setting(n, "rotation", [1e200 * x for x in rotation(n, 0)[:3]] + [a])
             for n, a in wanted.items()]  # fmt: skip
@@ -262,14 +262,14 @@ def test_setting_any_field_gives_a_valid_command_or_a_refusal(
     nodes: VrmlNodes, rules: Session, state: State, changes: list[tuple[str, str, Any]]
 ) -> None:
     try:
-        command = nodes.command(state, [setting(*each) for each in changes])
+        command = nodes.command(state, [setting(*change) for change in changes])
     except InputError:
         return
     rules.check(command)
     after = rules.step(state, [command], 0.01)
     for node in nodes.world(after).nodes:
-        for each in node.fields:
-            assert np.isfinite(np.array(each.value)).all()
+        for field in node.fields:
+            assert np.isfinite(np.array(field.value)).all()
 
 
 def test_held_object_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> None:
@@ -281,10 +281,10 @@ def test_held_object_is_not_moved_by_name(nodes: VrmlNodes, state: State) -> Non
 def test_cup_is_not_moved_by_name_to_where_nothing_carries_it(robot: Robot) -> None:
     session = describe_robot(Settings(), URDF_PATH, None).session
     nodes = VrmlNodes(robot, session.environment)
-    begun = session.begin(session.ready, 0.0, 0.0)
-    nodes.command(begun, [setting("cup", "translation", [0.5, -0.5, 0.0])])
+    state = session.begin(session.ready, 0.0, 0.0)
+    nodes.command(state, [setting("cup", "translation", [0.5, -0.5, 0.0])])
     with pytest.raises(InputError, match="nothing carries it there"):
-        nodes.command(begun, [setting("cup", "translation", [1.5, 0.0, 0.0])])
+        nodes.command(state, [setting("cup", "translation", [1.5, 0.0, 0.0])])
 
 
 def test_arm_without_a_gripper_has_no_names_for_it(robot: Robot) -> None:

@@ -31,7 +31,7 @@ def read(element: ElementTree.Element) -> Element:
 def words(text: str) -> Any:
     """Return the numbers of an attribute, its texts in quotation marks, or itself."""
     if text.startswith('"'):
-        return [re.sub(r"\\(.)", r"\1", found) for found in re.findall(TEXT, text)]
+        return [re.sub(r"\\(.)", r"\1", string) for string in re.findall(TEXT, text)]
     try:
         return [float(word) for word in text.split()]
     except ValueError:

@@ -208,12 +208,12 @@ def main() -> None:
     packages = missing(list(PACKAGES))
     if packages and shutil.which("apt-get") and os.geteuid() == 0:
         install(packages)
-    for fetch, each in (
+    for fetch, tool in (
         *((fetch_npm, package) for package in NPM_PACKAGES),
         *((fetch_wheel, package) for package in WHEELS),
     ):
-        why = "" if each.file else fetch(each)
-        print(f"{each} for the tests:", each.folder if each.file else f"not here; {why}")
+        why = "" if tool.file else fetch(tool)
+        print(f"{tool} for the tests:", tool.folder if tool.file else f"not here; {why}")
     packages = missing(list(PACKAGES))
     print(
         f"Some tests are skipped; on Debian and Ubuntu: apt-get install {' '.join(packages)}"

@@ -66,11 +66,11 @@ class Stage:
         limits = self.plan_context.arm.limits
         q = np.array([state.setpoint for state in states])
         bounds = (limits.speed, limits.acceleration, limits.jerk)
-        found = [
+        ratios = [
             (np.abs(np.diff(q, order, axis=0)) / TICK**order / most).max()
             for order, most in enumerate(bounds, start=1)
         ]
-        return np.array(found)
+        return np.array(ratios)
 
     def play(self, program: Program, state: State, most: int = 5000) -> tuple[Run, list[State]]:
         """Run ``program`` to its end; return the run and all states."""

@@ -32,7 +32,7 @@ class LaggingDriver(SimulatedDriver):
     def _measured(self, sent: DriverAnswer, t: float) -> DriverAnswer:
         self._waiting.append(sent.q)
         due = self._waiting[0]
-        moves = any(not np.array_equal(each, due) for each in self._waiting)
+        moves = any(not np.array_equal(q, due) for q in self._waiting)
         mode = ArmMode.MOVING if moves else ArmMode.HOLDING
         report = ArmReport(mode, t, frozen(np.append(due, sent.gripper)))
         return DriverAnswer(frozen(due + self._offset), sent.gripper, report)

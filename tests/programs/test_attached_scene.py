@@ -113,9 +113,9 @@ def test_files_are_read_from_the_folder_of_the_script_only(tmp_path: Path) -> No
     ],
 )
 def test_script_without_its_scene_keeps_its_lines(text: str) -> None:
-    found = without_scene(text)
-    assert found.count("\n") == text.count("\n")
-    script = parse(found)
+    rest = without_scene(text)
+    assert rest.count("\n") == text.count("\n")
+    script = parse(rest)
     assert (script.scene, script.name, len(script.steps)) == (None, "A", 1)
-    at = text.count("\n", 0, text.index("home")) + 1
-    assert script.steps[0].line == at
+    line = text.count("\n", 0, text.index("home")) + 1
+    assert script.steps[0].line == line

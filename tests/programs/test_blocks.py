@@ -25,12 +25,12 @@ poses:
 
 def waits(script: Script) -> list[float]:
     """Return the durations of the waits of ``script`` [s]."""
-    return [each.step.seconds for each in script.steps if isinstance(each.step, TimedPause)]
+    return [parsed.step.seconds for parsed in script.steps if isinstance(parsed.step, TimedPause)]
 
 
 def test_names_and_units_stand_wherever_a_number_stands() -> None:
     script = parse(f"{HEAD}steps:\n  - move: start\n  - line: {{by: [0, half, -1 cm]}}\n")
-    move, line = (each.step for each in script.steps)
+    move, line = (parsed.step for parsed in script.steps)
     assert isinstance(move, Move)
     assert isinstance(move.to, StepTarget)
     assert move.to.position is not None
@@ -43,7 +43,7 @@ def test_names_and_units_stand_wherever_a_number_stands() -> None:
 
 def test_name_of_a_point_stands_wherever_a_point_stands() -> None:
     script = parse(f"{HEAD}steps:\n  - move: corner\n  - line: {{to: corner}}\n")
-    move, line = (each.step for each in script.steps)
+    move, line = (parsed.step for parsed in script.steps)
     assert isinstance(move, Move)
     assert isinstance(line, Line)
     assert isinstance(move.to, StepTarget)
@@ -81,7 +81,7 @@ steps:
 
 def test_item_of_a_list_is_a_name() -> None:
     script = parse("let: {parts: [cup, basin]}\nsteps:\n  - pick: parts[1]\n")
-    assert [each.step for each in script.steps] == [Pick("basin")]
+    assert [parsed.step for parsed in script.steps] == [Pick("basin")]
 
 
 def test_definition_has_parameters_with_defaults() -> None:
@@ -99,7 +99,7 @@ steps:
 
 def test_steps_have_the_places_of_the_definition() -> None:
     script = parse("define:\n  rest:\n    steps:\n      - wait: 1\nsteps:\n  - call: rest\n")
-    assert [(each.line, each.column) for each in script.steps] == [(4, 9)]
+    assert [(parsed.line, parsed.column) for parsed in script.steps] == [(4, 9)]
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_mistake_is_refused_at_its_place(text: str, line: int, said: str) -> Non
     with pytest.raises(ScriptError) as caught:
         parse(text)
     problems = caught.value.problems
-    assert any(each.line == line and said in each.text for each in problems), problems
+    assert any(problem.line == line and said in problem.text for problem in problems), problems
 
 
 def test_repeated_mistake_is_reported_once() -> None:

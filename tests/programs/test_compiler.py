@@ -25,7 +25,7 @@ def puts(*spots: tuple[str, tuple[float, float]]) -> str:
 
 def stood(stage: Stage, name: str) -> tuple[float, float]:
     """Return the initial place of an object [mm]."""
-    (scene_object,) = (each for each in stage.begin().objects if each.name == name)
+    (scene_object,) = (candidate for candidate in stage.begin().objects if candidate.name == name)
     x, y, _ = (1e3 * scene_object.T[:3, 3]).tolist()
     return x, y
 
@@ -52,8 +52,8 @@ def test_an_object_beyond_the_table_is_refused_before_anything_moves(
 def test_an_object_at_the_edge_of_the_table_is_carried(stage: Stage) -> None:
     program = stage.planned(puts(("cup", (740.0, 690.0))))
     _, states = stage.play(program, stage.begin())
-    at = {each.name: 1e3 * each.T[:2, 3] for each in states[-1].objects}
-    assert at["cup"] == pytest.approx((740.0, 690.0))
+    places = {scene_object.name: 1e3 * scene_object.T[:2, 3] for scene_object in states[-1].objects}
+    assert places["cup"] == pytest.approx((740.0, 690.0))
 
 
 def test_a_repeated_step_is_planned_again_after_objects_have_moved(stage: Stage) -> None:
@@ -76,8 +76,8 @@ def test_planning_reports_each_step_of_both_phases(stage: Stage) -> None:
     stages: list[PlanningStage] = []
     stage.planned(LINES, report=stages.append)
     phases = [(phase, step) for phase in (FINDING, TIMING) for step in range(1, 5)]
-    assert [(each.phase, each.step) for each in stages] == phases
-    fractions = [each.fraction for each in stages]
+    assert [(stage_report.phase, stage_report.step) for stage_report in stages] == phases
+    fractions = [stage_report.fraction for stage_report in stages]
     assert fractions[0] == pytest.approx(0.0)
     assert fractions == sorted(fractions)
     assert fractions[-1] < 1.0
@@ -89,20 +89,20 @@ def test_planning_ends_at_the_next_checkpoint(stage: Stage) -> None:
         reached: list[PlanningStage] = []
 
         def check() -> None:
-            if any(each == (phase, 3, 4) for each in reached):  # noqa: B023
+            if any(progress == (phase, 3, 4) for progress in reached):  # noqa: B023
                 raise CancelledError("enough")
 
         with pytest.raises(CancelledError, match="enough"), checked_by(check):
             stage.planned(LINES, report=reached.append)
         assert reached[-1] == (phase, 3, 4)
     gaps: list[float] = []
-    begun = time.thread_time()
+    start = time.thread_time()
 
     def measure() -> None:
-        nonlocal begun
+        nonlocal start
         now = time.thread_time()
-        gaps.append(now - begun)
-        begun = now
+        gaps.append(now - start)
+        start = now
 
     with checked_by(measure):
         stage.planned(pour_text())

@@ -69,9 +69,9 @@ def stop(stage: Stage, program: Program, run: Run, state: State) -> tuple[Run, S
 
 
 def interruption_of(program: Program, run: Run, state: State) -> Interruption:
-    found = Interruption.of(program, run, state)
-    assert found is not None
-    return found
+    interruption = Interruption.of(program, run, state)
+    assert interruption is not None
+    return interruption
 
 
 def rest_of(stage: Stage, program: Program, run: Run, state: State) -> Program:
@@ -100,8 +100,8 @@ def after_return(rest: Program, states: list[State]) -> list[State]:
         return states
     assert isinstance(way[-1], FollowPlan)
     end = way[-1].plan.end
-    there = next(n for n, each in enumerate(states) if np.abs(each.setpoint - end).max() < 1e-9)
-    return states[there:]
+    first = next(n for n, state in enumerate(states) if np.abs(state.setpoint - end).max() < 1e-9)
+    return states[first:]
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_arm_that_was_moved_returns_to_its_path_first(stage: Stage, program: Pro
     added = rest.tasks[rest.first : rest.first + 2]
     assert [task.name for task in added] == ["move: speed", RETURN]
     # The list of steps keeps their names.
-    assert [each.name for each in steps_of(rest)] == [each.name for each in steps_of(program)]
+    assert [step.name for step in steps_of(rest)] == [step.name for step in steps_of(program)]
     assert rest.tasks[rest.first].number == interruption.task.number
     states = played(stage, rest, state)
     assert off_path(program, states[:1]) > 0.3
@@ -188,7 +188,7 @@ def test_speed_in_force_applies_to_the_rest(stage: Stage, program: Program) -> N
     run, state = stopped_after(stage, program, 60)
     rest = rest_of(stage, program, run, state)
     state = replace(state, speed=0.1)
-    assert {each.speed for each in played(stage, rest, state)[5:]} == {0.8}
+    assert {after.speed for after in played(stage, rest, state)[5:]} == {0.8}
 
 
 @pytest.fixture(scope="module")
@@ -218,7 +218,7 @@ def test_stopped_pour_loses_no_drop_and_is_completed(stage: Stage, pour: Program
     last = states[-1].poured
     assert last is not None
     assert last.water.basin > 0.99 * full
-    assert not any(each.held for each in states[-1].objects)
+    assert not any(scene_object.held for scene_object in states[-1].objects)
 
 
 def test_full_cup_returns_straight_or_not_at_all(stage: Stage, pour: Program) -> None:

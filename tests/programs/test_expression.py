@@ -57,9 +57,9 @@ NAMES = {
     ],
 )
 def test_expression_has_value_and_kind(text: str, value: float, kind: str) -> None:
-    found = evaluate(text, NAMES)
-    assert found.value == pytest.approx(value, rel=1e-12)
-    assert found.kind == kind
+    result = evaluate(text, NAMES)
+    assert result.value == pytest.approx(value, rel=1e-12)
+    assert result.kind == kind
 
 
 @pytest.mark.parametrize(

@@ -132,12 +132,12 @@ def test_list_of_steps_and_timeline_show_the_predicted_alternative(
     stage: Stage, nested: Program, empty: State
 ) -> None:
     steps = steps_of(nested)
-    assert [(each.alternative, each.name) for each in steps] == [
+    assert [(step.alternative, step.name) for step in steps] == [
         ("", "if the water in the cup"), ("then", "nudge"), ("then", "if the water in the cup"),
         ("then", "nudge"), ("", "nudge"),
     ]  # fmt: skip
-    assert [each.predicted for each in steps] == [True, False, False, False, True]
-    assert all(each.seconds > 0.0 for each in steps if each.name == "nudge")
+    assert [step.predicted for step in steps] == [True, False, False, False, True]
+    assert all(step.seconds > 0.0 for step in steps if step.name == "nudge")
     timeline = Timeline.of(nested)
     assert timeline.span == pytest.approx(steps[4].seconds)
     assert current_step(steps, None, 0.5 * timeline.span) == 4
@@ -186,8 +186,8 @@ def test_conditions_are_measured(stage: Stage, empty: State, condition: str, hol
     program = planned(stage, text, empty)
     run, _ = stage.play(program, empty)
     assert run.choices == ((1, holds),)
-    taken = program.tasks[program.schedule[-1].number].action
-    assert taken.fraction(empty, 0.1) == (1.0 if holds else 0.5)
+    action = program.tasks[program.schedule[-1].number].action
+    assert action.fraction(empty, 0.1) == (1.0 if holds else 0.5)
 
 
 @pytest.mark.parametrize(

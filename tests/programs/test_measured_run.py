@@ -106,14 +106,14 @@ def test_arm_that_is_only_late_stays_on_its_path() -> None:
 def test_nearest_points_of_a_circle_are_on_its_radius() -> None:
     plan = planned(TEXT)
     states = run_by_clock(plan).states
-    path = next(path for each in reversed(states) if (path := path_of(each)) is not None)
+    path = next(path for state in reversed(states) if (path := path_of(state)) is not None)
     points = point_derivatives(path, np.linspace(0.0, 1.0, 7))[0]
     centre = points[:-1].mean(axis=0)
     radial = (points - centre) / np.linalg.norm(points - centre, axis=1)[:, None]
     aside = np.array((0.0, 0.003, 0.0))
-    found = nearest_points(path, points + 0.005 * radial + aside)
-    np.testing.assert_allclose(found, points, atol=1e-7)
-    off = np.linalg.norm(points + 0.005 * radial + aside - found, axis=1)
+    nearest = nearest_points(path, points + 0.005 * radial + aside)
+    np.testing.assert_allclose(nearest, points, atol=1e-7)
+    off = np.linalg.norm(points + 0.005 * radial + aside - nearest, axis=1)
     np.testing.assert_allclose(off, np.hypot(0.005, 0.003), rtol=1e-9)
 
 

@@ -36,11 +36,11 @@ Place = tuple[Any, Any]
 def scripts() -> dict[str, str]:
     """Return valid scripts that together have every step."""
     paths = sorted((ROOT / "examples" / "programs").glob("*.yaml"))
-    found = {path.stem: script_text(path) for path in paths}
+    scripts = {path.stem: script_text(path) for path in paths}
     page = (ROOT / "docs" / "programs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
-    found |= {f"docs {n}": block for n, block in enumerate(blocks) if "steps:" in block}
-    return found | {name: script_text(library_file(name)) for name in ("circle", "pour")}
+    scripts |= {f"docs {n}": block for n, block in enumerate(blocks) if "steps:" in block}
+    return scripts | {name: script_text(library_file(name)) for name in ("circle", "pour")}
 
 
 SCRIPTS = scripts()
@@ -58,8 +58,8 @@ def places(value: Any) -> Iterator[Place]:
 def misspelt(random: Random, place: Place) -> None:
     parent, key = place
     if isinstance(parent, dict):
-        at = random.randrange(len(str(key)) + 1)
-        parent[f"{str(key)[:at]}{random.choice('axz_ ')}{str(key)[at:]}"] = parent.pop(key)
+        index = random.randrange(len(str(key)) + 1)
+        parent[f"{str(key)[:index]}{random.choice('axz_ ')}{str(key)[index:]}"] = parent.pop(key)
 
 
 def removed(random: Random, place: Place) -> None:  # noqa: ARG001
@@ -106,11 +106,11 @@ def mistaken(text: str, random: Random) -> str:
 def damaged(text: str, random: Random) -> str:
     """Return the text with some characters lost, doubled or replaced."""
     for _ in range(random.randrange(1, 4)):
-        at = random.randrange(len(text))
+        index = random.randrange(len(text))
         text = (
-            text[:at]
+            text[:index]
             + random.choice(("", ":", "\t", "- ", "[", "}", "\n", "#", "&a ", "*a", "!!x "))
-            + text[at + random.randrange(3) :]
+            + text[index + random.randrange(3) :]
         )
     return text
 

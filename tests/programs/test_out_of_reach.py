@@ -69,14 +69,14 @@ def targets(count: int) -> list[ToolTarget]:
 def test_amount_is_the_distance_to_the_nearest_point(begin: PlanState) -> None:
     stretched = limited = 0
     for target in targets(24):
-        found = AMOUNT.search(said(begin, target))
+        match = AMOUNT.search(said(begin, target))
         by_search = nearest_by_search(begin.chain, target)
-        if found is None:
+        if match is None:
             # Printed with one decimal: what is missed by less is not looked for here.
             continue
-        stretched += "the arm is stretched" in found[2]
-        limited += LIMIT.search(found[2]) is not None
-        assert float(found[1]) == pytest.approx(1e3 * by_search, abs=0.1, rel=2e-3)
+        stretched += "the arm is stretched" in match[2]
+        limited += LIMIT.search(match[2]) is not None
+        assert float(match[1]) == pytest.approx(1e3 * by_search, abs=0.1, rel=2e-3)
     assert min(stretched, limited) >= 3
 
 
@@ -84,9 +84,9 @@ def test_named_axis_binds(begin: PlanState) -> None:
     """Without the limit that is named the place is nearer, and without any other one it is not."""
     chain, named = begin.chain, set()
     for target in targets(40):
-        found = AMOUNT.search(said(begin, target))
-        limits = [] if found is None else LIMIT.findall(found[2])
-        if found is None or len(limits) != 1:
+        match = AMOUNT.search(said(begin, target))
+        limits = [] if match is None else LIMIT.findall(match[2])
+        if match is None or len(limits) != 1:
             continue
         ((number, name, shown),) = limits
         axis = int(number) - 1
@@ -100,9 +100,9 @@ def test_named_axis_binds(begin: PlanState) -> None:
             freed = replace(chain, lower=chain.lower - wider, upper=chain.upper + wider)
             now = nearest_by_search(freed, target)
             if other == axis:
-                assert 1e3 * now < float(found[1]) - 0.1
+                assert 1e3 * now < float(match[1]) - 0.1
             else:
-                assert 1e3 * now == pytest.approx(float(found[1]), abs=0.1, rel=2e-3)
+                assert 1e3 * now == pytest.approx(float(match[1]), abs=0.1, rel=2e-3)
     assert len(named) >= 2
 
 
@@ -112,9 +112,9 @@ def test_roll_beyond_its_limit_is_named(begin: PlanState) -> None:
     why = said(begin, target)
     assert "the roll is 3.5 deg beyond what the arm can have" in why
     assert "axis 5, wrist roll, is at its limit of 171.5 deg" in why
-    found = re.search(r"roll: ([\d.]+)}`", why)
-    assert found is not None
-    assert float(found[1]) == pytest.approx(171.5, abs=0.1)
+    match = re.search(r"roll: ([\d.]+)}`", why)
+    assert match is not None
+    assert float(match[1]) == pytest.approx(171.5, abs=0.1)
 
 
 def refusal(stage: Stage, steps: str, frame: str = "base") -> str:

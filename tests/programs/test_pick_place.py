@@ -27,15 +27,15 @@ NEAR, AT = (240.0, 90.0), (230.0, -120.0)
 
 def box(
     name: str,
-    at: tuple[float, float],
+    xy: tuple[float, float],
     size: tuple[float, ...] = (40.0, 40.0, 60.0),
     *,
     yaw: float = 0.0,
     shape: Shape = Shape.BOX,
 ) -> SceneObject:
     """Return an object that can be held; lengths in mm, the yaw in deg."""
-    T = se3.from_rotation_translation(so3.rotation_z(np.radians(yaw)), 1e-3 * np.array((*at, 0.0)))
-    return SceneObject(name, shape, tuple(1e-3 * each for each in size), T, can_be_held=True)
+    T = se3.from_rotation_translation(so3.rotation_z(np.radians(yaw)), 1e-3 * np.array((*xy, 0.0)))
+    return SceneObject(name, shape, tuple(1e-3 * length for length in size), T, can_be_held=True)
 
 
 def planned(stage: Stage, steps: str, *objects: SceneObject) -> tuple[Program, State]:
@@ -49,7 +49,7 @@ def played(stage: Stage, steps: str, *objects: SceneObject) -> dict[str, SceneOb
     run, states = stage.play(program, start)
     assert run.phase is Phase.DONE
     assert all(not state.findings for state in states[::10])
-    return {each.name: each for each in states[-1].objects}
+    return {scene_object.name: scene_object for scene_object in states[-1].objects}
 
 
 def place(scene_object: SceneObject) -> list[float]:
@@ -177,11 +177,11 @@ def test_low_object_is_held_by_the_fingertips(
     stage: Stage, side: str, size: tuple[float, ...]
 ) -> None:
     """The tips keep their distance from the table, and cover a part of the object's sides."""
-    at, to = (NEAR, AT) if side == "above" else ((340.0, 0.0), (300.0, -120.0))
+    origin, to = (NEAR, AT) if side == "above" else ((340.0, 0.0), (300.0, -120.0))
     steps = (
         f"- pick: {{object: plate, side: {side}}}\n- place: {{at: {{x: {to[0]}, y: {to[1]}}}}}\n"
     )
-    program, start = planned(stage, steps, box("plate", at, size))
+    program, start = planned(stage, steps, box("plate", origin, size))
     run, states = stage.play(program, start)
     assert run.phase is Phase.DONE
     assert not any(state.findings for state in states)

@@ -42,19 +42,19 @@ def in_base(stage: Stage, p: FloatArray) -> FloatArray:
 
 
 def test_line_goes_to_a_named_pose_with_its_pitch(stage: Stage) -> None:
-    found = end(stage, planned(stage, "  - line: {to: above}\n"))
-    assert in_base(stage, found.position) == pytest.approx([320, -40, 200], abs=1e-6)
-    assert np.degrees(found.pitch) == pytest.approx(60.0)
-    assert np.degrees(found.roll) == pytest.approx(0.0, abs=1e-9)
-    found = end(stage, planned(stage, "  - line: {to: above, pitch: 45}\n"))
-    assert np.degrees(found.pitch) == pytest.approx(45.0)
+    target = end(stage, planned(stage, "  - line: {to: above}\n"))
+    assert in_base(stage, target.position) == pytest.approx([320, -40, 200], abs=1e-6)
+    assert np.degrees(target.pitch) == pytest.approx(60.0)
+    assert np.degrees(target.roll) == pytest.approx(0.0, abs=1e-9)
+    target = end(stage, planned(stage, "  - line: {to: above, pitch: 45}\n"))
+    assert np.degrees(target.pitch) == pytest.approx(45.0)
 
 
 def test_named_pose_is_the_centre_of_an_arc(stage: Stage) -> None:
-    found = end(stage, planned(stage, "  - arc: {centre: above, axis: y, angle: 20}\n"))
+    target = end(stage, planned(stage, "  - arc: {centre: above, axis: y, angle: 20}\n"))
     a = np.radians(20.0)
     wanted = [320 - 50 * np.sin(a), -40, 200 - 50 * np.cos(a)]
-    assert in_base(stage, found.position) == pytest.approx(wanted, abs=1e-6)
+    assert in_base(stage, target.position) == pytest.approx(wanted, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -67,9 +67,9 @@ def test_pose_by_joints_is_no_point(step: str) -> None:
 
 
 def test_move_by_is_relative_to_the_present_place(stage: Stage) -> None:
-    found = end(stage, planned(stage, "  - move: {by: {y: 3 cm, z: 20}, pitch: 55}\n"))
-    assert in_base(stage, found.position) == pytest.approx([320, -10, 170], abs=1e-6)
-    assert np.degrees(found.pitch) == pytest.approx(55.0)
+    target = end(stage, planned(stage, "  - move: {by: {y: 3 cm, z: 20}, pitch: 55}\n"))
+    assert in_base(stage, target.position) == pytest.approx([320, -10, 170], abs=1e-6)
+    assert np.degrees(target.pitch) == pytest.approx(55.0)
     with pytest.raises(ScriptError, match="A relative move has no 'x'"):
         parse(f"{HEAD}  - move: {{by: {{y: 3}}, x: 2}}\n")
 

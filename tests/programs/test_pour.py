@@ -48,7 +48,7 @@ def check_poured(stage: Stage, program: Program, room: float = 0.0) -> None:
     assert stage.loads(states).max() <= 1.0 + 1e-6
     chain, q = stage.plan_context.arm.chain, np.array([state.setpoint for state in states])
     assert np.degrees(np.minimum(q - chain.lower, chain.upper - q)).min() >= room
-    (cup,) = (each for each in end.objects if each.name == "cup")
+    (cup,) = (candidate for candidate in end.objects if candidate.name == "cup")
     stood = [t for s in carried for t in s.objects if t.name == "cup" and not t.held][-1]
     assert not cup.held
     np.testing.assert_allclose(cup.T, stood.T, rtol=0, atol=1e-6)

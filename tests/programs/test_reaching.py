@@ -47,9 +47,9 @@ def test_suggested_places_are_reached(begin: PlanState, frame: str) -> None:
     for _ in range(60):
         *p, pitch = np.round(rng.uniform((-600, -600, -300, -90), (700, 600, 600, 90)), 1).tolist()
         why = refusal(begin, frame, tuple(p), pitch)
-        if found := POINT.search(why):
+        if match := POINT.search(why):
             points += 1
-            assert refusal(begin, frame, tuple(map(float, found.groups())), pitch) == ""
+            assert refusal(begin, frame, tuple(map(float, match.groups())), pitch) == ""
         assert not why or f"({p[0]:.1f}, {p[1]:.1f}, {p[2]:.1f}) mm in the {frame} frame" in why
     assert points > 20
 
@@ -66,11 +66,11 @@ def test_path_beyond_a_limit_is_reported_in_the_frame_of_the_script(
     )
     with pytest.raises(ScriptError, match="over its limit") as refused:
         stage.planned(text)
-    found = re.search(r"at \((\S+), (\S+), (\S+)\) mm in (.*?),", str(refused.value))
-    assert found is not None
-    assert found[4] == name
-    assert [float(found[1]), float(found[3])] == pytest.approx([330.0, z], abs=0.1)
-    assert -120.0 < float(found[2]) < 120.0
+    match = re.search(r"at \((\S+), (\S+), (\S+)\) mm in (.*?),", str(refused.value))
+    assert match is not None
+    assert match[4] == name
+    assert [float(match[1]), float(match[3])] == pytest.approx([330.0, z], abs=0.1)
+    assert -120.0 < float(match[2]) < 120.0
 
 
 ABOVE = "frame: base\ntool: tcp\nsteps:\n  - move: {x: 320, y: 0, z: 150, pitch: 60, roll: 0}\n"

@@ -127,9 +127,9 @@ def test_a_pause_stays_on_the_path_and_does_not_count_as_waiting(
 def test_the_timeout_begins_when_the_path_is_blocked(stage: Stage, cleared: bool) -> None:
     script = parse("steps:\n  - joints: [60, -68, 85, 8, 0]")
     program = compiled(script, stage.plan_context, stage.begin(), speed=0.03)
-    at = np.eye(4)
-    at[:2, 3] = 0.5 * np.array((np.cos(0.8), np.sin(0.8)))
-    wall = SceneObject("wall", Shape.BOX, (0.1, 0.1, 0.5), at)
+    T = np.eye(4)
+    T[:2, 3] = 0.5 * np.array((np.cos(0.8), np.sin(0.8)))
+    wall = SceneObject("wall", Shape.BOX, (0.1, 0.1, 0.5), T)
     state = stage.session.step(stage.begin(), [cmd.PlaceObject(wall)], 0.01)
     run, stood = Run(state.t), 0.0
     while stood < 0.9 * ACTION_TIMEOUT:
@@ -172,7 +172,7 @@ def test_time_left_never_rises_while_a_command_is_on_its_way(
         left.append(runner.seconds_left(program, run, before))
     assert max(b - a for a, b in pairwise(left)) < 1e-6
     # One clock for preview, list and bar. Each task begins a tick after the one before.
-    listed = sum(each.seconds for each in steps_of(program))
+    listed = sum(step.seconds for step in steps_of(program))
     assert left[0] == pytest.approx(program.duration) == listed
     assert left[0] == pytest.approx(state.t, abs=0.03 * len(program.tasks))
 

@@ -46,15 +46,15 @@ def scene() -> ScriptScene:
 
 
 @pytest.fixture(scope="module")
-def begun(stage: Stage, scene: ScriptScene) -> State:
+def beginning(stage: Stage, scene: ScriptScene) -> State:
     return scene.begin(stage.session)
 
 
-def test_scene_of_a_file_begins_with_its_joints_and_water(begun: State) -> None:
-    assert [each.name for each in begun.objects] == ["post", "cup"]
-    assert np.degrees(begun.setpoint[0]) == pytest.approx(10.0)
-    assert begun.poured is not None
-    assert begun.poured.water.cup.volume / MILLILITRE == pytest.approx(50.0)
+def test_scene_of_a_file_begins_with_its_joints_and_water(beginning: State) -> None:
+    assert [scene_object.name for scene_object in beginning.objects] == ["post", "cup"]
+    assert np.degrees(beginning.setpoint[0]) == pytest.approx(10.0)
+    assert beginning.poured is not None
+    assert beginning.poured.water.cup.volume / MILLILITRE == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(
@@ -83,10 +83,10 @@ def test_simulation_uses_the_scene_of_the_script() -> None:
     assert refused.value.problems[0].line == 6
 
 
-def test_present_scene_is_accepted(stage: Stage, scene: ScriptScene, begun: State) -> None:
-    scene.check_present(stage.session, begun)
+def test_present_scene_is_accepted(stage: Stage, scene: ScriptScene, beginning: State) -> None:
+    scene.check_present(stage.session, beginning)
     elsewhere = stage.session.begin(stage.session.ready, 0.5, 0.0)
-    elsewhere = replace(elsewhere, objects=begun.objects, poured=begun.poured)
+    elsewhere = replace(elsewhere, objects=beginning.objects, poured=beginning.poured)
     scene.check_present(stage.session, elsewhere)
 
 
@@ -115,18 +115,18 @@ def test_first_difference_is_named(
     assert refused.value.problems[0].line == 1
 
 
-def test_held_object_is_a_difference(stage: Stage, scene: ScriptScene, begun: State) -> None:
-    post, cup = begun.objects
-    present = replace(begun, objects=(post, replace(cup, held=True)))
+def test_held_object_is_a_difference(stage: Stage, scene: ScriptScene, beginning: State) -> None:
+    post, cup = beginning.objects
+    present = replace(beginning, objects=(post, replace(cup, held=True)))
     with pytest.raises(ScriptError, match="cup is in the hand"):
         scene.check_present(stage.session, present)
 
 
-def test_meshes_are_compared_without_their_forms(stage: Stage, begun: State) -> None:
+def test_meshes_are_compared_without_their_forms(stage: Stage, beginning: State) -> None:
     mesh = f"{{name: cup, shape: mesh, mesh: {{file: a.stl}}, {AT}}}"
     scene = scene_of(f"scene: [{mesh}]\n{STEPS}")
     with pytest.raises(ScriptError, match="cup has another shape or size"):
-        scene.check_present(stage.session, begun)
+        scene.check_present(stage.session, beginning)
     with pytest.raises(ScriptError, match="cup is a mesh, whose file is not read here") as refused:
         scene.begin(stage.session)
     assert refused.value.problems[0].line == 1

@@ -55,8 +55,8 @@ def known_fields(text: str, name: str = "zzz") -> set[str]:
     with pytest.raises(ScriptError) as refused:
         parse(text)
     for problem in refused.value.problems:
-        if found := re.search(rf"has no '{name}'; it may have (.*)\.", problem.text):
-            return set(found[1].split(", "))
+        if match := re.search(rf"has no '{name}'; it may have (.*)\.", problem.text):
+            return set(match[1].split(", "))
     raise AssertionError(refused.value.problems)
 
 
@@ -88,11 +88,11 @@ def test_schema_has_every_field_of_a_script_and_every_step() -> None:
         parse(f"steps: [{name}]")
 
 
-@pytest.mark.parametrize("name", [each for each in STEP_VALUES if mappings(STEP_VALUES[each])])
+@pytest.mark.parametrize("name", [step for step in STEP_VALUES if mappings(STEP_VALUES[step])])
 def test_schema_has_every_field_of_a_step(name: str) -> None:
     *_, properties = mappings(STEP_VALUES[name])
-    given = "by: [1, 2, 3], " if name == "move" else ""
-    assert known_fields(f"steps:\n  - {name}: {{{given}zzz: 1}}") == set(properties)
+    motion = "by: [1, 2, 3], " if name == "move" else ""
+    assert known_fields(f"steps:\n  - {name}: {{{motion}zzz: 1}}") == set(properties)
 
 
 def test_schema_has_every_field_of_a_place() -> None:

@@ -35,11 +35,11 @@ steps:
 
 
 def test_a_script_of_poses_is_read_as_poses() -> None:
-    found = taught(parse(TAUGHT))
-    assert found is not None
-    assert (found.name, found.times) == ("Shown", 3)
+    teaching = taught(parse(TAUGHT))
+    assert teaching is not None
+    assert (teaching.name, teaching.times) == ("Shown", 3)
     rest = (-68.0, 85.0, 8.0, 0.0)
-    assert found.poses == (
+    assert teaching.poses == (
         TaughtPose((10.0, *rest), 0.5, gripper=3.0, wait=1.5),
         TaughtPose((20.0, *rest), 0.5, blend=True),
         TaughtPose((30.0, *rest), 0.5),
@@ -78,9 +78,9 @@ def test_poses_of_a_partial_repetition_are_written_out() -> None:
         "steps:\n  - repeat: {times: 2, steps: [{joints: [1, 0, 0, 0, 0]}]}\n"
         "  - joints: [2, 0, 0, 0, 0]\n"
     )
-    found = taught(parse(text))
-    assert found is not None
-    assert (found.times, [pose.joints[0] for pose in found.poses]) == (1, [1.0, 1.0, 2.0])
+    teaching = taught(parse(text))
+    assert teaching is not None
+    assert (teaching.times, [pose.joints[0] for pose in teaching.poses]) == (1, [1.0, 1.0, 2.0])
 
 
 def test_a_saved_script_is_listed(tmp_path: Path) -> None:

@@ -26,11 +26,11 @@ def poured(stage: Stage) -> tuple[Program, Timeline, list[Moment]]:
 def test_moments_are_on_the_clock_of_the_plans(
     poured: tuple[Program, Timeline, list[Moment]],
 ) -> None:
-    program, timeline, found = poured
+    program, timeline, moments = poured
     assert timeline.span == pytest.approx(program.duration)
-    assert [moment.t for moment in found] == sorted(moment.t for moment in found)
-    assert found[-1].t == pytest.approx(timeline.span)
-    for moment in found:
+    assert [moment.t for moment in moments] == sorted(moment.t for moment in moments)
+    assert moments[-1].t == pytest.approx(timeline.span)
+    for moment in moments:
         # At full speed and 20 ms between the states; the pour itself is slower.
         np.testing.assert_allclose(timeline.at(moment.t)[0], moment.state.q, rtol=0, atol=5e-3)
 
@@ -38,12 +38,12 @@ def test_moments_are_on_the_clock_of_the_plans(
 def test_cup_is_carried_and_emptied(
     stage: Stage, poured: tuple[Program, Timeline, list[Moment]]
 ) -> None:
-    _, timeline, found = poured
-    carried = [moment.t for moment in found if any(each.held for each in moment.state.objects)]
+    _, timeline, moments = poured
+    carried = [moment.t for moment in moments if any(o.held for o in moment.state.objects)]
     assert 0.1 * timeline.span < carried[0] < carried[-1] < timeline.span
     levels = [
         (moment.state.poured.water.cup.volume, moment.state.poured.water.basin)
-        for moment in found
+        for moment in moments
         if moment.state.poured is not None
     ]
     assert levels[0][0] == pytest.approx(200 * MILLILITRE, abs=1)
@@ -52,10 +52,10 @@ def test_cup_is_carried_and_emptied(
     assert levels[0][0] - MILLILITRE < levels[-1][1] < levels[0][0]
     assert all(before[1] <= after[1] for before, after in pairwise(levels))
     # The cup is in the hand wherever it is held.
-    for moment in found:
-        for each in moment.state.objects:
-            if each.held:
-                T = stage.session.environment.pose(each, moment.state.x)
+    for moment in moments:
+        for scene_object in moment.state.objects:
+            if scene_object.held:
+                T = stage.session.environment.pose(scene_object, moment.state.x)
                 assert np.linalg.norm(T[:3, 3]) > 0.2
                 assert T[2, 3] > -1e-3
 

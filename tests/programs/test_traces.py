@@ -38,10 +38,10 @@ def server() -> Iterator[viser.ViserServer]:
 def test_trace_follows_the_arc(server: viser.ViserServer, arm: MountedArm) -> None:
     session = Session(arm, np.array(Settings().ready))
     state = session.begin(session.ready, 0.0, 0.0)
-    at = ToolTarget.at(arm.chain, session.ready)
-    centre = at.position - (0.0, 0.0, 0.05)
-    arc = ToolArc(at.position, centre, np.array((1.0, 0.0, 0.0)), math.tau,
-                  Linear(at.pitch, at.pitch), Linear(0.0, 0.0))  # fmt: skip
+    target = ToolTarget.at(arm.chain, session.ready)
+    centre = target.position - (0.0, 0.0, 0.05)
+    arc = ToolArc(target.position, centre, np.array((1.0, 0.0, 0.0)), math.tau,
+                  Linear(target.pitch, target.pitch), Linear(0.0, 0.0))  # fmt: skip
     path = ToolPath(arm.chain, arc, branch_of(arm.chain, session.ready), session.ready)
     traces = Traces(server, arm)
     traced = traces._traced
@@ -80,5 +80,5 @@ def test_trace_follows_the_arc(server: viser.ViserServer, arm: MountedArm) -> No
 
 
 def test_errors_have_their_colours() -> None:
-    found = coloured(np.array((0.0, WORST_ERROR, 5.0 * WORST_ERROR)))
-    assert found.tolist() == [GOOD_COLOUR.tolist(), BAD_COLOUR.tolist(), BAD_COLOUR.tolist()]
+    colours = coloured(np.array((0.0, WORST_ERROR, 5.0 * WORST_ERROR)))
+    assert colours.tolist() == [GOOD_COLOUR.tolist(), BAD_COLOUR.tolist(), BAD_COLOUR.tolist()]

@@ -52,7 +52,7 @@ def swing(seconds: float, amplitude: float = 10.0) -> list[list[float]]:
 
 def plan_of(program: Program) -> tuple[TrajectoryPath, float]:
     """Return the trajectory, and the time [s] at full speed without the ramps."""
-    plans = [each.action.plan for each in program.tasks if isinstance(each.action, FollowPlan)]
+    plans = [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
     segment = plans[-1].segments[0]
     assert isinstance(segment.path, TrajectoryPath)
     return segment.path, segment.scaling.span
@@ -67,7 +67,7 @@ def test_spline_passes_its_values_smoothly(steps: list[float], seed: int) -> Non
     np.testing.assert_allclose(spline.values_at(times), values, atol=1e-9)
     for t in times[1:-1]:
         before, after = (
-            [each.derivatives() for each in spline.at(Jet.variable(float((t + side) / times[-1])))]
+            [jet.derivatives() for jet in spline.at(Jet.variable(float((t + side) / times[-1])))]
             for side in (-1e-9, 1e-9)
         )
         for one, other in zip(before, after, strict=True):
@@ -167,15 +167,15 @@ def test_stopped_trajectory_continues_on_its_path(stage: Stage) -> None:
     rest = rest_of(stage, program, run, state)
     states = played(stage, rest, state)
     np.testing.assert_allclose(states[-1].setpoint, path.end, atol=1e-9)
-    assert np.degrees(max(each.setpoint[0] for each in states)) == pytest.approx(30.0, abs=0.05)
+    assert np.degrees(max(state.setpoint[0] for state in states)) == pytest.approx(30.0, abs=0.05)
     assert off_path(rest, after_return(rest, states)) < 5e-3
 
 
 def test_contact_is_refused_with_its_time_and_the_parts(stage: Stage) -> None:
     rows = [[100.0 + t, *angles] for t, *angles in swing(4.0, 40.0)]
-    there = np.radians((40.0, *READY[1:]))
+    q = np.radians((40.0, *READY[1:]))
     with pytest.raises(ScriptError) as caught:
-        stage.planned(script(rows), with_box(stage, there))
+        stage.planned(script(rows), with_box(stage, q))
     text = str(caught.value)
     assert "line 2" in text
     assert " and box would " in text

@@ -80,8 +80,8 @@ def test_half_of_the_cup_is_poured_into_a_glass_and_all_into_the_basin(stage: St
     assert stage.session.pouring is not None
     margins = [stage.session.pouring.margin_to_rim(s.poured, s.objects) for s in full if s.poured]
     assert min(margins[:-50]) > 0.0
-    (there,) = (each for each in states[-1].objects if each.name == "glass")
-    np.testing.assert_allclose(there.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-6)
+    (poured,) = (vessel for vessel in states[-1].objects if vessel.name == "glass")
+    np.testing.assert_allclose(poured.T[:3, 3], (0.42, 0.04, 0.0), atol=1e-6)
 
 
 @pytest.mark.cases(1)
@@ -133,19 +133,19 @@ def test_vessels_come_and_go_with_their_water(stage: Stage) -> None:
     for command in (cmd.Fill(100.0), cmd.PlaceObject(glass(0)), cmd.PlaceObject(glass(1))):
         state = session.step(state, [command], state.t + 0.01)
     assert state.poured is not None
-    assert [each.name for each in state.poured.water.vessels] == ["cup", "glass 0", "glass 1"]
+    assert [vessel.name for vessel in state.poured.water.vessels] == ["cup", "glass 0", "glass 1"]
     again = session.step(state, [], state.t + 0.01)
     assert again.poured is state.poured
-    gone = session.step(state, [cmd.Remove("glass 0")], state.t + 0.01)
-    assert gone.poured is not None
-    assert [each.name for each in gone.poured.water.vessels] == ["cup", "glass 1"]
-    assert gone.poured.water.total == state.poured.water.total
+    removed = session.step(state, [cmd.Remove("glass 0")], state.t + 0.01)
+    assert removed.poured is not None
+    assert [vessel.name for vessel in removed.poured.water.vessels] == ["cup", "glass 1"]
+    assert removed.poured.water.total == state.poured.water.total
     assert session.step(state, [cmd.Remove("cup")], state.t + 0.01).poured is None
 
 
 def test_scene_has_few_vessels(stage: Stage) -> None:
     state = stage.begin()
-    cup = tuple(each for each in state.objects if is_vessel(each))
+    cup = tuple(scene_object for scene_object in state.objects if is_vessel(scene_object))
     some = tuple(map(glass, range(MAX_VESSELS - 1)))
     stage.session.check(cmd.ReplaceScene((*cup, *some), 1e-4))
     with pytest.raises(InputError, match=f"at most {MAX_VESSELS} vessels with the cup"):
