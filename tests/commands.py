@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -51,3 +52,10 @@ def output(
     done = completed(command, cwd=cwd, text=text, env=env, seconds=seconds)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def modules_after(code: str, cwd: Path = ROOT) -> set[str]:
+    """Return the names of all modules that a fresh process has loaded after ``code``."""
+    return set(
+        output([sys.executable, "-c", f"{code}; import sys; print(*sys.modules)"], cwd=cwd).split()
+    )

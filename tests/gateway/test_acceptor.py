@@ -7,7 +7,6 @@ import errno
 import json
 import logging
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Iterator
@@ -39,6 +38,7 @@ from katana450.server.web.limits import ConnectionLimit
 from katana450.server.web.listen import WANTED_DESCRIPTORS, listen
 from katana450.server.web.program_socket import ProgramChannel
 from katana450.settings import Settings
+from tests.commands import completed, modules_after
 from tests.gateway.client import HOUR, Control, ask, enter, page_name, websocket
 from tests.gateway.virtual import VirtualServer
 
@@ -231,9 +231,7 @@ def test_descriptor_limit_is_raised_as_far_as_the_system_allows(soft: int, hard:
         "raise_descriptor_limit()\n"
         "print(resource.getrlimit(resource.RLIMIT_NOFILE)[0])\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
-    )
+    done = completed([sys.executable, "-c", program])
     assert int(done.stdout) == min(hard, WANTED_DESCRIPTORS)
     assert ("Raise the limit to" in done.stderr) == (hard < 1024)
 
@@ -456,11 +454,5 @@ def test_requests_for_other_hosts_are_refused_at_once(web: WebServer) -> None:
 
 
 def test_pages_need_neither_numpy_nor_viser() -> None:
-    code = (
-        "import sys, katana450.assembly.web_server\n"
-        "print(*sorted({'numpy', 'viser', 'trimesh'} & set(sys.modules)))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
-    )
-    assert not done.stdout.strip()
+    loaded = modules_after("import katana450.assembly.web_server")
+    assert not loaded & {"numpy", "viser", "trimesh"}

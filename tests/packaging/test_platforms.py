@@ -20,6 +20,7 @@ import pytest
 
 import katana450
 from katana450 import platform_support
+from tests.commands import output
 
 APP = Path(katana450.__file__).parent
 ALLOWED = {
@@ -168,9 +169,7 @@ def test_process_that_was_started_by_nice_keeps_its_priority() -> None:
         "import os; from katana450.platform_support import reset_priority; os.nice(5); "
         "os.geteuid() or os.setuid(65534); reset_priority(); print(os.getpriority(0, 0))"
     )
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
-    assert int(done.stdout) > 0
+    assert int(output([sys.executable, "-c", program])) > 0
 
 
 @pytest.mark.skipif(
@@ -182,9 +181,7 @@ def test_thread_keeps_its_priority_where_none_is_allowed() -> None:
         "resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0)); os.geteuid() or os.setuid(65534); "
         "prefer_thread(); print(os.sched_getscheduler(0) == os.SCHED_OTHER)"
     )
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout == "True\n"
+    assert output([sys.executable, "-c", program]) == "True\n"
 
 
 @pytest.mark.skipif(

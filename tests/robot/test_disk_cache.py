@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -29,6 +28,7 @@ from katana450.resources import URDF_PATH
 from katana450.server.view.scene import surface
 from katana450.server.view.scene_objects import _merged
 from katana450.server.viser_bridge import viser_page
+from tests.commands import modules_after
 
 
 class Made:
@@ -213,24 +213,10 @@ def test_folder_that_is_read_only_changes_nothing(folder: Path) -> None:
     assert kept(Made(), float, b"a") == 1.0
 
 
-RUN = """
-import sys
-from katana450.arm.robot.collision import world_of
-from katana450.arm.robot.loader import load
-robot = load()
-world_of(robot)
-print("trimesh" in sys.modules)
-"""
-
-
 @pytest.mark.usefixtures("folder")
 def test_robot_that_was_read_before_needs_no_trimesh() -> None:
-    needed = []
-    for _ in range(2):
-        run = [sys.executable, "-c", RUN]
-        done = subprocess.run(run, capture_output=True, text=True, check=True, timeout=60)
-        needed.append(done.stdout.strip())
-    assert needed == ["True", "False"]
+    read = "from katana450.arm.robot import collision, loader; collision.world_of(loader.load())"
+    assert ["trimesh" in modules_after(read) for _ in range(2)] == [True, False]
 
 
 @pytest.mark.usefixtures("folder")

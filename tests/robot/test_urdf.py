@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from katana450.arm.robot.urdf import Urdf, urdf_of
 from katana450.arm.robot.visual import GREY
 from katana450.errors import RobotDescriptionError
 from katana450.settings import Settings
+from tests.commands import modules_after, output
 from tests.robot.public_arms import PX150, J, urdf, written
 
 ARMS = Path(__file__).parent / "arms"
@@ -71,15 +71,9 @@ def test_links_have_their_shapes_colors_and_mass(everything: Path) -> None:
 
 
 def test_libraries_are_loaded_when_they_are_needed() -> None:
-    script = (
-        "import sys; from katana450.arm.robot.loader import load;"
-        "first = {'trimesh', 'yourdfpy'} & set(sys.modules); load();"
-        "print([*first, *({'mujoco', 'viser'} & set(sys.modules))])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
-    )
-    assert done.stdout == "[]\n"
+    load = "from katana450.arm.robot.loader import load"
+    assert not modules_after(load) & {"trimesh", "yourdfpy"}
+    assert not modules_after(f"{load}; load()") & {"mujoco", "viser"}
 
 
 def test_described_robot_needs_no_engine_until_a_distance_is_measured() -> None:
@@ -91,14 +85,9 @@ def test_described_robot_needs_no_engine_until_a_distance_is_measured() -> None:
         "print(before, 'mujoco' in sys.modules)"
     )
     # The first process may have to find the pairs that can meet, and keeps them.
-    first, second = (
-        subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60
-        )
-        for _ in range(2)
-    )
-    assert first.stdout.endswith("True\n")
-    assert second.stdout == "False True\n"
+    first, second = (output([sys.executable, "-c", script]) for _ in range(2))
+    assert first.endswith("True\n")
+    assert second == "False True\n"
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from katana450.errors import RobotDescriptionError
 from katana450.extensions.xacro import xacro_file
 from katana450.extensions.xacro.xacro_expression import UnsafeExpressionError, evaluated
 from tests.cli.lines import ask
+from tests.commands import output
 from tests.robot.public_arms import PX150, urdf
 from tests.robot.xacro_files import FILE, OPEN, PACKAGE, refusal, templated
 
@@ -84,10 +85,8 @@ def test_the_expansion_agrees_with_the_program_xacro(monkeypatch: pytest.MonkeyP
         "sys.modules[m.__name__] = m; sys.modules['ament_index_python'] = m; "
         f"import xacro; print(xacro.process_file({str(FILE)!r}).documentElement.toxml())"
     )
-    stock = subprocess.run(
-        [sys.executable, "-c", words], capture_output=True, text=True, check=True, timeout=60
-    )
-    assert read_urdf(FILE).decode() == stock.stdout.rstrip("\n")
+    stock = output([sys.executable, "-c", words])
+    assert read_urdf(FILE).decode() == stock.rstrip("\n")
 
 
 @pytest.mark.long
