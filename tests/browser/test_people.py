@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,13 +12,12 @@ import pytest
 from playwright.sync_api import Page
 
 from katana450.arm.control.lease import Role
-from katana450.client import connect
+from katana450.client import Client, connect
 from katana450.client.files import LostError
 from katana450.server.api import answers, requests
 from tests.browser.camera import Drawing
 from tests.browser.conftest import Windows
 from tests.gateway.site import Site, open_site
-from tests.gateway.test_people import poll
 
 
 @pytest.fixture
@@ -32,6 +32,13 @@ def visiting(windows: Windows, url: str) -> Iterator[Page]:
     with windows.open(url, drawing=Drawing.NONE) as window:
         window.page.locator("#name", has_text=re.compile(".")).wait_for()
         yield window.page
+
+
+def poll(program: Client) -> None:
+    """Query the state for five seconds."""
+    for _ in range(50):
+        program.query(answers.State)
+        time.sleep(0.1)
 
 
 def waits(page: Page, name: str, words: str) -> None:

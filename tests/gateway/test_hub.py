@@ -140,6 +140,12 @@ class Table:
         notices = self.notices_of.setdefault(page, [])
         return self.hub.join(Identity("session", name, role), page, notices.append, heartbeat)
 
+    def driver(self) -> Participant:
+        """Return the window of the first page, which has touched a control of the scene."""
+        participant = self.join(PAGES[0])
+        self.touch(participant.person.key)
+        return participant
+
     def touch(self, key: str) -> Actor:
         """Touch a control of the scene in the window of ``key``."""
         gate = self.hub.gate
@@ -178,8 +184,7 @@ def test_first_window_to_use_a_control_gets_the_lease(table: Table) -> None:
 
 
 def test_window_without_control_socket_cannot_drive(table: Table) -> None:
-    participant = table.join(PAGES[0])
-    table.touch(participant.person.key)
+    participant = table.driver()
     table.hub.leave(participant)
     with pytest.raises(LeaseError, match="start page"):
         table.touch(participant.person.key)
@@ -251,8 +256,7 @@ class FakePicture:
 
 
 def test_silent_driver_of_a_moving_arm_causes_a_stop(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    driver = table.driver()
     table.wait(1.0, driver)
     table.arm.moves = True
     table.wait(Settings.silence - TICK)
@@ -268,8 +272,7 @@ def test_silent_driver_of_a_moving_arm_causes_a_stop(table: Table) -> None:
 
 
 def test_silent_driver_at_rest_loses_the_lease_without_a_stop(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    driver = table.driver()
     table.wait(LEASE_TIMEOUT - 2 * TICK)
     assert table.hub.lease.holder == driver.person
     table.wait(3 * TICK)
@@ -318,8 +321,7 @@ def test_two_browsers_with_one_link_are_two_people(table: Table) -> None:
 
 
 def test_page_name_of_another_session_is_another_window(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    table.driver()
     stranger = Identity("another session", None, Role.ADMIN)
     with pytest.raises(LeaseError):
         table.touch(key_of(stranger, PAGES[0]))

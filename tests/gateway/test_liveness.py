@@ -48,8 +48,7 @@ class Received(LastHeartbeat):
 
 
 def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    table.driver()
     table.arm.moves = True
     table.hub.tick()
     assert table.arm.beats == 1
@@ -62,8 +61,7 @@ def test_silent_driver_is_stopped_by_a_server_that_is_always_late(table: Table) 
 
 
 def test_arm_gets_no_heartbeat_for_a_silent_driver_at_rest(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    driver = table.driver()
     table.wait(Settings.silence - TICK)
     beats = table.arm.beats
     table.wait(5 * TICK)
@@ -91,8 +89,7 @@ def test_message_that_waits_for_a_late_server_counts(table: Table) -> None:
 
 
 def test_reason_distinguishes_a_silent_window_from_a_closed_one(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    driver = table.driver()
     table.arm.moves = True
     table.hub.leave(driver)
     table.wait(2 * Settings.silence)
@@ -127,8 +124,7 @@ def stage(table: Table) -> tuple[str, str]:
 
 
 def test_arm_that_does_not_answer_is_reported_and_then_stopped(table: Table) -> None:
-    driver = table.join(PAGES[0])
-    table.touch(driver.person.key)
+    driver = table.driver()
     table.arm.moves = True
     assert status.health(table.hub) is None
     table.arm.taken, table.arm.age = 0, 0.4

@@ -122,6 +122,7 @@ def test_server_and_exported_file_have_the_same_names(local: VirtualServer, tmp_
     on_server = {name: node["kind"] for name, node in world.items() if node["kind"] in kinds}
     assert {"cup", "basin", "tcp", "flange", "axis_1"} <= on_server.keys()
     assert in_file == on_server
+    assert world["axis_2"]["fields"][0]["type"] == "SFRotation"
     for name in ("cup", "basin", "tcp", "flange"):
         fields = {each["field"]: each for each in world[name]["fields"]}
         assert {"translation", "rotation"} == fields.keys()
@@ -158,22 +159,3 @@ def painted(client: Client) -> bool:
         for field in node.fields
         if field.field == "whichChoice"
     )
-
-
-def test_names_work_over_http(local: VirtualServer) -> None:
-    status, _, body = local.ask("/api/v1/world")
-    assert status == 200
-    world = {node["node"]: node for node in json.loads(body)["nodes"]}
-    assert {"axis_1", "pan_link_look", "pan_link_paint", "cup", "basin_paint"} <= world.keys()
-    assert world["axis_2"]["fields"][0] == {
-        "field": "rotation", "type": "SFRotation", "settable": True,
-        "value": world["axis_2"]["fields"][0]["value"],
-    }  # fmt: skip
-    status, answer = local.post(do="set", node="axis_5", field="rotation", value=[1, 0, 0, 0.2])
-    assert (status, answer["is"]) == (200, "done")
-    status, answer = local.post(do="get", node="axis_5", field="rotation")
-    assert (status, answer["is"]) == (200, "values")
-    status, answer = local.post(do="set", node="axis_5", field="rotation", value="round")
-    assert (status, answer["is"]) == (422, "refused")
-    status, answer = local.post(do="release_lease")
-    assert status == 200

@@ -11,9 +11,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from katana450.arm.control.lease import Role
-from katana450.client import Client
-from katana450.client.files import LostError, RefusedError
-from katana450.server.api import answers, requests
 from katana450.server.web.access_links import AccessFile
 from tests.gateway.client import HOUR, Control, page_name
 from tests.gateway.virtual import VirtualServer
@@ -149,24 +146,3 @@ def test_revoked_link_is_gone_from_the_access_file(
         assert (await guarded.request("/api/v1/stop", b"", Authorization=bearer))[0] == 401
 
     guarded.run(act())
-
-
-def poll(program: Client) -> None:
-    """Query the state for five seconds."""
-    for _ in range(50):
-        program.query(answers.State)
-        time.sleep(0.1)
-
-
-def test_program_of_an_admin_lists_and_kicks(guarded: VirtualServer, file: AccessFile) -> None:
-    boss, viewer = link(file, "Ada", Role.ADMIN), link(file, "Paul", Role.VIEWER)
-    with guarded.connect("Guard", boss) as guard, guarded.connect("Watch", viewer) as watch:
-        people = {each.name: each for each in guard.people()}
-        assert people["Paul"].connections[0].name == "Paul, Watch"
-        with pytest.raises(RefusedError, match="Only an admin"):
-            watch.people()
-        guard.kick(people["Paul"].person, seconds=1.0)
-        with pytest.raises(LostError, match="closed"):
-            poll(watch)
-        with pytest.raises(RefusedError, match="disconnect yourself"):
-            guard.ask(requests.Kick(person=people["Ada"].person))

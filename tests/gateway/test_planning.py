@@ -287,8 +287,7 @@ def test_owner_pauses_resumes_and_slows_a_program(table: Staged) -> None:
 
 def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> None:
     participant = table.join(PAGES[0])
-    table.plan(participant, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
-    table.programs.steer(participant, ProgramOrder.RUN)
+    table.run(participant, "steps:\n  - wait: 1\n  - speed: 0.8\n  - wait: 1\n")
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, participant)
@@ -301,8 +300,7 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
 @pytest.mark.parametrize("ends", ["done", "ended", "STOP"])
 def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: str) -> None:
     participant, before = table.join(PAGES[0]), table.arm.state.tool
-    table.plan(participant, "steps:\n  - tool: flange\n  - wait: 1\n")
-    table.programs.steer(participant, ProgramOrder.RUN)
+    table.run(participant, "steps:\n  - tool: flange\n  - wait: 1\n")
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, tool="flange")
     if ends == "ended":

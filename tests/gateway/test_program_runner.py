@@ -76,6 +76,11 @@ class Staged(Table):
         self.programs.script(participant, script, more=False, speed=1.0)
         until(lambda: self.status != "planning", 10.0)
 
+    def run(self, participant: Participant, script: str = SCRIPT) -> None:
+        """Plan ``script`` and begin it."""
+        self.plan(participant, script)
+        self.programs.steer(participant, ProgramOrder.RUN)
+
 
 @pytest.fixture
 def table(session: Session) -> Staged:
@@ -83,8 +88,7 @@ def table(session: Session) -> Staged:
 
 
 def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
-    participant = table.join(PAGES[0])
-    table.touch(participant.person.key)
+    participant = table.driver()
     table.plan(participant)
     assert table.status == "ready"
     table.programs.steer(participant, ProgramOrder.RUN)
@@ -101,8 +105,7 @@ def test_program_holds_the_lease_under_its_own_name(table: Staged) -> None:
 def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None:
     """Use an arm at rest, whose state is unchanged, its time included."""
     participant = table.join(PAGES[0])
-    table.plan(participant)
-    table.programs.steer(participant, ProgramOrder.RUN)
+    table.run(participant)
     table.wait(29.0, participant)
     assert not any(isinstance(command, cmd.Follow) for command in table.arm.commands)
     table.wait(2.0, participant)
@@ -111,8 +114,7 @@ def test_program_time_passes_while_the_state_is_unchanged(table: Staged) -> None
 
 def test_pause_does_not_count_towards_the_timeout(table: Staged) -> None:
     participant = table.join(PAGES[0])
-    table.plan(participant, "steps:\n  - gripper: open\n")
-    table.programs.steer(participant, ProgramOrder.RUN)
+    table.run(participant, "steps:\n  - gripper: open\n")
     rest = table.arm.rest
     table.arm.rest = replace(rest, gripper_goal=rest.gripper_goal + 0.5)
     table.wait(0.1, participant)
@@ -161,8 +163,7 @@ def test_program_does_not_take_the_lease_from_a_driver(table: Staged) -> None:
 
 def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
     participant = table.join(PAGES[0])
-    table.plan(participant)
-    table.programs.steer(participant, ProgramOrder.RUN)
+    table.run(participant)
     table.stop("Somebody")
     table.wait(0.1, participant)
     assert table.status == "stopped"
@@ -180,8 +181,7 @@ def test_stop_and_a_closed_page_end_a_program(table: Staged) -> None:
 
 def test_stop_that_another_person_clears_leaves_the_lease_to_the_owner(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES[:2])
-    table.plan(owner)
-    table.programs.steer(owner, ProgramOrder.RUN)
+    table.run(owner)
     table.stop("Somebody")
     table.wait(0.1, owner)
     table.hub.move(other, cmd.ClearStop())

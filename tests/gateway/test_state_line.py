@@ -72,16 +72,12 @@ def test_pace_is_refused_with_a_reason_to_all_but_the_driver(table: Staged) -> N
     table.touch(driver.person.key)
     assert table.bar(driver)["pace"] == ""
     assert table.bar(other)["pace"] == "Window 1 drives: ask for the arm."
-
-
-def test_viewer_may_not_pace(table: Staged) -> None:
-    participant = table.join(PAGES[0], Role.VIEWER)
-    assert table.bar(participant)["pace"] == "You may watch, not drive."
+    viewer = table.join("third", Role.VIEWER)
+    assert table.bar(viewer)["pace"] == "You may watch, not drive."
 
 
 def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
-    participant = table.join(PAGES[0])
-    table.touch(participant.person.key)
+    participant = table.driver()
     rest = table.arm.rest
     table.arm.rest = replace(rest, motion=replace(rest.motion, qd=rest.motion.qd + 0.1))
     table.stop("Anybody")
@@ -94,8 +90,7 @@ def test_stop_is_in_progress_until_the_arm_rests(table: Staged) -> None:
 
 def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
-    table.plan(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 5\n")
-    table.programs.steer(owner, ProgramOrder.RUN)
+    table.run(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 5\n")
     table.wait(10.5, owner)
     shown = table.bar(other)
     assert shown["mood"] == "program"
@@ -112,8 +107,7 @@ def test_running_program_shows_its_task_step_and_remaining_time(table: Staged) -
 
 def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
     owner, other = (table.join(page) for page in PAGES)
-    table.plan(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 1\n")
-    table.programs.steer(owner, ProgramOrder.RUN)
+    table.run(owner, "name: Nap\nsteps:\n  - wait: 30\n  - wait: 1\n")
     table.wait(10.5, owner)
     table.programs.steer(owner, ProgramOrder.END)
     table.wait(0.1, owner)
