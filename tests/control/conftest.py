@@ -26,11 +26,11 @@ def state(session: Session) -> State:
 @pytest.fixture(scope="session")
 def world(robot: Robot) -> CollisionWorld:
     """The arm on its table, with a cup in front of it."""
-    found, _ = world_of(robot)
-    assert found is not None
+    bodies, _ = world_of(robot)
+    assert bodies is not None
     cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
     cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
-    return found.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
+    return bodies.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
 
 
 @pytest.fixture(scope="session")

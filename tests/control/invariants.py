@@ -209,16 +209,16 @@ class JointRules(RuleBasedStateMachine):
 
     def note(self, commands: tuple[cmd.Command, ...]) -> None:
         """Record whether arm and fingers may move from now on."""
-        for each in commands:
-            if isinstance(each, cmd.Batch):
-                self.note(each.commands)
-            elif isinstance(each, cmd.Stop):
+        for command in commands:
+            if isinstance(command, cmd.Batch):
+                self.note(command.commands)
+            elif isinstance(command, cmd.Stop):
                 self.may_move = self.fingers_may_move = False
             elif self.state.stopped is None or (
                 self.may_clear and any(isinstance(c, cmd.ClearStop) for c in commands)
             ):
-                self.may_move |= isinstance(each, MOTIONS) and not isinstance(each, RESTS)
-                self.fingers_may_move |= isinstance(each, cmd.Gripper)
+                self.may_move |= isinstance(command, MOTIONS) and not isinstance(command, RESTS)
+                self.fingers_may_move |= isinstance(command, cmd.Gripper)
 
     def check_limits(self, before: State, state: State) -> None:
         """Check position, speed, acceleration and jerk, and that setpoints agree with rates."""
@@ -318,4 +318,4 @@ def _bits(state: State) -> tuple[object, ...]:
     motion = state.motion
     arrays = (motion.q, motion.qd, motion.qdd, state.goal)
     rest = (state.gripper_setpoint, state.gripper_goal, state.blocked, state.paused, state.speed)
-    return (*(each.tobytes() for each in arrays), *rest, state.findings, state.status)
+    return (*(array.tobytes() for array in arrays), *rest, state.findings, state.status)

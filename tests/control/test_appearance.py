@@ -168,8 +168,8 @@ def test_object_moves_and_turns_separately_and_is_removed_with_its_paint(
     ):
         state = session.step(state, [cmd.SetAppearance("cube", trait, value)], 0.02)
         assert state.objects[0].appearance == look
-    gone = session.step(state, [cmd.Remove("cube")], 0.02)
-    assert (gone.objects, gone.appearance) == ((), Appearance())
+    removed = session.step(state, [cmd.Remove("cube")], 0.02)
+    assert (removed.objects, removed.appearance) == ((), Appearance())
     for bad in ({"position": np.array((0.0, 0.0, 9.0))}, {"R": np.ones((3, 3))}):
         with pytest.raises(InputError, match="cube"):
             cmd.MoveObject("cube", **bad)

@@ -97,20 +97,20 @@ def test_branch_change_keeps_limits_and_joint_speed(
     T = se3.from_rotation_translation(so3.rotation_y(-1.3), np.array([0.03, 0.0, 0.42]))
     state = take(session, state, cmd.Pose(T), cmd.EndDrag())
     metrics = branch_options(arm, state)[BRANCHES.index(branch)].metrics
-    taken = take(session, state, cmd.Branch(name=str(branch)))
-    assert taken.branch == branch
-    assert isinstance(taken.target, JointTarget)
-    assert np.allclose(taken.goal, metrics.q, atol=1e-12)
-    while taken.moving:
-        before = taken.setpoint
-        taken = take(session, taken)
-        step = np.abs(taken.setpoint - before)
+    target = take(session, state, cmd.Branch(name=str(branch)))
+    assert target.branch == branch
+    assert isinstance(target.target, JointTarget)
+    assert np.allclose(target.goal, metrics.q, atol=1e-12)
+    while target.moving:
+        before = target.setpoint
+        target = take(session, target)
+        step = np.abs(target.setpoint - before)
         assert (step <= arm.chain.speed * TICK * (1 + 1e-9)).all()
-        assert arm.chain.within_limits(taken.setpoint, slack=0.0)
-    on = branch_of(arm.chain, taken.setpoint)
+        assert arm.chain.within_limits(target.setpoint, slack=0.0)
+    on = branch_of(arm.chain, target.setpoint)
     assert on == branch
     # Later drags keep the new branch.
-    dragged = take(session, taken, cmd.Position(point(arm, taken.goal) - 0.01 * UP))
+    dragged = take(session, target, cmd.Position(point(arm, target.goal) - 0.01 * UP))
     assert dragged.branch == branch
     assert branch_of(arm.chain, dragged.goal) == branch
 
@@ -126,11 +126,11 @@ def test_target_is_kept_on_the_other_shoulder(
     assert isinstance(state.target, ToolTarget)
     back = take(session, state, cmd.Branch("back", "up"))
     assert isinstance(back.target, ToolTarget)
-    for each in (state, back):
-        assert isinstance(each.target, ToolTarget)
+    for after in (state, back):
+        assert isinstance(after.target, ToolTarget)
     T, T_back = (
-        each.pose(arm.chain, each.facing(arm.chain, branch, 0.0))  # type: ignore[arg-type]
-        for each, branch in ((state.target, state.branch), (back.target, back.branch))
+        target.pose(arm.chain, target.facing(arm.chain, branch, 0.0))  # type: ignore[arg-type]
+        for target, branch in ((state.target, state.branch), (back.target, back.branch))
     )
     assert np.allclose(T, T_back, atol=1e-12)
 
@@ -139,12 +139,12 @@ def test_branch_options_predict_the_result_of_taking_them(
     arm: ArmModel, session: Session, state: State
 ) -> None:
     state = take(session, state, cmd.Position(point(arm, state.goal) + 0.05 * UP))
-    for branch, found in zip(BRANCHES, branch_options(arm, state), strict=True):
-        metrics = found.metrics
-        assert found.contact is None
-        taken = take(session, state, cmd.Branch(name=str(branch)))
+    for branch, option in zip(BRANCHES, branch_options(arm, state), strict=True):
+        metrics = option.metrics
+        assert option.contact is None
+        target = take(session, state, cmd.Branch(name=str(branch)))
         assert metrics.branch == branch
-        assert np.allclose(taken.goal, metrics.q, atol=1e-12)
+        assert np.allclose(target.goal, metrics.q, atol=1e-12)
         assert metrics.within_limits
         assert metrics.distance == np.abs(metrics.q - state.q).max()
 
@@ -155,7 +155,7 @@ FAR_OUT = np.array([0.55, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
-    ("priority", "kept", "given_up"),
+    ("priority", "held", "given_up"),
     [
         (Priority.POSE, "position", {Reason.YAW_FIXED, Reason.PITCH_CHANGED}),
         (Priority.PITCH, "pitch", {Reason.YAW_FIXED, Reason.POSITION_CHANGED}),
@@ -167,7 +167,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
     session: Session,
     state: State,
     priority: Priority,
-    kept: str,
+    held: str,
     given_up: set[Reason],
 ) -> None:
     T = se3.from_rotation_translation(SIDEWAYS, FAR_OUT)
@@ -175,7 +175,7 @@ def test_each_priority_keeps_its_part_and_reports_what_is_lost(
     assert state.priority is priority
     assert given_up <= set(reasons(state))
     assert set(reasons(state)) <= given_up | {Reason.AXIS_LIMIT, Reason.LINKS}
-    if kept == "position":
+    if held == "position":
         assert np.allclose(point(arm, state.goal), FAR_OUT, atol=1e-9)
     else:
         assert pitch_and_roll(session.require_arm().chain, state.goal)[0] == pytest.approx(

@@ -56,7 +56,7 @@ INTO: dict[str, tuple[FloatArray, list[cmd.Command], set[str]]] = {
 
 @pytest.mark.parametrize("what", INTO)
 def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> None:
-    start, commands, met = INTO[what]
+    start, commands, names = INTO[what]
     state, near = run(guarded, standing(guarded, start), *commands)
     assert min(near) >= MIN_CLEARANCE - SLIGHTLY
     assert state.blocked
@@ -65,7 +65,7 @@ def test_arm_at_full_speed_stops_before_contact(guarded: Session, what: str) -> 
     finding = state.findings[0]
     assert finding.reason is Reason.CONTACT
     assert finding.parts is not None
-    assert met & set(finding.parts)
+    assert names & set(finding.parts)
     assert finding.amount == pytest.approx(near[-1], abs=1e-9)
     assert MIN_CLEARANCE - SLIGHTLY <= finding.amount < 2.0 * MIN_CLEARANCE
 
@@ -156,13 +156,13 @@ def test_contact_of_a_branch_is_reported_before_the_change(guarded: Session) -> 
     options = {choice.metrics.branch: choice for choice in guarded.choices(state)}
     own = options[state.branch]
     assert own.contact is None
-    met = [choice for choice in options.values() if choice.contact is not None]
-    assert met
-    for choice in met:
+    blocked = [choice for choice in options.values() if choice.contact is not None]
+    assert blocked
+    for choice in blocked:
         assert choice.contact is not None
         assert choice.contact.distance < MIN_CLEARANCE
-        taken, near = run(guarded, state, cmd.Branch(name=str(choice.metrics.branch)), ticks=2000)
-        assert taken.status is Status.BLOCKED
+        changed, near = run(guarded, state, cmd.Branch(name=str(choice.metrics.branch)), ticks=2000)
+        assert changed.status is Status.BLOCKED
         assert min(near) > 0.0
 
 

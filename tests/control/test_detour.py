@@ -223,9 +223,9 @@ def pairs_on(region: BranchRegion, count: int) -> Iterator[tuple[FloatArray, Flo
     """Yield pairs of random postures (5,) [rad] on a branch."""
     chain, rng = region.chain, np.random.default_rng(1)
     drawn = rng.uniform(chain.lower, chain.upper, (5000, 5))
-    kept = [q for q in drawn if region.holds(q)]
-    assert len(kept) >= 2 * count
-    yield from zip(kept[:count], kept[count : 2 * count], strict=True)
+    inside = [q for q in drawn if region.holds(q)]
+    assert len(inside) >= 2 * count
+    yield from zip(inside[:count], inside[count : 2 * count], strict=True)
 
 
 def test_no_path_on_the_branch_is_refused(shipped: Session) -> None:

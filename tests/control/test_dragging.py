@@ -209,14 +209,14 @@ def check_tick(
 def test_drags_keep_branch_limits_and_progress(
     arm: ArmModel, session: Session, priority: Priority
 ) -> None:
-    seen: Counter[Status] = Counter()
+    counts: Counter[Status] = Counter()
     for number, trip in enumerate(trips(arm.chain, (priority,), DRAGS[priority])):
-        seen.update(state.status for state in drag(arm.chain, session, trip, number))
-    assert sum(seen.values()) == DRAGS[priority]
+        counts.update(state.status for state in drag(arm.chain, session, trip, number))
+    assert sum(counts.values()) == DRAGS[priority]
     # The drags have reached every status.
     assert all(
-        seen[status] > DRAGS[priority] // 20 for status in (Status.OK, Status.LIMITED, Status.GAP)
-    ), seen
+        counts[status] > DRAGS[priority] // 20 for status in (Status.OK, Status.LIMITED, Status.GAP)
+    ), counts
 
 
 def other_arms() -> Iterator[tuple[str, Chain]]:
@@ -237,8 +237,8 @@ def other_arms() -> Iterator[tuple[str, Chain]]:
 def test_drags_of_other_arms_keep_branch_limits_and_progress(chain: Chain) -> None:
     arm = ArmModel(chain, {"tool": chain.M}, "tool", NO_GRIPPER)
     session = Session(arm, 0.5 * (chain.lower + chain.upper))
-    seen: Counter[Status] = Counter()
+    counts: Counter[Status] = Counter()
     for number, trip in enumerate(trips(chain, tuple(PRIORITIES), DRAGS_OF_OTHER_ARMS)):
-        seen.update(state.status for state in drag(chain, session, trip, number))
-    assert sum(seen.values()) == DRAGS_OF_OTHER_ARMS
-    assert set(seen) == {Status.OK, Status.LIMITED, Status.GAP}
+        counts.update(state.status for state in drag(chain, session, trip, number))
+    assert sum(counts.values()) == DRAGS_OF_OTHER_ARMS
+    assert set(counts) == {Status.OK, Status.LIMITED, Status.GAP}

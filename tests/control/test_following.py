@@ -43,15 +43,15 @@ def poured(arm: ArmModel) -> Plan:
     """A plan that lifts a cup, carries it along an arc and pours: three paths, with rests."""
     chain = arm.chain
     start = np.radians((-20.0, -75.0, 100.0, -25.0, 0.0))
-    branch, at = branch_of(chain, start), ToolTarget.at(chain, start)
-    lifted = ToolTarget(at.position + np.array([0.0, 0.0, 0.08]), at.pitch, at.roll)
-    lift = ToolPath(chain, ToolLine(at, lifted), branch, start)
-    level = Linear(at.pitch, at.pitch), Linear(at.roll, at.roll)
+    branch, point = branch_of(chain, start), ToolTarget.at(chain, start)
+    lifted = ToolTarget(point.position + np.array([0.0, 0.0, 0.08]), point.pitch, point.roll)
+    lift = ToolPath(chain, ToolLine(point, lifted), branch, start)
+    level = Linear(point.pitch, point.pitch), Linear(point.roll, point.roll)
     arc = ToolArc(lifted.position, np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0, *level)
     carry = ToolPath(chain, arc, branch, lift.end)
-    there = ToolTarget.at(chain, carry.end)
-    out = ToolTarget(there.position, there.pitch, there.roll + 1.9)
-    pour = ToolPath(chain, ToolLine(there, out), branch, carry.end)
+    carried = ToolTarget.at(chain, carry.end)
+    out = ToolTarget(carried.position, carried.pitch, carried.roll + 1.9)
+    pour = ToolPath(chain, ToolLine(carried, out), branch, carry.end)
     session = Session(arm, start)
     return plan_along(arm, None, session.begin(start, 0.0, 0.0), [lift, carry, pour])
 
@@ -87,7 +87,7 @@ def check_limits(session: Session, states: list[State]) -> None:
         difference = np.abs(np.diff(q, order, axis=0)) / TICK**order
         assert (difference <= limit + rounding / TICK**order).all(), order
     chain = session.require_arm().chain
-    points = np.array([forward(chain, each)[:3, 3] for each in q])
+    points = np.array([forward(chain, posture)[:3, 3] for posture in q])
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() <= TOOL_SPEED * TICK + 1e-12
     for before, after in pairwise(states):
         # The reported rates agree with the setpoints.
@@ -103,7 +103,7 @@ def off_path(states: list[State], plan: Plan) -> float:
         assert state.following is not None
         segment = plan.segments[state.following.number]
         sigma = segment.scaling.pace(state.following.local).sigma
-        q = np.array([each.c0 for each in segment.path.joints(Jet.variable(sigma))])
+        q = np.array([jet.c0 for jet in segment.path.joints(Jet.variable(sigma))])
         worst = max(worst, float(np.abs(q - state.setpoint).max()))
     return worst
 
@@ -161,7 +161,7 @@ def test_cup_stays_level_and_on_its_path_under_any_pacing(
         assert point[2] == pytest.approx(lifted[2], abs=1e-12)
     held = [pitch_and_roll(arm.chain, state.setpoint) for state in states]
     pitch, _ = pitch_and_roll(arm.chain, poured.start)
-    assert max(abs(each - pitch) for each, _ in held) < 1e-14
+    assert max(abs(pitch_held - pitch) for pitch_held, _ in held) < 1e-14
     visited = {state.following.number for state in states if state.following is not None}
     assert visited == {0, 1, 2}
     turned = [state.following.pace.qd[0] < 0.0 for state in states if state.following is not None]
@@ -191,8 +191,8 @@ def test_plan_from_another_posture_is_refused(session: Session, poured: Plan) ->
     assert finding.axis == 4
     assert after.following is None
     assert not after.moving
-    gone = session.step(after, [cmd.Joints(poured.start)], 2 * TICK)
-    assert gone.findings == ()
+    returned = session.step(after, [cmd.Joints(poured.start)], 2 * TICK)
+    assert returned.findings == ()
 
 
 @pytest.mark.parametrize("fraction", [-0.1, 1.1, math.nan, "end"])
@@ -255,8 +255,8 @@ def test_stop_on_a_plan_is_as_fast_as_the_joints_allow(session: Session, poured:
     assert len(stopped) * TICK == pytest.approx(finding.time, abs=2 * TICK)
     travel = math.dist(
         *(
-            forward(session.require_arm().chain, each.setpoint)[:3, 3]
-            for each in (under_way, stopped[-1])
+            forward(session.require_arm().chain, after.setpoint)[:3, 3]
+            for after in (under_way, stopped[-1])
         )
     )
     assert finding.amount == pytest.approx(travel, abs=1e-4)
@@ -279,8 +279,8 @@ def test_plan_goes_around_the_cup_if_the_straight_path_is_blocked(
     assert same.all()
     states = until_rest(guarded, state, cmd.Follow(plan))
     assert (states[-1].setpoint == BEYOND_CUP).all()
-    assert not any(each.blocked for each in states)
-    near = min(clearance(world, each) for each in states)
+    assert not any(state.blocked for state in states)
+    near = min(clearance(world, state) for state in states)
     assert near >= MIN_CLEARANCE
     # The reported clearance is accurate to a tenth, and also holds between the ticks.
     assert 0.89 * plan.nearest.contact.distance - 1e-4 <= near
@@ -295,16 +295,16 @@ def test_stop_beside_the_cup_keeps_clear_of_it(
     start = guarded.begin(LOW, 0.0, 0.0)
     states = until_rest(guarded, start, cmd.Follow(round_cup))
     along = 0
-    for at in range(60, len(states) - 40, 12):
-        stopped = until_rest(guarded, states[at], cmd.Stop())
+    for tick in range(60, len(states) - 40, 12):
+        stopped = until_rest(guarded, states[tick], cmd.Stop())
         along += stopped[0].following is not None
-        assert min(clearance(world, each) for each in stopped) >= MIN_CLEARANCE - SLIGHTLY
+        assert min(clearance(world, state) for state in stopped) >= MIN_CLEARANCE - SLIGHTLY
         assert stopped[-1].motion.at_rest
-        check_limits(guarded, [*states[at - 3 : at + 1], *stopped])
+        check_limits(guarded, [*states[tick - 3 : tick + 1], *stopped])
     assert along > 0
-    for at in range(60, len(states) - 40, 60):
-        away = trace(guarded, states[at], {0: [cmd.Home()]}, 100)
-        assert min(clearance(world, each) for each in away) >= MIN_CLEARANCE - SLIGHTLY
+    for tick in range(60, len(states) - 40, 60):
+        away = trace(guarded, states[tick], {0: [cmd.Home()]}, 100)
+        assert min(clearance(world, state) for state in away) >= MIN_CLEARANCE - SLIGHTLY
         assert away[-1].following is None
 
 
@@ -321,7 +321,7 @@ def test_obstacle_added_after_planning_is_met_at_rest(
     assert states[-1].status is Status.BLOCKED
     assert "cup" in (states[-1].findings[0].parts or ())
     # Where the plan is not known to be clear, no shorter piece of the path is checked.
-    assert min(clearance(world, each) for each in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
+    assert min(clearance(world, state) for state in states) >= MIN_CLEARANCE - MAX_UNCHECKED_PATH
     assert off_path(states, plan) <= 1e-15
     # The path back is clear, and so is the path onwards without the cup.
     back = until_rest(guarded, states[-1], cmd.GoAlong(0.0))

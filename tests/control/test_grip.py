@@ -57,7 +57,7 @@ def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:
 
 
 def before_cup(
-    session: Session, arm: MountedArm, state: State, back: float, beside: float = 0.0
+    session: Session, arm: MountedArm, state: State, back: float, offset: float = 0.0
 ) -> FloatArray:
     """Return the joints (5,) with the grasp frame ``back`` [m] before the cup's axis.
 
@@ -69,13 +69,13 @@ def before_cup(
     azimuth = np.arctan2(p[1], p[0])
     out = np.array((np.cos(azimuth), np.sin(azimuth), 0.0))
     p = p - back * (np.cos(PITCH) * out - np.sin(PITCH) * np.array((0.0, 0.0, 1.0)))
-    p = p + beside * np.array((-out[1], out[0], 0.0))
+    p = p + offset * np.array((-out[1], out[0], 0.0))
     azimuth = np.arctan2(p[1], p[0])
     pose = ToolTarget(p, PITCH, 0.0).pose(chain, azimuth)
     (best,) = (
-        each.q
-        for each in inverse(chain, pose)
-        if each.within_limits and str(each.branch) == "front-up"
+        solution.q
+        for solution in inverse(chain, pose)
+        if solution.within_limits and str(solution.branch) == "front-up"
     )
     return best
 
@@ -87,9 +87,9 @@ def holding(session: Session, arm: MountedArm) -> State:
     state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     before = before_cup(session, arm, state, BEFORE)
     state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, before)))
-    at = before_cup(session, arm, state, AT)
-    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, at)))
-    np.testing.assert_allclose(state.q, at, rtol=0, atol=1e-9)
+    grasp = before_cup(session, arm, state, AT)
+    state = rested(session, state, cmd.Follow(plan_to(arm, session.world_at(state), state, grasp)))
+    np.testing.assert_allclose(state.q, grasp, rtol=0, atol=1e-9)
     return rested(session, state, cmd.Gripper(-0.44))
 
 
@@ -114,9 +114,9 @@ def test_closed_fingers_hold_the_cup_in_place(session: Session, holding: State) 
 def lifted(session: Session, arm: MountedArm, state: State, by: float) -> State:
     """Return the state with the tool ``by`` [m] higher, with the same pitch and roll."""
     chain = arm.chain_to("grasp")
-    at = ToolTarget.at(chain, state.q)
-    up = replace(at, position=at.position + np.array((0.0, 0.0, by)))
-    way = ToolPath(chain, ToolLine(at, up), state.branch, state.q)  # type: ignore[arg-type]
+    target = ToolTarget.at(chain, state.q)
+    up = replace(target, position=target.position + np.array((0.0, 0.0, by)))
+    way = ToolPath(chain, ToolLine(target, up), state.branch, state.q)  # type: ignore[arg-type]
     return rested(
         session, state, cmd.Follow(plan_along(arm, session.world_at(state), state, [way]))
     )
@@ -132,16 +132,16 @@ def test_held_object_moves_with_the_hand_and_is_checked_for_contacts(
     np.testing.assert_allclose(T_up[:3, 3] - T[:3, 3], (0.0, 0.0, 0.12), rtol=0, atol=1e-9)
     # A move down by more than the free height: the cup meets the table, not the fingers.
     chain = arm.chain_to("grasp")
-    at = ToolTarget.at(chain, up.q)
-    down = rested(session, up, cmd.Position(at.position - [0.0, 0.0, 0.2]))
-    (met,) = (f for f in down.findings if f.reason is Reason.CONTACT)
-    assert met.parts is not None
-    assert set(met.parts) == {"cup", "table"}
-    assert 0.005 <= met.amount < 0.01
+    target = ToolTarget.at(chain, up.q)
+    down = rested(session, up, cmd.Position(target.position - [0.0, 0.0, 0.2]))
+    (contact,) = (f for f in down.findings if f.reason is Reason.CONTACT)
+    assert contact.parts is not None
+    assert set(contact.parts) == {"cup", "table"}
+    assert 0.005 <= contact.amount < 0.01
     cup, T = cup_of(session, down)
     # The path down has tilted the cup a little, so an edge of its foot is lowest.
     lowest = T[2, 3] - cup.size[0] * np.sqrt(1.0 - T[2, 2] ** 2)
-    assert met.amount == pytest.approx(lowest, abs=1e-5)
+    assert contact.amount == pytest.approx(lowest, abs=1e-5)
 
 
 def test_holding_hand_closes_no_further_and_keeps_the_cup_in_a_stop(
@@ -182,7 +182,7 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
     state = session.begin(session.ready, 0.0, 0.0)
     state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
-        q = before_cup(session, arm, state, back, beside=0.008)
+        q = before_cup(session, arm, state, back, offset=0.008)
         plan = plan_to(arm, session.world_at(state), state, q)
         state = rested(session, state, cmd.Follow(plan))
     closed = rested(session, state, cmd.Gripper(-0.44))
@@ -200,11 +200,11 @@ def test_one_touching_finger_does_not_grasp_and_is_reported(
 
 
 def scene_object(name: str = "box", **changed: Any) -> SceneObject:
-    given: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": name, "shape": Shape.BOX, "size": (0.05, 0.05, 0.05),
         "T": se3.from_rotation_translation(np.eye(3), (0.4, 0.0, 0.0)),
     }  # fmt: skip
-    return SceneObject(**(given | changed))
+    return SceneObject(**(fields | changed))
 
 
 def test_objects_are_replaced_by_name_and_limited_in_number(session: Session) -> None:
@@ -226,7 +226,7 @@ def test_held_object_cannot_be_moved_or_removed(session: Session, holding: State
         [cmd.PlaceObject(scene_object("cup")), cmd.Remove("cup"), cmd.Remove("basin")],
         holding.t + 0.01,
     )
-    assert [each.name for each in state.objects] == ["cup"]
+    assert [prop.name for prop in state.objects] == ["cup"]
     assert cup_of(session, state)[0].held
 
 

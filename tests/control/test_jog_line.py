@@ -116,7 +116,7 @@ def jog(v: FloatArray, pitch: float = 0.0) -> cmd.Jog:
 
 @pytest.mark.cases(3)
 @pytest.mark.parametrize(
-    "case", [*QUICK, *(pytest.param(each, marks=pytest.mark.long) for each in MORE)]
+    "case", [*QUICK, *(pytest.param(case, marks=pytest.mark.long) for case in MORE)]
 )
 def test_jog_stays_on_its_line(session: Session, case: str) -> None:
     posture, name = case.split()
@@ -133,7 +133,7 @@ def test_jog_stays_on_its_line(session: Session, case: str) -> None:
     assert course.states[-1].findings == ()
 
 
-@pytest.mark.parametrize("command", [cmd.Hold(), cmd.Pause()], ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize("command", [cmd.Hold(), cmd.Pause()], ids=lambda case: type(case).__name__)
 def test_brake_of_a_jog_stays_on_its_line(session: Session, command: cmd.Command) -> None:
     """Joints that braked as hard as they could sped the tool up from 0.1 to 0.3 m/s."""
     direction, course = AXES["-z"], begun(session, "ready")
@@ -159,7 +159,7 @@ def test_hold_drops_the_jog_and_reports_its_cause(session: Session) -> None:
     course.rest()
     state = course.states[-1]
     assert state.jogging is None
-    assert [each.reason for each in state.findings] == [Reason.WAITING, Reason.DRIVER_SILENT]
+    assert [finding.reason for finding in state.findings] == [Reason.WAITING, Reason.DRIVER_SILENT]
 
 
 @pytest.mark.parametrize("later", [-0.1 * AXES["y"], 0.1 * AXES["z"]], ids=["back", "up"])

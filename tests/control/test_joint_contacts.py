@@ -68,14 +68,14 @@ def begun(session: Session) -> State:
 
 def excess(world: CollisionWorld, state: State) -> float:
     """Return the smallest distance of any pair beyond what it keeps [m]."""
-    placed, kept = world.at(state.x_setpoint), world.kept(MIN_CLEARANCE)
-    return float(min(placed.distance(pair) - kept[pair] for pair in range(len(kept))))
+    placed, checked = world.at(state.x_setpoint), world.kept(MIN_CLEARANCE)
+    return float(min(placed.distance(pair) - checked[pair] for pair in range(len(checked))))
 
 
 def test_carriages_on_one_rail_stop_before_each_other(make: Make) -> None:
-    made = make(rail())
-    session, world = made.session, made.world
-    state = during(session, begun(session), 4.0, made.move(slide_left=0.4))[-1]
+    machine = make(rail())
+    session, world = machine.session, machine.world
+    state = during(session, begun(session), 4.0, machine.move(slide_left=0.4))[-1]
     # 0.2 m apart, 50 mm wide, and 5 mm stay between them.
     assert state.setpoint[0] == pytest.approx(0.144, abs=1.5e-3)
     assert world.gap(state.x_setpoint, "left", "right") >= MIN_CLEARANCE - DISTANCE_ROUNDING
@@ -87,20 +87,20 @@ def test_carriages_on_one_rail_stop_before_each_other(make: Make) -> None:
 
 
 def test_both_carriages_brake_and_the_blocked_one_continues_once_free(make: Make) -> None:
-    made = make(rail())
-    session, world = made.session, made.world
-    command = made.move(slide_left=0.4, slide_right=-0.3)
-    seen = during(session, begun(session), 3.0, command)
-    assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
-    assert seen[-1].blocked
-    state = during(session, seen[-1], 4.0, made.move(slide_right=0.3))[-1]
+    machine = make(rail())
+    session, world = machine.session, machine.world
+    command = machine.move(slide_left=0.4, slide_right=-0.3)
+    states = during(session, begun(session), 3.0, command)
+    assert min(excess(world, state) for state in states) >= -DISTANCE_ROUNDING
+    assert states[-1].blocked
+    state = during(session, states[-1], 4.0, machine.move(slide_right=0.3))[-1]
     np.testing.assert_allclose(state.setpoint, (0.4, 0.3), atol=1e-9)
     assert (state.status, state.findings) == (Status.OK, ())
 
 
 def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> None:
-    made = make(rail())
-    session, world = made.session, made.world
+    machine = make(rail())
+    session, world = machine.session, machine.world
     state = begun(session)
     for number in range(200):
         t = state.t + DT
@@ -113,9 +113,9 @@ def test_a_stream_is_followed_up_to_the_contact_and_not_into_it(make: Make) -> N
 
 
 def test_stop_and_pause_work_before_a_contact(make: Make) -> None:
-    made = make(rail())
-    session, world = made.session, made.world
-    state = during(session, begun(session), 0.4, made.move(slide_left=0.4))[-1]
+    machine = make(rail())
+    session, world = machine.session, machine.world
+    state = during(session, begun(session), 0.4, machine.move(slide_left=0.4))[-1]
     assert state.moving
     stopped = during(session, state, 2.0, cmd.Stop())[-1]
     assert stopped.status is Status.STOPPED
@@ -125,12 +125,12 @@ def test_stop_and_pause_work_before_a_contact(make: Make) -> None:
 
 
 def test_thumb_and_finger_meet_and_the_following_joint_counts(make: Make) -> None:
-    made = make(hand())
-    session, world = made.session, made.world
-    command = made.move(thumb_bend1=0.0, finger2_bend1=1.5, finger2_bend2=1.2)
-    seen = during(session, begun(session), 4.0, command)
-    assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
-    state = seen[-1]
+    machine = make(hand())
+    session, world = machine.session, machine.world
+    command = machine.move(thumb_bend1=0.0, finger2_bend1=1.5, finger2_bend2=1.2)
+    states = during(session, begun(session), 4.0, command)
+    assert min(excess(world, state) for state in states) >= -DISTANCE_ROUNDING
+    state = states[-1]
     assert state.blocked
     assert state.findings[0].parts is not None
     assert "thumb" in "".join(state.findings[0].parts)
@@ -149,52 +149,52 @@ targets = st.lists(
 def test_no_motion_of_a_hand_brings_its_parts_too_near(
     make: Make, wanted: Sequence[tuple[Sequence[float], float]]
 ) -> None:
-    made = make(hand())
-    session, world = made.session, made.world
+    machine = make(hand())
+    session, world = machine.session, machine.world
     state = begun(session)
     for q, seconds in wanted:
-        goal = made.joints.clamp(np.array(q))
-        seen = during(session, state, seconds, cmd.Joints(goal))
-        assert min(excess(world, each) for each in seen) >= -DISTANCE_ROUNDING
-        state = seen[-1]
+        goal = machine.joints.clamp(np.array(q))
+        states = during(session, state, seconds, cmd.Joints(goal))
+        assert min(excess(world, state) for state in states) >= -DISTANCE_ROUNDING
+        state = states[-1]
     stopping = during(session, state, 0.5, cmd.Stop())
-    assert min(excess(world, each) for each in stopping) >= -DISTANCE_ROUNDING
+    assert min(excess(world, state) for state in stopping) >= -DISTANCE_ROUNDING
 
 
 def test_fingers_that_stand_closer_than_5_mm_keep_half_of_their_distance(make: Make) -> None:
     # 27 mm apart and 24 mm wide: 3 mm between them at rest.
-    made = make(hand(3, pitch=0.027, thumb=False))
-    session, world = made.session, made.world
+    machine = make(hand(3, pitch=0.027, thumb=False))
+    session, world = machine.session, machine.world
     assert min(world.close.values()) == pytest.approx(1.5e-3, abs=1e-6)
-    command = made.move(finger1_spread=0.3)
+    command = machine.move(finger1_spread=0.3)
     state = during(session, begun(session), 2.0, command)[-1]
     free = world.gap(state.x_setpoint, "finger1_link1", "finger2_link1")
-    state = during(session, state, 2.0, made.move(finger1_spread=-0.3))[-1]
+    state = during(session, state, 2.0, machine.move(finger1_spread=-0.3))[-1]
     near = world.gap(state.x_setpoint, "finger1_link3", "finger2_link3")
     assert min(free, near) >= 1.5e-3 - DISTANCE_ROUNDING
     assert state.blocked
     assert sentence(state).endswith("mm apart: they must not come nearer.")
     # Each finger alone bends past its neighbours.
-    bent = during(session, begun(session), 3.0, made.move(finger2_bend1=1.4))[-1]
-    assert bent.setpoint[made.joints.names.index("finger2_bend1")] == 1.4
+    bent = during(session, begun(session), 3.0, machine.move(finger2_bend1=1.4))[-1]
+    assert bent.setpoint[machine.joints.names.index("finger2_bend1")] == 1.4
 
 
 def test_without_a_world_joints_pass_each_other(make: Make) -> None:
-    made = make(rail())
-    unchecked = Session(made.joints, made.joints.ready)
-    state = during(unchecked, begun(unchecked), 3.0, made.move(slide_left=0.4))[-1]
+    machine = make(rail())
+    unchecked = Session(machine.joints, machine.joints.ready)
+    state = during(unchecked, begun(unchecked), 3.0, machine.move(slide_left=0.4))[-1]
     assert state.setpoint[0] == 0.4
 
 
 def test_a_robot_that_begins_in_a_contact_can_leave_it(make: Make) -> None:
-    made = make(rail())
-    session, world = made.session, made.world
+    machine = make(rail())
+    session, world = machine.session, machine.world
     state = session.begin(np.array((0.149, 0.0)), 0.0, 0.0)
     assert world.gap(state.x_setpoint, "left", "right") < MIN_CLEARANCE
-    nearer = during(session, state, 1.0, made.move(slide_left=0.2))[-1]
+    nearer = during(session, state, 1.0, machine.move(slide_left=0.2))[-1]
     assert nearer.setpoint[0] == 0.149
     assert nearer.blocked
-    away = during(session, replace(state, blocked=False), 2.0, made.move(slide_left=0.0))[-1]
+    away = during(session, replace(state, blocked=False), 2.0, machine.move(slide_left=0.0))[-1]
     assert away.setpoint[0] == 0.0
 
 
@@ -205,10 +205,10 @@ def height(state: State) -> float:
 
 @pytest.mark.parametrize("foot", [0.0, -0.3])
 def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
-    made = make(column(foot))
-    seen = during(made.session, begun(made.session), 4.0, made.move(lift=-0.4))
-    state = seen[-1]
-    assert min(map(height, seen)) >= MIN_CLEARANCE - DISTANCE_ROUNDING
+    machine = make(column(foot))
+    states = during(machine.session, begun(machine.session), 4.0, machine.move(lift=-0.4))
+    state = states[-1]
+    assert min(map(height, states)) >= MIN_CLEARANCE - DISTANCE_ROUNDING
     assert height(state) == pytest.approx(MIN_CLEARANCE, abs=1.5e-3)
     (finding,) = state.findings
     assert (finding.reason, set(finding.parts or ())) == (Reason.CONTACT, {"beam", "table"})
@@ -216,12 +216,12 @@ def test_a_beam_stops_before_the_table(make: Make, foot: float) -> None:
 
 
 def test_an_object_is_an_obstacle_until_it_is_removed(make: Make) -> None:
-    made = make(column(-0.3))
-    session = made.session
+    machine = make(column(-0.3))
+    session = machine.session
     state = during(session, begun(session), 0.05, cmd.PlaceObject(block(-0.3)))[-1]
-    seen = during(session, state, 4.0, made.move(lift=-0.4))
-    state = seen[-1]
-    assert min(map(height, seen)) >= 0.1 + MIN_CLEARANCE - DISTANCE_ROUNDING
+    states = during(session, state, 4.0, machine.move(lift=-0.4))
+    state = states[-1]
+    assert min(map(height, states)) >= 0.1 + MIN_CLEARANCE - DISTANCE_ROUNDING
     assert height(state) == pytest.approx(0.1 + MIN_CLEARANCE, abs=3e-3)
     assert (state.status, state.findings[0].parts) == (Status.BLOCKED, ("beam", "block"))
     # The goal stays, so the beam continues down to the table once the object is away.

@@ -58,14 +58,14 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
 ) -> None:
     rules = Session(JOINTS, JOINTS.ready)
     state = during(rules, rules.begin(JOINTS.ready, 0.0, 0.0), DT, cmd.Speed(fraction))[-1]
-    limits, seen = JOINTS.limits, [state]
+    limits, states = JOINTS.limits, [state]
     for target, seconds in targets:
-        seen += during(rules, state, seconds, cmd.Joints(np.array(target)))
-        state = seen[-1]
+        states += during(rules, state, seconds, cmd.Joints(np.array(target)))
+        state = states[-1]
     state = rested(rules, state)
     goal = np.clip(targets[-1][0], limits.lower, limits.upper)
     np.testing.assert_array_equal(state.q, goal)
-    for before, now in pairwise(seen):
+    for before, now in pairwise(states):
         motion = now.motion
         assert ((motion.q >= limits.lower) & (motion.q <= limits.upper)).all()
         assert (np.abs(motion.qd) <= fraction * limits.speed * (1.0 + 1e-6)).all()
@@ -75,11 +75,11 @@ def test_targets_keep_all_limits_and_the_last_is_reached(
 
 
 def test_clamped_value_is_reported_in_its_unit(session: Session, state: State) -> None:
-    there = during(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))[-1]
-    findings = [(f.reason, f.axis, f.amount) for f in there.findings]
+    end = during(session, state, DT, cmd.SetAxes(((1, 9.0), (2, 9.0), (3, 0.1))))[-1]
+    findings = [(f.reason, f.axis, f.amount) for f in end.findings]
     assert findings == [(Reason.SLIDE_LIMIT, 0, 0.4), (Reason.AXIS_LIMIT, 1, math.pi)]
-    assert there.status is Status.LIMITED
-    assert rested(session, there, cmd.SetAxes(((1, 0.1), (2, 0.0)))).findings == ()
+    assert end.status is Status.LIMITED
+    assert rested(session, end, cmd.SetAxes(((1, 0.1), (2, 0.0)))).findings == ()
 
 
 def test_stop_takes_the_reported_distance_and_holds_until_cleared(

@@ -60,13 +60,13 @@ def legal(event: str, lease: Lease, person: Person, to: Person) -> bool:
 
 def leases() -> list[Lease]:
     """Return leases with every holder and every queue of the others."""
-    found = []
+    result = []
     for holder in (None, ANNA, BERT, CARA):
-        others = [each for each in (ANNA, BERT, CARA) if each != holder]
+        others = [person for person in (ANNA, BERT, CARA) if person != holder]
         for size in range(len(others) + 1):
             for waiting in itertools.permutations(others, size):
-                found.append(Lease(holder, 10.0 if holder else -math.inf, waiting))
-    return found + [replace(each, left=10.5) for each in found if each.holder is not None]
+                result.append(Lease(holder, 10.0 if holder else -math.inf, waiting))
+    return result + [replace(lease, left=10.5) for lease in result if lease.holder is not None]
 
 
 @pytest.mark.parametrize("event", EVENTS)
@@ -113,8 +113,8 @@ def test_lease_has_at_most_one_holder_who_never_waits_for_it(
         assert DORA not in lease.waiting
         if lease.holder != before.holder and before.holder is not None:
             # Only these events take the arm from its holder.
-            taken = {"take", "hand over", "release", "expire"}
-            assert event in taken or (event == "acquire" and before.left < math.inf)
+            takings = {"take", "hand over", "release", "expire"}
+            assert event in takings or (event == "acquire" and before.left < math.inf)
         if event == "hear":
             assert replace(lease, left=before.left) == replace(before, heard=t)
 

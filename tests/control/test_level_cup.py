@@ -47,8 +47,8 @@ def test_lost_pitch_is_reported_also_out_of_reach(session: Session) -> None:
     T = se3.from_rotation_translation(so3.rotation_y(math.pi / 2.0), np.array((1.0, 0.0, 0.0)))
     p = project(chain, T, priority=Priority.PITCH)
     assert p.pitch_error > 0.1
-    found = of_projection(chain, p, Priority.PITCH, yaw_was_given=True)
-    amounts = {each.reason: each.amount for each in found}
+    findings = of_projection(chain, p, Priority.PITCH, yaw_was_given=True)
+    amounts = {finding.reason: finding.amount for finding in findings}
     assert amounts[Reason.OUT_OF_REACH] == p.position_error
     assert amounts[Reason.PITCH_CHANGED] == p.pitch_error
-    assert all(finding_text(each) for each in found)
+    assert all(finding_text(finding) for finding in findings)

@@ -37,29 +37,29 @@ def test_each_margin_is_the_minimum(session: Session, seed: int) -> None:
     )
     world = session.world_at(session.begin(session.ready, 0.0, 0.0))
     assert world is not None
-    found = margins(chain, world, x)
+    reported = margins(chain, world, x)
 
     rooms = [min(a - low, up - a) for a, low, up in zip(q, chain.lower, chain.upper, strict=True)]
-    assert found.limits.tolist() == rooms
-    assert rooms[found.axis] == min(rooms)
+    assert reported.limits.tolist() == rooms
+    assert rooms[reported.axis] == min(rooms)
 
     # Its square is the least eigenvalue of J^T J, in units of the characteristic length.
     J = jacobian_body(chain, q)
     scaled = np.vstack((J[:3], J[3:] / characteristic_length(chain)))
     least = float(np.linalg.eigvalsh(scaled.T @ scaled)[0])
-    assert found.singular_values[-1] ** 2 == pytest.approx(least, abs=1e-12)
+    assert reported.singular_values[-1] ** 2 == pytest.approx(least, abs=1e-12)
 
-    assert found.nearest is not None
+    assert reported.nearest is not None
     names = [part.name for part in world.parts]
     gaps = {pair: world.gap(x, *pair) for pair in combinations(names, 2)}
-    assert found.nearest.distance == pytest.approx(min(gaps.values()), abs=1e-9)
-    assert gaps[found.nearest.parts] == pytest.approx(found.nearest.distance, abs=1e-9)
+    assert reported.nearest.distance == pytest.approx(min(gaps.values()), abs=1e-9)
+    assert gaps[reported.nearest.parts] == pytest.approx(reported.nearest.distance, abs=1e-9)
 
 
 def test_margin_is_negative_beyond_a_limit(session: Session) -> None:
     chain = session.require_arm().chain
     q = np.array(session.ready)
     q[3] = chain.upper[3] + 0.01
-    found = margins(chain, None, np.append(q, 0.0))
-    assert (found.axis, found.nearest) == (3, None)
-    assert found.limits[3] == pytest.approx(-0.01)
+    reported = margins(chain, None, np.append(q, 0.0))
+    assert (reported.axis, reported.nearest) == (3, None)
+    assert reported.limits[3] == pytest.approx(-0.01)

@@ -63,9 +63,9 @@ BEGINNINGS: dict[type, Callable[[Session, State], State]] = {
 def test_later_mode_replaces_the_earlier_one(
     session: Session, state: State, first: type, second: type
 ) -> None:
-    begun = BEGINNINGS[first](session, state)
-    assert isinstance(begun.mode, first)
-    assert isinstance(BEGINNINGS[second](session, begun).mode, second)
+    beginning = BEGINNINGS[first](session, state)
+    assert isinstance(beginning.mode, first)
+    assert isinstance(BEGINNINGS[second](session, beginning).mode, second)
 
 
 def test_resume_moves_nothing_where_a_pause_ended_the_brake_of_a_hold(

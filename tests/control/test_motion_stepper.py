@@ -102,9 +102,9 @@ def test_pause_stays_on_the_path_and_resume_continues(session: Session, state: S
     assert not paused.moving
     assert (paused.setpoint != paused.goal).any()
     way = FAR - start
-    for at in (moving.setpoint, paused.setpoint):
-        fraction = (at - start) @ way / (way @ way)
-        assert np.allclose(at, start + fraction * way, atol=1e-9)
+    for q in (moving.setpoint, paused.setpoint):
+        fraction = (q - start) @ way / (way @ way)
+        assert np.allclose(q, start + fraction * way, atol=1e-9)
     again = run(session, paused, [cmd.Resume()], 400)
     assert (again.setpoint == FAR).all()
     assert again.findings == ()
@@ -123,8 +123,8 @@ def test_elbow_that_is_too_fast_for_its_branch_brakes_beyond_it(
     q, qd = np.array(state.setpoint), np.zeros(5)
     q[2], qd[2] = 0.002, -0.4
     goal = q + np.array([0.0, 0.0, 0.5, 0.0, 0.0])
-    begun = run(session, state, [cmd.Joints(goal)])
-    moving = replace(begun, motion=JointMotion(frozen(q), frozen(qd), frozen(np.zeros(5))))
+    beginning = run(session, state, [cmd.Joints(goal)])
+    moving = replace(beginning, motion=JointMotion(frozen(q), frozen(qd), frozen(np.zeros(5))))
     assert moving.branch.elbow == state.branch.elbow  # type: ignore[union-attr]
     after = session.step(moving, [command], moving.t + TICK)
     check(session, moving.motion, after.motion)

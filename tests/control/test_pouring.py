@@ -51,11 +51,11 @@ def held_level(session: Session, state: State) -> State:
     """Return ``full`` with the cup in the hand, upright at the grasp frame."""
     x = np.append(state.setpoint, state.gripper_setpoint)
     palm = session.environment.pose(replace(state.objects[0], T=np.eye(4), held=True), x)
-    (cup,) = (each for each in state.objects if each.name == "cup")
+    (cup,) = (prop for prop in state.objects if prop.name == "cup")
     T = se3.from_rotation_translation(np.eye(3), palm[:3, 3] + [0.1, 0.0, 0.0])
     held = session.environment.taken(replace(cup, T=T), x)
     objects: tuple[SceneObject, ...] = tuple(
-        held if each is cup else each for each in state.objects
+        held if prop is cup else prop for prop in state.objects
     )
     return ticked(session, replace(state, objects=objects, grip=0.0), cmd.Fill(200.0))
 
@@ -73,12 +73,12 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     cup = replace(state.poured.water.cup, film=3 * 10**11)
     water = replace(state.poured.water, vessels=(cup,))
     state = replace(state, poured=replace(state.poured, water=water))
-    start, seen = state.t, []
+    start, waters = state.t, []
     for _ in range(1050):
         state = ticked(session, state)
         assert state.poured is not None
-        seen.append(state.poured.water)
-    assert 9 <= sum(a is not b for a, b in pairwise(seen)) <= 12
+        waters.append(state.poured.water)
+    assert 9 <= sum(a is not b for a, b in pairwise(waters)) <= 12
     moving = ticked(session, state, cmd.Joint(1, 0.1), ticks=2)
     assert moving.poured is not None
     assert session.pouring is not None
@@ -88,11 +88,11 @@ def test_film_in_a_cup_at_rest_drains_in_few_steps(session: Session, full: State
     for _ in range(round((moving.t - start) / 0.01)):
         fine = flow.step(fine, {"cup": VesselMove(water.cup.T, rest)}, 0.01)
     assert moving.poured.water.cup.film == pytest.approx(fine.cup.film, rel=5e-3)
-    assert {each.total for each in seen} == {moving.poured.water.total} == {water.total}
+    assert {poured.total for poured in waters} == {moving.poured.water.total} == {water.total}
 
 
 def test_moved_cup_keeps_its_water(session: Session, full: State) -> None:
-    (cup,) = (each for each in full.objects if each.name == "cup")
+    (cup,) = (prop for prop in full.objects if prop.name == "cup")
     T: FloatArray = se3.from_rotation_translation(np.eye(3), (0.3, 0.1, 0.0))
     moved = ticked(session, full, cmd.PlaceObject(replace(cup, T=T)), ticks=50)
     assert moved.poured is not None
@@ -143,9 +143,9 @@ def test_volume_above_the_capacity_is_refused(session: Session) -> None:
 
 
 def test_fill_without_a_cup_is_refused(session: Session, full: State) -> None:
-    gone = ticked(session, full, cmd.Remove("cup"), ticks=2)
-    assert gone.poured is None
-    assert ticked(session, gone, cmd.Fill(100.0)).poured is None
+    removed = ticked(session, full, cmd.Remove("cup"), ticks=2)
+    assert removed.poured is None
+    assert ticked(session, removed, cmd.Fill(100.0)).poured is None
 
 
 def swing(session: Session, state: State, steps: tuple[float, ...]) -> tuple[float, float]:

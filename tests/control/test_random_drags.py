@@ -96,10 +96,10 @@ class Regions:
         r = arm.a + arm.l1 * np.cos(two) + arm.l2 * np.cos(both) + arm.l3 * np.cos(all_three)
         bend = np.sin(alpha[..., 1])
         side, up = branch.shoulder == "front", branch.elbow == "up"
-        found: FloatArray = ((r if side else -r) >= -ROUNDING) & (
+        inside: FloatArray = ((r if side else -r) >= -ROUNDING) & (
             (bend if up else -bend) >= -ROUNDING
         )
-        return found
+        return inside
 
     def _labels(self, branch: Branch) -> FloatArray:
         grid = np.stack(np.meshgrid(*self._axes, indexing="ij"), axis=-1)
@@ -146,16 +146,16 @@ def followed_by_newton(chain: Chain, q: FloatArray, target: FloatArray) -> Float
     count = max(math.ceil(float(np.linalg.norm(way)) / STRIDE), 1)
     for number in range(1, count + 1):
         desired = start + np.append(number / count * way, (0.0, 0.0))
-        begun = q
+        first = q
         for _ in range(6):
-            here = five(chain, q)
-            error = desired - here
+            point = five(chain, q)
+            error = desired - point
             error[3:] = np.remainder(error[3:] + math.pi, math.tau) - math.pi
             J = np.empty((5, 5))
             for axis in range(5):
                 step = np.zeros(5)
                 step[axis] = 1e-6
-                change = five(chain, q + step) - here
+                change = five(chain, q + step) - point
                 change[3:] = np.remainder(change[3:] + math.pi, math.tau) - math.pi
                 J[:, axis] = change / 1e-6
             if abs(np.linalg.det(J)) < 1e-9:
@@ -166,7 +166,7 @@ def followed_by_newton(chain: Chain, q: FloatArray, target: FloatArray) -> Float
         else:
             return None
         # Beside a singularity the joints would be too fast for the steps of this search.
-        if np.abs(q - begun).max() > 0.05 or not chain.within_limits(q, slack=0.0):
+        if np.abs(q - first).max() > 0.05 or not chain.within_limits(q, slack=0.0):
             return None
     return q
 
@@ -198,15 +198,15 @@ def settled(session: Session, state: State) -> State:
 
 
 def test_random_drags_arrive_or_offer_every_detour(dragged: Session) -> None:
-    regions, seen = Regions(dragged.require_arm().chain), Counter[str]()
+    regions, counts = Regions(dragged.require_arm().chain), Counter[str]()
     for number in (*range(DRAGS), *HARD_DRAGS):
-        check_drag(dragged, regions, number, seen)
-    print(dict(seen))
-    assert seen["clear way"] > 0
-    assert seen["detour arrived"] > 0
+        check_drag(dragged, regions, number, counts)
+    print(dict(counts))
+    assert counts["clear way"] > 0
+    assert counts["detour arrived"] > 0
 
 
-def check_drag(session: Session, regions: Regions, number: int, seen: Counter[str]) -> None:
+def check_drag(session: Session, regions: Regions, number: int, counts: Counter[str]) -> None:
     """Drag from a random posture to the tool point of another, and take the detour on offer."""
     arm = session.require_arm()
     chain, rng = arm.chain, np.random.default_rng([17, number])
@@ -216,16 +216,16 @@ def check_drag(session: Session, regions: Regions, number: int, seen: Counter[st
     branch = state.branch
     state = settled(session, session.step(state, [cmd.Position(target)], state.t + TICK))
     away = float(np.linalg.norm(forward(chain, state.setpoint)[:3, 3] - target))
-    seen["arrived" if away <= ON_TARGET else "held"] += 1
+    counts["arrived" if away <= ON_TARGET else "held"] += 1
     if followed_by_newton(chain, start, target) is not None:
-        seen["clear way"] += 1
+        counts["clear way"] += 1
         assert away <= ON_TARGET, number
         assert state.status is Status.OK, number
     state = session.step(state, [cmd.EndDrag()], state.t + TICK)
     assert state.branch == branch
     if state.beyond_gap is not None:
-        seen["gap"] += 1
-        check_detour(session, arm, regions, state, target, seen, number)
+        counts["gap"] += 1
+        check_detour(session, arm, regions, state, target, counts, number)
 
 
 def check_detour(
@@ -234,22 +234,22 @@ def check_detour(
     regions: Regions,
     state: State,
     target: FloatArray,
-    seen: Counter[str],
+    counts: Counter[str],
     number: int,
 ) -> None:
     """Take the detour from ``state``; it exists if brute force finds a continuous path."""
     assert state.beyond_gap is not None
     goal, branch, chain = state.beyond_gap.q, state.branch, arm.chain
-    here, there = (regions.label(q, branch) for q in (state.setpoint, goal))  # type: ignore[arg-type]
-    assert here
-    assert there
-    seen["continuous path"] += here == there
+    region, goal_region = (regions.label(q, branch) for q in (state.setpoint, goal))  # type: ignore[arg-type]
+    assert region
+    assert goal_region
+    counts["continuous path"] += region == goal_region
     try:
         plan = detour_from(arm, None, state)
     except BlockedError:
-        assert here != there, number
+        assert region != goal_region, number
         return
-    seen["detour"] += 1
+    counts["detour"] += 1
     state = session.step(state, [cmd.OfferDetour(plan)], state.t + TICK)
     rested = session.step(state, (), state.t + TICK)
     assert (rested.setpoint == state.setpoint).all()
@@ -262,7 +262,7 @@ def check_detour(
         assert chain.within_limits(state.setpoint, slack=0.0)
         assert true_speed(chain, state.setpoint, state.motion.qd) <= TOOL_SPEED * (1.0 + ROUNDING)
     np.testing.assert_array_equal(state.setpoint, goal)
-    seen["detour arrived"] += 1
-    seen["detour to the target"] += bool(
+    counts["detour arrived"] += 1
+    counts["detour to the target"] += bool(
         np.linalg.norm(forward(chain, goal)[:3, 3] - target) <= ON_TARGET
     )

@@ -36,9 +36,9 @@ SLIGHTLY = 2e-5  # m
 
 def solid_of(mesh: trimesh.Trimesh, key: str = "a1") -> Solid:
     """Return the solid as the reader of files makes it: on z = 0, about its middle."""
-    (low, high), found = mesh.bounds, convex_body(mesh.vertices)
-    at = np.array((*(0.5 * (low + high)[:2]), low[2]))
-    return Solid(key, tuple(high - low), found.corners - at)
+    (low, high), body = mesh.bounds, convex_body(mesh.vertices)
+    foot = np.array((*(0.5 * (low + high)[:2]), low[2]))
+    return Solid(key, tuple(high - low), body.corners - foot)
 
 
 KNOT = trimesh.creation.torus(0.06, 0.02, 24, 16)
@@ -71,15 +71,15 @@ def outlines(session: Session, state: State) -> list[tuple[int, FloatArray, Floa
     """Return the hulls of the links: index of the moving body, planes (m, 3) and offsets (m,)."""
     world = session.world_at(replace(state, objects=()))
     assert world is not None
-    found = []
+    shapes = []
     for part in world.parts:
         for T, shape in zip(part.T_mover_shape, part.shapes, strict=True):
             if part.mover:
                 corners = np.frombuffer(shape.mark).reshape(-1, 3) @ T[:3, :3].T + T[:3, 3]
                 mesh = trimesh.Trimesh(corners).convex_hull
                 heights = np.einsum("ij,ij->i", mesh.face_normals, mesh.triangles[:, 0])
-                found.append((part.mover, mesh.face_normals, heights))
-    return found
+                shapes.append((part.mover, mesh.face_normals, heights))
+    return shapes
 
 
 def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
@@ -101,8 +101,8 @@ def test_arm_at_full_speed_stops_before_a_mesh(session: Session) -> None:
     world = session.world_at(states[-1])
     assert world is not None
     links = outlines(session, states[-1])
-    for each in states[::30] + states[-1:]:
-        poses = world.linkage.poses(x_of(each))
+    for passed in states[::30] + states[-1:]:
+        poses = world.linkage.poses(x_of(passed))
         for mover, normals, heights in links:
             local = (points - poses[mover][:3, 3]) @ poses[mover][:3, :3]
             assert (local @ normals.T - heights).max(axis=1).min() > 0.0
@@ -136,7 +136,7 @@ def test_attached_object_moves_with_the_hand(session: Session) -> None:
     assert hand is not None
     assert all(world.gap(x_of(moved), "knot", finger) == np.inf for finger in hand.fingers)
     low = until_rest(session, moved, cmd.Joint(2, 0.3))[-1]
-    (finding,) = (each for each in low.findings if each.reason is Reason.CONTACT)
+    (finding,) = (finding for finding in low.findings if finding.reason is Reason.CONTACT)
     assert set(finding.parts or ()) == {"knot", "table"}
 
 
@@ -147,13 +147,13 @@ def test_detached_object_stays_in_place_or_is_put_on_the_table(
     palm_at = np.eye(4)
     palm_at[:3, 3] = (0.08, 0.0, 0.0)
     state = begun(session, knot(palm_at, fixed=True))
-    there = session.environment.pose(state.objects[0], x_of(state))
+    T = session.environment.pose(state.objects[0], x_of(state))
     state = session.step(state, [cmd.Attach("knot", to)], state.t + TICK)
     (left,) = state.objects
     assert not left.carried
-    np.testing.assert_allclose(left.T[:2, 3], there[:2, 3], atol=1e-12)
+    np.testing.assert_allclose(left.T[:2, 3], T[:2, 3], atol=1e-12)
     if to is Attachment.WORLD:
-        np.testing.assert_allclose(left.T, there, atol=1e-12)
+        np.testing.assert_allclose(left.T, T, atol=1e-12)
     else:
         assert left.T[2, 3] == 0.0
         np.testing.assert_allclose(left.T[:3, 2], (0.0, 0.0, 1.0), atol=1e-12)
@@ -167,11 +167,11 @@ def test_scene_is_replaced_in_one_step(session: Session) -> None:
     assert state.poured is not None
     assert state.poured.water.cup.volume == 100 * MILLILITRE
     held = replace(cup, held=True, T=np.eye(4))
-    kept = session.step(
+    after = session.step(
         replace(state, objects=(held,), grip=0.0), [cmd.ReplaceScene((cup,))], state.t + TICK
     )
-    assert [scene_object.held for scene_object in kept.objects] == [True]
-    assert kept.poured is None
+    assert [scene_object.held for scene_object in after.objects] == [True]
+    assert after.poured is None
 
 
 def test_appearance_is_part_of_the_object(session: Session) -> None:
@@ -260,8 +260,8 @@ def test_new_objects_are_placed_in_reach_and_apart() -> None:
     new = knot(np.eye(4), "new", scale=0.6)
     side = free_place(new, [], near=(0.1, 0.5))
     np.testing.assert_array_equal(side[:3, 3], (0.1, 0.5, 0.0))
-    beside = free_place(new, [replace(new, name="there", T=side)], near=(0.1, 0.5))[:2, 3]
-    assert 2.0 * girth(new) <= np.linalg.norm(beside - (0.1, 0.5)) < 0.25
+    place = free_place(new, [replace(new, name="there", T=side)], near=(0.1, 0.5))[:2, 3]
+    assert 2.0 * girth(new) <= np.linalg.norm(place - (0.1, 0.5)) < 0.25
     behind = free_place(new, [], near=(-0.3, 0.0))[:2, 3]
     assert np.linalg.norm(behind - (-0.3, 0.0)) < 0.1
     before = free_place(new, [], near=(-0.1, 0.05))[:2, 3]

@@ -90,11 +90,11 @@ def lag_and_error(
 ) -> tuple[float, float]:
     """Return the lag [s] that explains axis 1 best, and the remaining error [rad]."""
     late = [state for state in states if state.t > since]
-    found = []
+    errors = []
     for lag in np.arange(-0.02, 0.12, 0.002).tolist():
         off = [abs(state.setpoint[0] - signal(state.t - lag)) for state in late]
-        found.append((max(off), lag))
-    error, lag = min(found)
+        errors.append((max(off), lag))
+    error, lag = min(errors)
     return lag, error
 
 

@@ -134,11 +134,11 @@ def test_drag_that_ends_at_once_still_reaches_its_target(
     assert released.since is not None
     assert released.findings == ()
     assert math.dist(tool_point(arm, released), desired) > 0.1
-    there = ticked(session, released, ticks=15)
-    assert there.since is None
-    assert np.allclose(tool_point(arm, there), desired, atol=1e-12)
-    assert isinstance(there.target, JointTarget)
-    assert there.target.q is there.goal
+    arrived = ticked(session, released, ticks=15)
+    assert arrived.since is None
+    assert np.allclose(tool_point(arm, arrived), desired, atol=1e-12)
+    assert isinstance(arrived.target, JointTarget)
+    assert arrived.target.q is arrived.goal
     # A new drag on the way replaces the target.
     again = ticked(session, released, cmd.Position(desired), ticks=15)
     assert np.allclose(tool_point(arm, again), desired, atol=1e-12)
@@ -255,9 +255,12 @@ def test_limit_of_a_drag_is_no_outcome_of_the_gripper_or_the_speed(
     before = away = ticked(session, state, far)
     while away.status is Status.OK:
         before, away = away, ticked(session, away, *others)
-        verdicts += [each.verdict for each in away.outcomes]
+        verdicts += [outcome.verdict for outcome in away.outcomes]
     assert len(verdicts) > 2
     assert set(verdicts) == {Verdict.ACCEPTED}
     # In the tick that reaches the limit, a drag is limited and not what follows it.
     beyond = ticked(session, before, far, *others)
-    assert [each.verdict for each in beyond.outcomes] == [Verdict.LIMITED, *2 * [Verdict.ACCEPTED]]
+    assert [outcome.verdict for outcome in beyond.outcomes] == [
+        Verdict.LIMITED,
+        *2 * [Verdict.ACCEPTED],
+    ]

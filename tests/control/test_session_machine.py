@@ -175,14 +175,14 @@ class ArmRules(JointRules):
         self.run([cmd.Gripper(angle / 8.0)], ticks)
 
     @precondition(lambda self: self.name == "shipped")
-    @rule(at=fractions(2), ticks=ticks)
-    def move_cup(self, at: FloatArray, ticks: int) -> None:
-        self.run([cmd.MoveObject("cup", np.array([0.35 + 0.2 * at[0], 0.4 * at[1], 0.0]))], ticks)
+    @rule(xy=fractions(2), ticks=ticks)
+    def move_cup(self, xy: FloatArray, ticks: int) -> None:
+        self.run([cmd.MoveObject("cup", np.array([0.35 + 0.2 * xy[0], 0.4 * xy[1], 0.0]))], ticks)
 
     @precondition(lambda self: self.name == "shipped")
     @rule(cup=st.booleans(), ticks=ticks)
     def change_scene(self, cup: bool, ticks: int) -> None:
-        objects = tuple(each for each in self.first.objects if cup or each.name != "cup")
+        objects = tuple(prop for prop in self.first.objects if cup or prop.name != "cup")
         self.run([cmd.ReplaceScene(objects, 1e-4 if cup else None)], ticks)
 
 

@@ -195,13 +195,13 @@ def test_restarted_arm_is_stopped_with_the_scene_of_the_kept_state(
 ) -> None:
     moving = ticked(session, state, cmd.Speed(0.5), cmd.Joint(1, 1.0), ticks=20)
     assert moving.moving
-    kept = at_rest(moving)
-    begun = session.begin(kept.q, kept.gripper, 5.0)
-    first = restarted(begun, kept)
+    rest = at_rest(moving)
+    beginning = session.begin(rest.q, rest.gripper, 5.0)
+    first = restarted(beginning, rest)
     assert reasons(first) == {Reason.STOPPED, Reason.RESTARTED}
     assert (first.speed, first.objects, first.status) == (0.5, moving.objects, Status.STOPPED)
     later = ticked(session, first, ticks=50)
     np.testing.assert_array_equal(later.q, moving.q)
     cleared = ticked(session, later, cmd.ClearStop(), ticks=50)
     np.testing.assert_array_equal(cleared.q, moving.q)
-    assert restarted(begun, None).stopped is not None
+    assert restarted(beginning, None).stopped is not None

@@ -100,7 +100,7 @@ def run(
 
 
 def reasons(state: State) -> list[Reason]:
-    return [each.reason for each in state.findings]
+    return [finding.reason for finding in state.findings]
 
 
 def test_arm_that_lags_as_expected_reaches_its_goal(
@@ -110,11 +110,11 @@ def test_arm_that_lags_as_expected_reaches_its_goal(
     assert np.abs(moving.q - moving.setpoint).max() > math.radians(3.0), "the lag is not a fault"
     assert moving.stopped is None
     assert moving.moving
-    there = run(session, measured, moving, [], 400)
-    np.testing.assert_array_equal(there.q, there.goal)
-    assert there.goal[0] == 1.0
-    assert not there.moving
-    assert there.stopped is None
+    arrived = run(session, measured, moving, [], 400)
+    np.testing.assert_array_equal(arrived.q, arrived.goal)
+    assert arrived.goal[0] == 1.0
+    assert not arrived.moving
+    assert arrived.stopped is None
 
 
 def test_arm_moves_until_it_is_measured_at_rest(
@@ -127,7 +127,7 @@ def test_arm_moves_until_it_is_measured_at_rest(
 
 
 @pytest.mark.parametrize(
-    "mode", [each for each in ArmMode if not each.follows and each is not ArmMode.LOST]
+    "mode", [mode for mode in ArmMode if not mode.follows and mode is not ArmMode.LOST]
 )
 def test_arm_that_does_not_follow_is_stopped_until_it_does(
     session: Session, state: State, mode: ArmMode
@@ -158,10 +158,10 @@ def test_stopped_arm_stays_where_it_came_to_rest(
     session: Session, measured: DelayedArm, state: State
 ) -> None:
     moving = run(session, measured, state, [cmd.Joint(1, 1.0)], 40)
-    ahead = moving.setpoint[0]
+    setpoint = moving.setpoint[0]
     stopped = run(session, measured, moving, [cmd.Stop()], 150)
     rest = stopped.q[0]
-    assert rest < ahead - math.radians(1.0), "the setpoint was ahead of the arm"
+    assert rest < setpoint - math.radians(1.0), "the setpoint was ahead of the arm"
     assert stopped.setpoint[0] == stopped.goal[0] == rest
     cleared = run(session, measured, stopped, [cmd.ClearStop()], 100)
     assert cleared.stopped is None
@@ -225,16 +225,16 @@ def test_contact_at_the_measured_posture_stops_the_arm(session: Session, state: 
     # Lean the arm forward until it meets the table.
     while world.nearest(np.append(touching, 0.0)).distance > 0.0:  # type: ignore[union-attr]
         touching[1] -= 0.01
-    there = replace(state, q=frozen(touching))
+    near = replace(state, q=frozen(touching))
     # Where a contact is intended, as when an object is put down, it is no reason to stop.
     intended = ArmReport(ArmMode.MOVING, state.t, np.append(touching, 0.0))
-    assert session.supervised(there, intended).stopped is None
+    assert session.supervised(near, intended).stopped is None
     # Not astray for long enough to be stopped for that.
     report = ArmReport(ArmMode.MOVING, state.t, np.append(session.ready, 0.0))
-    met = session.supervised(there, report)
-    assert met.stopped is not None
-    assert Reason.MEASURED_CONTACT in reasons(met)
-    assert "touch, as measured" in met.stopped.cause.why
+    after = session.supervised(near, report)
+    assert after.stopped is not None
+    assert Reason.MEASURED_CONTACT in reasons(after)
+    assert "touch, as measured" in after.stopped.cause.why
 
 
 def test_intended_contact_hides_no_other_one(session: Session, state: State) -> None:
@@ -251,28 +251,28 @@ def test_intended_contact_hides_no_other_one(session: Session, state: State) -> 
     away = np.append(q + np.array((-0.3, 0.0, 0.0, 0.0, 0.0)), 0.0)
     assert world.gap(away, *nearest.parts) == pytest.approx(nearest.distance, abs=1e-6)
     x, y, _ = nearest.points[0]
-    there = replace(state, q=frozen(q), gripper=0.0, motion=JointMotion.rest(away[:-1]))
+    near = replace(state, q=frozen(q), gripper=0.0, motion=JointMotion.rest(away[:-1]))
 
     def at(aside: float) -> State:
         place = np.eye(4)
         place[:3, 3] = x, y + aside, 0.001
         post = SceneObject("post", Shape.BOX, (0.02, 0.02, 0.05), place)
-        return replace(there, objects=(*there.objects, post))
+        return replace(near, objects=(*near.objects, post))
 
     aside = 0.2
     while True:
         with_post = at(aside)
-        found = session.world_at(with_post)
-        assert found is not None
-        if found.gap(with_post.x, arm, "post") < CONTACT_DISTANCE:
+        bodies = session.world_at(with_post)
+        assert bodies is not None
+        if bodies.gap(with_post.x, arm, "post") < CONTACT_DISTANCE:
             break
         aside -= 2e-4
-    assert found.nearest(with_post.x).parts == nearest.parts  # type: ignore[union-attr]
+    assert bodies.nearest(with_post.x).parts == nearest.parts  # type: ignore[union-attr]
     report = ArmReport(ArmMode.MOVING, state.t, away)
-    assert session.supervised(there, report).stopped is None
-    met = session.supervised(with_post, report)
-    assert met.stopped is not None
-    contact = next(f for f in met.findings if f.reason is Reason.MEASURED_CONTACT)
+    assert session.supervised(near, report).stopped is None
+    after = session.supervised(with_post, report)
+    assert after.stopped is not None
+    contact = next(f for f in after.findings if f.reason is Reason.MEASURED_CONTACT)
     assert "post" in (contact.parts or ())
     # Where both are intended, neither is a reason.
     both = ArmReport(ArmMode.MOVING, state.t, with_post.x)

@@ -95,6 +95,6 @@ def test_detached_object_must_not_be_left_in_the_air() -> None:
         check_mounted(around, (), held, Attachment.WORLD, x)
     camera = around.mounted(crate(at(0.3, 0.0, 0.3)), Attachment.HAND, x)
     check_mounted(around, (), camera, Attachment.WORLD, x)
-    beside = around.mounted(crate(at(0.3, 0.9, 0.3)), Attachment.HAND, x)
+    mounted = around.mounted(crate(at(0.3, 0.9, 0.3)), Attachment.HAND, x)
     with pytest.raises(InputError, match="nothing carries it there"):
-        check_mounted(around, (), beside, Attachment.TABLE, x)
+        check_mounted(around, (), mounted, Attachment.TABLE, x)

@@ -45,7 +45,7 @@ def speed(session: Session, state: State) -> float:
 
 def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list[float]:
     """Return the tool speeds [m/s] of ticks with commands at random times, most of them close."""
-    rng, found, wait = np.random.default_rng([450, seed]), [], 0
+    rng, speeds_found, wait = np.random.default_rng([450, seed]), [], 0
     state = session.begin(session.ready, 0.0, 0.0)
     for _ in range(ticks):
         commands: list[cmd.Command] = []
@@ -59,16 +59,16 @@ def speeds(session: Session, orders: list[Order], ticks: int, seed: int) -> list
         else:
             wait -= 1
         state = session.step(state, commands, state.t + TICK)
-        found.append(speed(session, state))
+        speeds_found.append(speed(session, state))
         assert session.require_arm().chain.within_limits(state.setpoint, slack=0.0)
-    return found
+    return speeds_found
 
 
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(3))
 def test_all_commands_keep_the_tool_speed(session: Session, seed: int) -> None:
-    found = speeds(session, [each for group in ORDERS.values() for each in group], 3500, seed)
-    assert 0.5 * TOOL_SPEED < max(found) <= TOOL_SPEED
+    reached = speeds(session, [order for group in ORDERS.values() for order in group], 3500, seed)
+    assert 0.5 * TOOL_SPEED < max(reached) <= TOOL_SPEED
 
 
 @pytest.mark.cases(1)
@@ -106,8 +106,8 @@ def test_fast_drags_keep_the_tool_speed(
 
 def test_lower_tool_speed_is_kept(arm: ArmModel, session: Session) -> None:
     slow = Session(arm, session.ready, tool_speed=0.1)
-    found = speeds(slow, [each for group in ORDERS.values() for each in group], 2000, 1)
-    assert 0.05 < max(found) <= 0.1
+    reached = speeds(slow, [order for group in ORDERS.values() for order in group], 2000, 1)
+    assert 0.05 < max(reached) <= 0.1
 
 
 def test_leaving_a_plan_keeps_the_tool_speed(arm: ArmModel, session: Session) -> None:

@@ -29,10 +29,10 @@ PLAIN: dict[object, object] = {int: 1, float: 0.1, str: "ball", Finding: Finding
 
 
 def examples(session: Session, state: State) -> list[cmd.Command]:
-    """Return one command of each class. Only fields with further types need an entry here."""
+    """Return one command of example class. Only fields with further types need an entry here."""
     arm = session.require_arm()
     q = np.zeros(arm.chain.n)
-    given: list[Command] = [
+    commands: list[Command] = [
         *(cmd.SetAxes(((1, 0.1),)), cmd.Joints(q), cmd.Servo(q), cmd.Jog(np.full(5, 0.1))),
         cmd.Servo(q).timed(0.1),
         *(cmd.Position(np.array((0.3, 0.0, 0.1))), cmd.Pose(np.eye(4))),
@@ -43,14 +43,14 @@ def examples(session: Session, state: State) -> list[cmd.Command]:
         *(cmd.SetAppearance("ball", AppearanceTrait.CHOICE, 0), cmd.OperateArm(ArmAct.UNBLOCK)),
         cmd.Batch((cmd.Home(),)),
     ]
-    kinds: dict[Any, Any] = {type(each): each for each in given}
+    kinds: dict[Any, Any] = {type(command): command for command in commands}
     return [kinds.get(kind) or plain_example(kind) for kind in KINDS]
 
 
 def plain_example(kind: Any) -> Any:
     """Return a command of a class whose fields are numbers and texts."""
     types = get_type_hints(kind)
-    needed = [each.name for each in msgspec.structs.fields(kind) if each.required]
+    needed = [field.name for field in msgspec.structs.fields(kind) if field.required]
     assert all(types[name] in PLAIN for name in needed), f"add an example of {kind.__name__}"
     return kind(**{name: PLAIN[types[name]] for name in needed})
 
@@ -75,31 +75,31 @@ def test_only_stop_is_a_safety_command() -> None:
 
 
 def test_no_command_of_the_server_itself_moves_the_arm(session: Session, state: State) -> None:
-    protective = [each for each in examples(session, state) if each.traits.protective]
-    assert {type(each) for each in protective} == {cmd.Stop, cmd.Hold, cmd.HoldFor, cmd.Speed}
-    for each in protective:
-        after = session.step(state, [each], state.t)
-        assert not after.moving, each
+    protective = [command for command in examples(session, state) if command.traits.protective]
+    assert {type(command) for command in protective} == {cmd.Stop, cmd.Hold, cmd.HoldFor, cmd.Speed}
+    for example in protective:
+        after = session.step(state, [example], state.t)
+        assert not after.moving, example
 
 
 def test_stopped_arm_accepts_exactly_the_declared_commands(session: Session, state: State) -> None:
     stopped = session.step(state, [cmd.Stop()], state.t)
-    given: list[cmd.Command] = examples(session, state)
-    assert {type(each) for each in given} == set(KINDS)
-    for each in given:
+    commands: list[cmd.Command] = examples(session, state)
+    assert {type(command) for command in commands} == set(KINDS)
+    for example in commands:
         # A five-axis arm has no use for a rotation, and no arm angle.
-        if each.traits.while_stopped or isinstance(each, cmd.Orient | cmd.TurnElbow):
+        if example.traits.while_stopped or isinstance(example, cmd.Orient | cmd.TurnElbow):
             continue
-        after = session.step(stopped, [each], stopped.t)
+        after = session.step(stopped, [example], stopped.t)
         same = ("goal", "mode", "findings", "stopped", "gripper_goal", "tool")
         for field in same:
-            assert getattr(after, field) is getattr(stopped, field), (each, field)
+            assert getattr(after, field) is getattr(stopped, field), (example, field)
 
 
 def test_mailbox_keeps_only_the_newest_of_a_stream(session: Session, state: State) -> None:
-    for each in examples(session, state):
+    for command in examples(session, state):
         mailbox = Mailbox(lambda _: None)
-        mailbox.put(each)
-        mailbox.put(each)
-        kept = len(mailbox.drain().commands)
-        assert kept == (1 if each.traits.stream or each.traits.safety else 2), each
+        mailbox.put(command)
+        mailbox.put(command)
+        count = len(mailbox.drain().commands)
+        assert count == (1 if command.traits.stream or command.traits.safety else 2), command

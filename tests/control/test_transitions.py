@@ -49,7 +49,7 @@ def followed(session: Session, state: State) -> State:
     return ticked(session, ticked(session, state, cmd.Follow(plan)), ticks=60)
 
 
-OF_FIVE_AXES = [each for each in COMMANDS if each not in (cmd.Orient, cmd.TurnElbow)]
+OF_FIVE_AXES = [kind for kind in COMMANDS if kind not in (cmd.Orient, cmd.TurnElbow)]
 """Commands of this arm; tests/general_arms has the others."""
 
 
@@ -59,7 +59,7 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
     cup = named(objects, "cup")
     assert cup is not None
     pose = forward(session.require_arm().chain_to(state.tool), session.ready)
-    found: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
+    makers: dict[type[cmd.Command], Callable[[], cmd.Command]] = {
         cmd.Joint: lambda: cmd.Joint(1, 0.5),
         cmd.Joints: lambda: cmd.Joints(session.ready + 0.1),
         cmd.Servo: lambda: cmd.Servo(np.array(state.setpoint) + 0.002),
@@ -85,9 +85,9 @@ def example(session: Session, state: State, kind: type[cmd.Command]) -> cmd.Comm
         cmd.Batch: lambda: cmd.Batch((cmd.Speed(0.5),)),
         cmd.Jog: lambda: cmd.Jog(np.array([0.0, 0.05, 0.0, 0.0, 0.0])),
     }
-    if kind in found:
-        return found[kind]()
-    return next(each for each in examples(session, state) if type(each) is kind)
+    if kind in makers:
+        return makers[kind]()
+    return next(command for command in examples(session, state) if type(command) is kind)
 
 
 def streamed(session: Session, state: State) -> State:
@@ -136,13 +136,13 @@ def test_table_covers_every_command_and_mode() -> None:
 def trace(state: State) -> tuple[object, ...]:
     """Return all visible parts of ``state``."""
     motion = (state.setpoint, state.motion.qd, state.motion.qdd, state.goal)
-    seen = tuple(each.tobytes() for each in motion)
+    content = tuple(values.tobytes() for values in motion)
     numbers = (state.gripper_goal, state.gripper_setpoint, state.speed, state.paused)
-    return (*seen, *numbers, state.findings, state.stopped, state.tool, state.priority)
+    return (*content, *numbers, state.findings, state.stopped, state.tool, state.priority)
 
 
 @pytest.fixture(scope="module")
-def begun(shipped: Session) -> dict[type[Mode], State]:
+def beginnings(shipped: Session) -> dict[type[Mode], State]:
     """A state in each mode."""
     state = shipped.begin(shipped.ready, 0.0, 0.0)
     return {mode: begin(shipped, state) for mode, begin in BEGINNINGS.items()}
@@ -151,17 +151,17 @@ def begun(shipped: Session) -> dict[type[Mode], State]:
 @pytest.mark.parametrize("mode", BEGINNINGS)
 @pytest.mark.parametrize("kind", OF_FIVE_AXES)
 def test_each_command_has_its_effect_in_each_mode(
-    shipped: Session, begun: dict[type[Mode], State], mode: type[Mode], kind: type[cmd.Command]
+    shipped: Session, beginnings: dict[type[Mode], State], mode: type[Mode], kind: type[cmd.Command]
 ) -> None:
-    before = begun[mode]
+    before = beginnings[mode]
     assert isinstance(before.mode, mode)
     command = example(shipped, before, kind)
     row, effect = row_of(kind), effect_of(command, before)
     after = ticked(shipped, before, command)
     if kind is cmd.Follow and not before.motion.at_rest:
-        found = [each.reason for each in after.findings]
+        reasons = [finding.reason for finding in after.findings]
         # A jog reports its own findings in every tick.
-        assert Reason.NOT_AT_START in found or after.jogging is not None
+        assert Reason.NOT_AT_START in reasons or after.jogging is not None
         effect = Effect.ACCEPTED
     if kind is cmd.Go:
         # It is refused without an offer.
@@ -181,11 +181,11 @@ def test_each_command_has_its_effect_in_each_mode(
 
 @pytest.mark.parametrize("kind", OF_FIVE_AXES)
 def test_stop_refuses_all_commands_but_the_listed(
-    shipped: Session, begun: dict[type[Mode], State], kind: type[cmd.Command]
+    shipped: Session, beginnings: dict[type[Mode], State], kind: type[cmd.Command]
 ) -> None:
-    stopped = ticked(shipped, begun[Jogging], cmd.Stop())
+    stopped = ticked(shipped, beginnings[Jogging], cmd.Stop())
     assert stopped.stopped is not None
-    command = example(shipped, begun[Jogging], kind)
+    command = example(shipped, beginnings[Jogging], kind)
     if kind is cmd.ClearStop:
         stopped = ticked(shipped, stopped, ticks=120)
     after = ticked(shipped, stopped, command, cmd.Batch((cmd.Speed(0.9),)))
@@ -210,8 +210,8 @@ def test_jog_is_refused_during_a_pause(shipped: Session) -> None:
 
 
 def test_batch_has_the_effects_of_its_commands(
-    shipped: Session, begun: dict[type[Mode], State]
+    shipped: Session, beginnings: dict[type[Mode], State]
 ) -> None:
-    after = ticked(shipped, begun[Jogging], cmd.Batch((cmd.Speed(0.3), cmd.Home())))
+    after = ticked(shipped, beginnings[Jogging], cmd.Batch((cmd.Speed(0.3), cmd.Home())))
     assert after.speed == 0.3
     assert isinstance(after.mode, Positioning)

@@ -72,7 +72,7 @@ def test_rings_turn_the_tool_of_their_arm(
             out = so3.from_quaternion(start) @ np.array((0.0, 1.0, 1.0))
             assert out @ elbow > 0.0
             assert abs(out @ wrist) < 1e-9
-            (turn,) = (each for each in gestures.commands if isinstance(each, TurnElbow))
+            (turn,) = (act for act in gestures.commands if isinstance(act, TurnElbow))
             assert turn.by == pytest.approx(0.1, abs=1e-9)
             continue
         command, end = gestures.commands[-2:]
