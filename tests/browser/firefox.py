@@ -111,14 +111,14 @@ class Firefox:
         if in_frame:
             tree = self.ask("browsingContext.getTree", root=window)
             window = tree["contexts"][0]["children"][0]["context"]
-        found = self.ask(
+        answer = self.ask(
             "script.evaluate",
             expression=f"(async () => JSON.stringify(await ({script})) ?? 'null')()",
             target={"context": window},
             awaitPromise=True,
         )
-        assert found["type"] == "success", f"{script}: {found['exceptionDetails']['text']}"
-        return json.loads(found["result"]["value"])
+        assert answer["type"] == "success", f"{script}: {answer['exceptionDetails']['text']}"
+        return json.loads(answer["result"]["value"])
 
     def wait_until(self, script: str, *, seconds: float = 60.0, in_frame: bool = False) -> None:
         """Return once an expression is true. Raises AssertionError after a time [s]."""
@@ -133,7 +133,7 @@ class Firefox:
             {"type": "pointerMove", "x": round(x), "y": round(y), "duration": MOVE_MILLISECONDS}
             for x, y in way
         ]
-        down, up = ({"type": f"pointer{each}", "button": 0} for each in ("Down", "Up"))
+        down, up = ({"type": f"pointer{end}", "button": 0} for end in ("Down", "Up"))
         self._perform("pointer", [moves[0], down, *moves[1:], up])
 
     def click(self, selector: str) -> None:
@@ -149,7 +149,7 @@ class Firefox:
 
     def press(self, key: str, seconds: float = 0.0) -> None:
         """Press a key, and release it after a time [s]."""
-        down, up = ({"type": f"key{each}", "value": key} for each in ("Down", "Up"))
+        down, up = ({"type": f"key{end}", "value": key} for end in ("Down", "Up"))
         self._perform("key", [down, {"type": "pause", "duration": round(1000 * seconds)}, up])
 
     def _perform(self, kind: str, actions: list[dict[str, Any]]) -> None:
@@ -167,9 +167,9 @@ def _address(process: subprocess.Popen[str]) -> str:
     assert process.stderr is not None
     end = time.monotonic() + START_SECONDS
     for line in process.stderr:
-        found = re.search(r"WebDriver BiDi listening on (\S+)", line)
-        if found:
-            return f"{found[1]}/session"
+        match = re.search(r"WebDriver BiDi listening on (\S+)", line)
+        if match:
+            return f"{match[1]}/session"
         assert time.monotonic() < end, "Firefox did not start"
     raise AssertionError(f"Firefox ended with status {process.wait()}")
 

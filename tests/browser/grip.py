@@ -75,7 +75,7 @@ class Grip(ABC):
 
     def _count(self, phase: str) -> int:
         sent = self._page.sent(f"TransformControlsDrag{phase}Message")
-        return sum(each.body["name"] == self._node for each in sent)
+        return sum(message.body["name"] == self._node for message in sent)
 
 
 class ArrowGrip(Grip):

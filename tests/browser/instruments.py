@@ -42,9 +42,9 @@ def show(page: ViserPage, wanted: bool) -> None:
 
 
 def card(page: ViserPage, name: str) -> Any:
-    found = page.page.locator(f"#instruments .card[data-id={name}]")
-    found.scroll_into_view_if_needed()
-    return found
+    element = page.page.locator(f"#instruments .card[data-id={name}]")
+    element.scroll_into_view_if_needed()
+    return element
 
 
 def dial(page: ViserPage, name: str) -> Any:
@@ -56,9 +56,9 @@ def goal(page: ViserPage, name: str) -> float:
     return float(dial(page, name).get_attribute("aria-valuenow") or "nan")
 
 
-def middle(found: Any) -> tuple[float, float, float]:
+def middle(element: Any) -> tuple[float, float, float]:
     """Return x and y of the middle of an element in the window, and half its width [px]."""
-    box = found.bounding_box()
+    box = element.bounding_box()
     assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2, box["width"] / 2
 

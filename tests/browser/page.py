@@ -136,7 +136,7 @@ class ViserPage:
             self.page.wait_for_timeout(2 * POLL_MILLISECONDS)
             values.append(value())
             return len(values) > 5 and all(
-                np.allclose(each, values[-1], atol=1e-4) for each in values[-6:]
+                np.allclose(value, values[-1], atol=1e-4) for value in values[-6:]
             )
 
         self.wait_until(rests, f"{what} to rest", seconds=20.0)
@@ -195,7 +195,7 @@ class ViserPage:
         self, log: str, kind: str, node: str | None, since: float, last: int | None
     ) -> list[Message]:
         # Selected in the page, because the transfer of a long record takes long.
-        found = self.frame.evaluate(
+        messages = self.frame.evaluate(
             """([log, type, node, since, last]) => {
                 const found = harness[log].filter((each) => each.type === type
                     && each.time >= since && (node === null || each.body.name === node));
@@ -203,7 +203,7 @@ class ViserPage:
             }""",
             [log, kind, node, since, last],
         )
-        return [Message(each["time"], each["type"], each["body"]) for each in found]
+        return [Message(message["time"], message["type"], message["body"]) for message in messages]
 
     def last_pose(self, node: str, *, since: float = 0.0) -> Matrix:
         """Return T_parent_node (4, 4) as the server sent it last.
@@ -211,11 +211,11 @@ class ViserPage:
         viser sends no pose for a node that stays in its initial pose, and none for a gizmo to the
         page that drags it. Raises LookupError if the server sent neither the frame nor a pose.
         """
-        position, wxyz, made = (
+        position, wxyz, built = (
             self.messages(kind, node=node, since=since, last=1)
             for kind in ("SetPositionMessage", "SetOrientationMessage", "FrameMessage")
         )
-        if not (position or wxyz or made):
+        if not (position or wxyz or built):
             raise LookupError(f"the server sent no pose of {node}")
         rotation = vtf.SO3(np.array(wxyz[0].body["wxyz"] if wxyz else (1.0, 0.0, 0.0, 0.0)))
         translation = np.array(position[0].body["position"] if position else (0.0, 0.0, 0.0))
@@ -332,8 +332,8 @@ class ViserPage:
         track = slider.locator(".mantine-Slider-trackContainer").bounding_box()
         assert track is not None, f"the slider {label} is not visible"
         start, stop = (
-            track["x"] + track["width"] * (each - low) / (high - low)
-            for each in (self.slider_value(label), value)
+            track["x"] + track["width"] * (number - low) / (high - low)
+            for number in (self.slider_value(label), value)
         )
         y = track["y"] + track["height"] / 2
         self.page.mouse.move(start, y)

@@ -96,8 +96,8 @@ class Person:
     def assert_stop_is_free(self) -> None:
         """Check that nothing lies over STOP and that the page does not scroll sideways."""
         place = middle(self.page.page.locator("#stop"))
-        found = self.page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
-        assert found == "stop"
+        name = self.page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
+        assert name == "stop"
         assert self.page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
 
 

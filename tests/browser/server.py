@@ -126,34 +126,34 @@ class AppServer:
     @property
     def stop_url(self) -> str:
         """Address of the port of STOP, which the process has printed."""
-        found = next(filter(None, map(STOP_PORT.search, reversed(self._lines))))
-        return f"{self.url.rpartition(':')[0]}:{found[1]}"
+        port = next(filter(None, map(STOP_PORT.search, reversed(self._lines))))
+        return f"{self.url.rpartition(':')[0]}:{port[1]}"
 
     def child(self, name: str) -> int:
         """Return the id of the child process ``name``. Raises ServerError if there is none."""
-        found = []
+        pids = []
         # The lists of children in /proc may lack one while another process ends.
         for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
                 stat = (process / "stat").read_text()
                 comm, _, rest = stat.partition("(")[2].rpartition(") ")
                 if comm == name and int(rest.split()[1]) == self.pid:
-                    found.append(int(process.name))
-        if len(found) != 1:
-            raise ServerError(f"{self._name} has {len(found)} processes {name!r}")
-        return found[0]
+                    pids.append(int(process.name))
+        if len(pids) != 1:
+            raise ServerError(f"{self._name} has {len(pids)} processes {name!r}")
+        return pids[0]
 
     @contextmanager
     def frozen(self, process: int) -> Iterator[None]:
         """Suspend ``process``, and the supervisor that would end it, inside the block."""
         processes = (self.pid, process)
-        for each in processes:
-            os.kill(each, signal.SIGSTOP)
+        for pid in processes:
+            os.kill(pid, signal.SIGSTOP)
         try:
             yield
         finally:
-            for each in reversed(processes):
-                os.kill(each, signal.SIGCONT)
+            for pid in reversed(processes):
+                os.kill(pid, signal.SIGCONT)
 
     def start(self) -> None:
         """Start the process and return when it is ready.

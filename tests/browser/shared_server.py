@@ -73,7 +73,7 @@ class SharedServer:
 
 
 def _objects(client: Client) -> set[str]:
-    return {each.name for each in client.query(answers.Objects).objects}
+    return {prop.name for prop in client.query(answers.Objects).objects}
 
 
 def _shown(client: Client) -> dict[str, Any]:

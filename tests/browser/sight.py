@@ -38,20 +38,20 @@ SHOWN = """() => {
 
 def shown(page: ViserPage) -> dict[str, Any]:
     page.wait_drawn()
-    found: dict[str, Any] = page.frame.evaluate(SHOWN)
-    return found
+    sight: dict[str, Any] = page.frame.evaluate(SHOWN)
+    return sight
 
 
 def whole(page: ViserPage) -> bool:
     """Return whether arm and gizmo are in the picture and not covered by either document."""
-    found = shown(page)
-    assert found["count"] > 1000
-    left, top, width, height = found["canvas"]
+    sight = shown(page)
+    assert sight["count"] > 1000
+    left, top, width, height = sight["canvas"]
     frame = page.frame.frame_element().bounding_box()
     assert frame is not None
     window = page.page.viewport_size
     assert window is not None
-    for x, y in found["outermost"]:
+    for x, y in sight["outermost"]:
         if not (left < x < left + width and top < y < top + height):
             return False
         place = [frame["x"] + x, frame["y"] + y]
@@ -59,7 +59,7 @@ def whole(page: ViserPage) -> bool:
             return False
         if page.page.evaluate("(at) => document.elementFromPoint(...at)?.id", place) != "scene":
             return False
-    return bool(found["uncovered"])
+    return bool(sight["uncovered"])
 
 
 def wait_whole(page: ViserPage, what: str) -> None:

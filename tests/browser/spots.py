@@ -42,12 +42,12 @@ class Spot(NamedTuple):
 def spot(page: ViserPage, links: list[str], joint: int) -> Spot:
     """Return the place of the link that is farthest from its axis, and not at its edge."""
     page.wait_drawn()
-    found = page.frame.evaluate(SPOTS, [links, joint])
-    assert found is not None, f"{links[joint]} is not in the picture"
+    places = page.frame.evaluate(SPOTS, [links, joint])
+    assert places is not None, f"{links[joint]} is not in the picture"
     box = page.page.locator("#scene").bounding_box()
     assert box is not None
-    x, y = found["pixel"]
-    return Spot((box["x"] + x, box["y"] + y), tuple(found["point"]))
+    x, y = places["pixel"]
+    return Spot((box["x"] + x, box["y"] + y), tuple(places["point"]))
 
 
 def seen_at(page: ViserPage, link: str, place: Spot) -> Pixel:

@@ -28,7 +28,7 @@ def reload(page: ViserPage) -> ViserPage:
     """Load the page again and open the sheet; return the window with its new documents."""
     page.page.reload()
     page.page.locator("#holder", has_text="drive").wait_for()
-    frame = next(each for each in page.page.frames if "/viser/" in each.url)
+    frame = next(frame for frame in page.page.frames if "/viser/" in frame.url)
     again = ViserPage(page.page, frame, page.errors)
     again.wait_ready(("/arm", MOVE))
     open_sheet(again)
@@ -79,7 +79,7 @@ def teach(page: ViserPage, truth: Truth, values: tuple[float, ...] = TURNS) -> N
 def play(page: ViserPage, truth: Truth) -> list[tuple[float, int | None]]:
     """Press Play; return axis 1 [deg] and the number of the marked pose, until the end."""
     press(page, "Play")
-    seen: list[tuple[float, int | None]] = []
+    angles: list[tuple[float, int | None]] = []
     deadline = time.monotonic() + PLAYED
     while says(page) != "Done.":
         assert time.monotonic() < deadline, says(page)
@@ -87,14 +87,14 @@ def play(page: ViserPage, truth: Truth) -> list[tuple[float, int | None]]:
             "() => document.querySelector('#teach li[aria-current] b')?.textContent"
         )
         number = int(marked) if marked else None
-        seen.append((float(np.degrees(truth.status()["q"][0])), number))
+        angles.append((float(np.degrees(truth.status()["q"][0])), number))
         page.page.wait_for_timeout(30)
-    return seen
+    return angles
 
 
 def drag(page: ViserPage, source: int, target: int) -> None:
     """Drag the row ``source`` by its picture over the row ``target`` (indices from 0)."""
-    boxes = [rows(page).nth(each).locator(".handle").bounding_box() for each in (source, target)]
+    boxes = [rows(page).nth(row).locator(".handle").bounding_box() for row in (source, target)]
     assert boxes[0] is not None
     assert boxes[1] is not None
     page.page.mouse.move(boxes[0]["x"] + 40, boxes[0]["y"] + 40)

@@ -54,22 +54,22 @@ def controls(page: ViserPage, tab: str) -> dict[str, Any]:
         return all(name for _, name in page.frame.evaluate(CONTROLS)["names"])
 
     page.wait_until(named, "names of all controls")
-    found: dict[str, Any] = page.frame.evaluate(CONTROLS)
-    return found
+    report: dict[str, Any] = page.frame.evaluate(CONTROLS)
+    return report
 
 
 @pytest.mark.long
 def test_every_control_of_the_panel_has_a_name_and_can_be_hit(page: ViserPage) -> None:
     for tab in TABS:
-        found = controls(page, tab)
-        assert len(found["names"]) > 5
-        small = [each for each in found["heights"] if each[1] < 31.9]
-        assert found["heights"]
+        report = controls(page, tab)
+        assert len(report["names"]) > 5
+        small = [row for row in report["heights"] if row[1] < 31.9]
+        assert report["heights"]
         assert not small
         # The slider of the preview has no thumb before there is a plan.
-        assert len(found["thumbs"]) == {"Drive": 6, "Programs": 0, "Scene": 2}[tab]
-        assert all(min(size) >= 16.0 for size in found["thumbs"])
-        assert not [each for each in found["text"] if each[1] < 13.0]
+        assert len(report["thumbs"]) == {"Drive": 6, "Programs": 0, "Scene": 2}[tab]
+        assert all(min(size) >= 16.0 for size in report["thumbs"])
+        assert not [row for row in report["text"] if row[1] < 13.0]
     page.open_tab("Drive")
     for label in ("1 base turn", "Gripper"):
         assert page.frame.get_by_role("slider", name=label, exact=True).count() == 1

@@ -169,20 +169,20 @@ def test_arm_stops_before_the_table_with_reason_and_warning_colour(
 
     def shown() -> list[str]:
         return [
-            each
-            for each in coats
-            if not robot.page.frame.evaluate("(name) => harness.missing([name])", each)
+            coat
+            for coat in coats
+            if not robot.page.frame.evaluate("(name) => harness.missing([name])", coat)
         ]
 
-    seen: list[str] = []
+    coats_shown: list[str] = []
 
     def appeared() -> bool:
-        seen.extend(shown())
-        return bool(seen)
+        coats_shown.extend(shown())
+        return bool(coats_shown)
 
     # Which finger is nearer can change again at once.
     robot.page.wait_until(appeared, "the warning colour")
-    coat = seen[0]
+    coat = coats_shown[0]
     robot.page.wait_drawn()
     robot.page.keep(artefacts / "app-contact.png")
     go_home(page, truth)

@@ -120,12 +120,12 @@ def assert_hazards_are_confirmed(card: Card, artefacts: Path) -> None:
     card.press("connect")
     card.shows("Arm uncalibrated")
     card.press("engage")
-    asked = page.locator("dialog.hazard")
-    assert "calibrated since it was switched on" in asked.inner_text()
-    assert asked.locator("button.main").is_disabled(), "the hazard must be confirmed"
+    dialog = page.locator("dialog.hazard")
+    assert "calibrated since it was switched on" in dialog.inner_text()
+    assert dialog.locator("button.main").is_disabled(), "the hazard must be confirmed"
     card.window.keep(artefacts / "arm-card-asks.png")
     page.keyboard.press("Escape")
-    assert not asked.is_visible(), "Esc also leaves the question"
+    assert not dialog.is_visible(), "Esc also leaves the question"
     assert truth.status()["arm"]["mode"] == "uncalibrated"
     card.confirm("engage")
     card.shows("Arm holding")
@@ -140,9 +140,9 @@ def assert_stop_is_measured(card: Card, program: Client) -> None:
     program.ask(requests.Speed(value=0.5))
     program.ask(requests.Joints(q=READY))
     card.shows("Arm moving")
-    begun = np.array(program.query(answers.State).q)
+    start = np.array(program.query(answers.State).q)
     card.window.wait_until(
-        lambda: np.abs(program.query(answers.State).q - begun).max() > 0.1, "the motion"
+        lambda: np.abs(program.query(answers.State).q - start).max() > 0.1, "the motion"
     )
     page.click("#stop")
     shown = re.fullmatch(

@@ -57,7 +57,7 @@ def test_stop_is_always_visible_and_the_largest_button(
 
     def areas() -> dict[str, float]:
         """Return the areas of all buttons of the bar; -1 for one outside the window."""
-        found: dict[str, float] = page.page.evaluate(
+        sizes: dict[str, float] = page.page.evaluate(
             """() => {
               const inside = ({left, top, right, bottom}) =>
                 left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight;
@@ -69,7 +69,7 @@ def test_stop_is_always_visible_and_the_largest_button(
                     inside(box) ? box.width * box.height : -1]));
             }"""
         )
-        return found
+        return sizes
 
     places: dict[str, list[Any]] = {size: [] for size in SIZES}
     for state in ("driving", "stopped"):
@@ -79,9 +79,9 @@ def test_stop_is_always_visible_and_the_largest_button(
             page.page.wait_for_selector("#clear-stop:not([hidden])")
         for size, (width, height) in SIZES.items():
             page.page.set_viewport_size({"width": width, "height": height})
-            found = areas()
-            assert min(found.values()) > 0.0, (size, found)
-            assert found["stop"] == max(found.values())
+            area = areas()
+            assert min(area.values()) > 0.0, (size, area)
+            assert area["stop"] == max(area.values())
             assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
             page.keep(artefacts / f"bar-{size}-{state}.png")
             places[size].append(page.page.locator("#scene").bounding_box())
@@ -118,13 +118,13 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
         """Note the height of the bar, and check that its parts neither overlap nor are cut."""
         page.page.wait_for_timeout(200)
         page.keep(artefacts / f"bar-{size[0]}-{state}.png")
-        found = page.page.evaluate(PARTS)
-        heights.add(found["height"])
-        for one, other in itertools.combinations(found["boxes"].items(), 2):
+        parts = page.page.evaluate(PARTS)
+        heights.add(parts["height"])
+        for one, other in itertools.combinations(parts["boxes"].items(), 2):
             assert not overlap(one[1], *other[1].values()), (state, one, other)
-        for name, box in found["boxes"].items():
+        for name, box in parts["boxes"].items():
             assert 0.0 <= box["x"] <= size[0] - box["width"] + 0.5, (state, name)
-        assert not [each for each in found["cut"] if "long name" not in each], state
+        assert not [word for word in parts["cut"] if "long name" not in word], state
 
     look("free")
     # The panel has its size by now.
@@ -156,7 +156,7 @@ def test_bar_keeps_its_height_and_the_reason_its_room(
     assert len(heights) == 1, heights
     # The scene and the panel stay where they are, whatever the bar says.
     shifts = page.page.evaluate("window.shifts")
-    assert not [each for each in shifts if not each["in_bar"]], shifts
+    assert not [shift for shift in shifts if not shift["in_bar"]], shifts
     assert page.errors == []
 
 
@@ -170,7 +170,7 @@ def test_everything_can_be_reached_by_keys_and_is_named(page: ViserPage) -> None
     names = ("instruments", "objects", "teach", "jog", "help", "more")
     buttons = [f"{name}-button" for name in names]
     buttons.insert(4, "phone-bar")
-    assert [each for each in order if each] == ["stop", "pause", *buttons, "scene"]
+    assert [name for name in order if name] == ["stop", "pause", *buttons, "scene"]
     page.page.click("#help-button")
     assert page.page.get_by_role("dialog", name="Help and keys").is_visible()
     assert page.page.locator("#headline").is_visible()
@@ -269,11 +269,11 @@ def test_link_signs_in_leaves_no_trace_and_only_then_viser_connects(
         page.goto(f"{server.url}/#{token}")
         page.locator("#name", has_text="Anna").wait_for()
         page.wait_for_selector("#poster.done", state="attached")
-        assert sorted(each.partition("?")[0].rpartition("/")[2] for each in opened) == [
+        assert sorted(url.partition("?")[0].rpartition("/")[2] for url in opened) == [
             "control",
             "viser",
         ]
-        assert sum(each.endswith("/viser/") for each in started) == 2
+        assert sum(url.endswith("/viser/") for url in started) == 2
         assert page.url == f"{server.url}/"
         assert not [url for url in started if token in url.partition("#")[0]]
         assert page.evaluate("() => document.cookie") == ""

@@ -62,7 +62,7 @@ def test_row_under_the_mouse_shows_its_branch(
     choices = reader.query(answers.Branches).choices
     path = reader.query(answers.Arm).links[-1].path
     gripper = reader.query(answers.State).gripper
-    options = {f"{each.shoulder}-{each.elbow}": each for each in choices}
+    options = {f"{choice.shoulder}-{choice.elbow}": choice for choice in choices}
     sent = len(page.sent("GuiUpdateMessage"))
     for branch, words in (("front-down", "elbow down"), ("back-up", "shoulder back")):
         row(page, branch).hover()

@@ -42,12 +42,12 @@ def listed(server: AppServer) -> dict[str, Any]:
     """Return the episodes of the server, queried without a browser."""
     status, _, body = ask(f"{server.url}/api/v1/episodes", Cookie=enter(server.url))
     assert status == 200, body
-    found: dict[str, Any] = json.loads(body)
-    return found
+    content: dict[str, Any] = json.loads(body)
+    return content
 
 
 def outcomes(server: AppServer) -> list[str]:
-    return [each["outcome"] for each in listed(server)["episodes"]]
+    return [row["outcome"] for row in listed(server)["episodes"]]
 
 
 def ready(page: ViserPage) -> None:

@@ -24,7 +24,7 @@ class Watch:
     def sent(self) -> list[object]:
         """Return the values sent since the start of the watch."""
         newer = self._page.sent("GuiUpdateMessage")[self._before :]
-        return [each.body["updates"]["value"] for each in newer]
+        return [message.body["updates"]["value"] for message in newer]
 
     def sees(self, *values: object) -> bool:
         """Wait for the values, and then as long as one more would take; return if none came."""

@@ -98,4 +98,4 @@ def test_page_reports_no_error(firefox: Firefox) -> None:
     firefox.evaluate("true")
     # Firefox reports this rejection although `forgoCode` of static/viser.js handles it.
     handled = "EvalError: Running text as code is not allowed."
-    assert [each for each in firefox.errors if each != handled] == []
+    assert [error for error in firefox.errors if error != handled] == []

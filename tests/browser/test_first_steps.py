@@ -154,7 +154,7 @@ def test_settings_for_developers_never_flash(open_page: OpenPage) -> None:
         page.wait_until(lambda: page.connected, "the connection", seconds=30.0)
         page.wait_ready(("/arm", MOVE))
         page.wait_drawn()
-        found = page.page.evaluate("settings")
+        settings = page.page.evaluate("settings")
         # The panel shows them for a moment by itself.
-        assert found["seen"] > 0
-        assert found["shown"] == 0
+        assert settings["seen"] > 0
+        assert settings["shown"] == 0

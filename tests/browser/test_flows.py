@@ -140,7 +140,7 @@ def objects(person: Person, reader: Client, folder: Path) -> None:
     page = person.page
 
     def names() -> set[str]:
-        return {each.name for each in reader.query(answers.Objects).objects}
+        return {prop.name for prop in reader.query(answers.Objects).objects}
 
     before = names()
     part = folder / "part.stl"
@@ -154,9 +154,9 @@ def objects(person: Person, reader: Client, folder: Path) -> None:
     person.assert_stop_is_free()
     person.press(page.page.locator("#objects-button"))
     (added,) = names() - before
-    found = next(each for each in reader.query(answers.Objects).objects if each.name == added)
-    place: Any = np.array(found.T)
-    top = place[:3, 3] + (0.0, 0.0, 0.5 * found.size[-1])
+    target = next(prop for prop in reader.query(answers.Objects).objects if prop.name == added)
+    place: Any = np.array(target.T)
+    top = place[:3, 3] + (0.0, 0.0, 0.5 * target.size[-1])
     pixel = still(page, lambda: page.project(top))
     person.point(pixel)
     page.page.wait_for_selector("#selection:not([hidden])")
@@ -290,11 +290,11 @@ def taught_poses(person: Person) -> None:
 
 def link(person: Person, reader: Client) -> None:
     page, truth = person.page, person.truth
-    links = ["/arm/" + "/".join(each.path) for each in reader.query(answers.Arm).links]
+    links = ["/arm/" + "/".join(link.path) for link in reader.query(answers.Arm).links]
 
     def middle() -> Pixel:
         """Return the pixel in the middle of the upper arm."""
-        shoulder, elbow = (page.node_pose(each)[:3, 3] for each in links[1:3])
+        shoulder, elbow = (page.node_pose(link)[:3, 3] for link in links[1:3])
         return page.project(0.5 * (shoulder + elbow))
 
     person.point(still(page, middle))

@@ -41,7 +41,7 @@ def test_arm_is_handed_over(
     page: ViserPage, server: AppServer, truth: Truth, open_page: OpenPage
 ) -> None:
     other = open_page(server.url, nodes=("/arm", MOVE))
-    me, they = (bar(each, "name").partition(",")[0] for each in (page, other))
+    me, they = (bar(window, "name").partition(",")[0] for window in (page, other))
     other.wait_until(lambda: bar(other, "holder") == f"{me} drives", "who drives")
     # A control of a person who does not drive springs back, and the reason is shown.
     before = other.slider_value("1 base turn")

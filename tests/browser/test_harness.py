@@ -26,7 +26,7 @@ def test_features_that_playwright_disables_stay_disabled(browser: Browser) -> No
     session = browser.new_browser_cdp_session()
     command: str = session.send("SystemInfo.getInfo")["commandLine"]
     session.detach()
-    lists = [set(each.split(",")) for each in re.findall(r"--disable-features=(\S+)", command)]
+    lists = [set(words.split(",")) for words in re.findall(r"--disable-features=(\S+)", command)]
     # Chromium takes the last one.
     assert len(lists) >= 2
     assert set().union(*lists) == lists[-1]

@@ -45,8 +45,8 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     turn(page, "axis-1", 50.0)
     # The last command of a turn follows those before it at the rate of the page.
     page.wait_until(lambda: abs(goal(page, "axis-1") - start - 50.0) < 2.0, "the goal")
-    there = goal(page, "axis-1")
-    end = math.radians(there)
+    reached = goal(page, "axis-1")
+    end = math.radians(reached)
     page.wait_until(lambda: abs(truth.status()["q"][0] - end) < 1e-4, "the end of the turn")
     page.page.wait_for_timeout(200)
 
@@ -54,13 +54,13 @@ def test_a_knob_turns_a_joint_and_the_plots_grow_meanwhile(page: ViserPage, trut
     t, angle = grown["t [s]"], grown["Axis 1 [deg]"]
     assert t[-1] > early["t [s]"][-1] + 0.5
     assert (np.diff(t) > 0.0).all()
-    assert angle[-1] == pytest.approx(there, abs=0.01)
+    assert angle[-1] == pytest.approx(reached, abs=0.01)
     # The plot has many points between, and the integral of the speed is the distance.
-    moving = angle[(angle > start + 1.0) & (angle < there - 1.0)]
+    moving = angle[(angle > start + 1.0) & (angle < reached - 1.0)]
     assert len(np.unique(moving)) > 10
     speeds = table(page, "joint-speeds")
     distance = np.trapezoid(speeds["Axis 1 [deg/s]"], speeds["t [s]"])
-    assert distance == pytest.approx(there - start, rel=0.1)
+    assert distance == pytest.approx(reached - start, rel=0.1)
 
 
 def test_keys_and_wheel_turn_what_has_the_focus(page: ViserPage, truth: Truth) -> None:
@@ -166,7 +166,7 @@ def test_instruments_fit_the_page(page: ViserPage, artefacts: Path) -> None:
         page.page.set_viewport_size({"width": width, "height": height})
         page.page.wait_for_timeout(100)
         assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
-        stop, scene = (page.page.locator(f"#{each}").bounding_box() for each in ("stop", "scene"))
+        stop, scene = (page.page.locator(f"#{name}").bounding_box() for name in ("stop", "scene"))
         assert stop is not None
         assert scene is not None
         assert min(stop["x"], stop["y"]) >= 0.0

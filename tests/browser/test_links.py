@@ -46,7 +46,7 @@ def page(page: ViserPage) -> ViserPage:
 def links(server: AppServer) -> list[str]:
     """Return the node of the link that each joint moves."""
     with connect(server.url, "Reader") as reader:
-        return ["/arm/" + "/".join(each.path) for each in reader.query(answers.Arm).links]
+        return ["/arm/" + "/".join(link.path) for link in reader.query(answers.Arm).links]
 
 
 def q(truth: Truth) -> Any:
@@ -102,7 +102,7 @@ def test_link_under_the_mouse_is_named_and_highlighted(
 def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
     page: ViserPage, links: list[str], truth: Truth, artefacts: Path
 ) -> None:
-    grabbed, seen = spot(page, links, 2), camera(page)
+    grabbed, view = spot(page, links, 2), camera(page)
     axis = on_axis(page, links[2], grabbed)
     start = np.subtract(grabbed.pixel, axis)
     c, s = np.cos(TURN), np.sin(TURN)
@@ -117,7 +117,7 @@ def test_grabbed_point_follows_the_mouse_and_one_undo_brings_it_back(
     moved = rest(truth)
     assert list(np.abs(moved - READY) > 1e-6) == [False, False, True, False, False]
     assert abs(moved[2] - READY[2]) > 0.3
-    assert np.allclose(camera(page), seen, atol=1e-3)
+    assert np.allclose(camera(page), view, atol=1e-3)
     page.page.keyboard.press("Control+z")
     page.wait_until(lambda: np.allclose(q(truth), READY, atol=1e-6), "the way back")
 
@@ -193,9 +193,9 @@ def test_finger_takes_hold_of_the_selected_link_only(
             hand.move((start[0] + by[0], start[1] + by[1]), seconds=0.6, steps=10)
             hand.lift()
 
-    seen = camera(page)
+    view = camera(page)
     swipe(spot(page, links, 2).pixel, (30.0, 20.0))
-    page.wait_until(lambda: not np.allclose(camera(page), seen, atol=1e-2), "another view")
+    page.wait_until(lambda: not np.allclose(camera(page), view, atol=1e-2), "another view")
     assert np.allclose(rest(truth), start, atol=1e-6)
     page.look_from(SIDE)
     page.settled(lambda: camera(page), "the camera")

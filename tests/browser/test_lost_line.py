@@ -27,7 +27,7 @@ from tests.gateway.slow_link import DelayedLink, SlowLink
 
 def worker_of(page: ViserPage) -> Worker:
     """Return the worker that holds the connection of the page."""
-    (worker,) = (each for each in page.page.workers if each.url.endswith("link.js"))
+    (worker,) = (worker for worker in page.page.workers if worker.url.endswith("link.js"))
     return worker
 
 

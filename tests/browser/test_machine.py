@@ -40,7 +40,7 @@ def links(server: AppServer) -> list[str]:
         arm = reader.query(answers.Arm)
     assert arm.joints_only
     assert arm.slides == [True, False, False]
-    paths = [[quote(name, safe="") for name in each.path] for each in arm.links]
+    paths = [[quote(name, safe="") for name in link.path] for link in arm.links]
     assert paths[-1][-1] == "left%2Ffinger"
     return ["/arm/" + "/".join(path) for path in paths]
 

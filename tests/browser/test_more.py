@@ -124,9 +124,9 @@ def test_another_robot_is_opened_and_every_window_loads_again(
         if AXE.exists():
             assert findings(page) == []
         windows[0].keep(artefacts / "robots.png")
-        begun = [window.page.evaluate("performance.timeOrigin") for window in windows]
+        starts = [window.page.evaluate("performance.timeOrigin") for window in windows]
         page.set_input_files("#robots input[type=file]", arm)
-        for window, time_origin in zip(windows, begun, strict=True):
+        for window, time_origin in zip(windows, starts, strict=True):
             window.page.wait_for_function(
                 "(begun) => performance.timeOrigin > begun", arg=time_origin, timeout=40_000
             )

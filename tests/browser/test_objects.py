@@ -44,7 +44,7 @@ GLOWING = """(name) => {
 
 def objects(reader: Client) -> dict[str, Any]:
     """Return the objects by their names."""
-    return {each.name: each for each in reader.query(answers.Objects).objects}
+    return {prop.name: prop for prop in reader.query(answers.Objects).objects}
 
 
 def place_of(reader: Client, name: str) -> Any:
@@ -82,7 +82,7 @@ def cube(side: float, kind: str = "stl") -> bytes:
 
 def clear_refusals(page: ViserPage) -> None:
     """Drop what the browser reports about refused files; anything else is an error."""
-    assert all("422" in each for each in page.errors)
+    assert all("422" in error for error in page.errors)
     page.errors.clear()
 
 

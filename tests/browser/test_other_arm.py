@@ -40,7 +40,7 @@ def six(other: AppServer, open_page: OpenPage) -> ViserPage:
 def link(page: ViserPage, name: str) -> Any:
     """Return the pose (4, 4) at which a link is drawn."""
     names = page.frame.evaluate("() => Object.keys(__viserMutable.nodeRefFromName)")
-    return page.node_pose(next(each for each in names if each.endswith(f"/{name}")))
+    return page.node_pose(next(node for node in names if node.endswith(f"/{name}")))
 
 
 def tool(page: ViserPage) -> Any:

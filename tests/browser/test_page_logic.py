@@ -252,7 +252,7 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         assert said()[0]["by"] == [0, 0, -0.01, 0, 0]
         for stick in (0.4, 0.9, 1.0, 0.0, 0.9):
             page.evaluate("(x) => steps.deflect([x, 0, 0, 0, 0, 0, 0])", stick)
-        assert [each["by"][0] for each in said()] == [0.01, 0.01]
+        assert [message["by"][0] for message in said()] == [0.01, 0.01]
         # Joints move by steps only.
         choose("step", "0")
         choose("frame", "joints")
@@ -263,7 +263,7 @@ def test_steps_move_once_by_button_key_and_stick(browser: Browser) -> None:
         assert turn["by"] == pytest.approx(0.0174533, abs=1e-6)
         for buttons in ([True, False], [True, False], [False, True]):
             page.evaluate("(buttons) => steps.grip(...buttons)", buttons)
-        assert [each["angle"] for each in said()] == [0.3, -0.4]
+        assert [message["angle"] for message in said()] == [0.3, -0.4]
 
 
 def test_elbow_of_seven_axes_moves_while_the_tool_rests(browser: Browser) -> None:
@@ -372,17 +372,17 @@ def test_text_of_poses_is_read_back_as_the_same_poses(page: Page) -> None:
     for name, (times, poses) in TAUGHT.items():
         content = {"name": name, "times": times, "poses": poses}
         text = module(page, "teach/poses.js", "({ scriptOf }, all) => scriptOf(all).text", content)
-        found = taught(parse(text))
-        assert found is not None, text
-        assert (found.name, found.times) == (name, times)
+        program = taught(parse(text))
+        assert program is not None, text
+        assert (program.name, program.times) == (name, times)
         wanted = []
-        for number, each in enumerate(poses):
+        for number, pose in enumerate(poses):
             after = poses[number + 1] if number + 1 < len(poses) else None
             # A pose is passed only on the way to another one at the same speed.
-            blend = each["blend"] and after is not None and after["speed"] == each["speed"]
-            speed, joints = each["speed"] / 100, tuple(each["joints"])
-            wanted.append(TaughtPose(joints, speed, blend, each["gripper"], each["wait"]))
-        assert list(found.poses) == wanted, text
+            blend = pose["blend"] and after is not None and after["speed"] == pose["speed"]
+            speed, joints = pose["speed"] / 100, tuple(pose["joints"])
+            wanted.append(TaughtPose(joints, speed, blend, pose["gripper"], pose["wait"]))
+        assert list(program.poses) == wanted, text
 
 
 KEPT = """({ Content }, text, joints) => {
@@ -466,7 +466,7 @@ def test_layout_of_instruments_is_repaired_and_arranged(page: Page) -> None:
 
     def names(call: str) -> list[str]:
         changed = module(page, path, f"(own, first) => own.{call}", first)
-        return [each["id"] for each in changed if each["shown"]]
+        return [row["id"] for row in changed if row["shown"]]
 
     assert names("moved(first, 'clearance', 'speed')") == ["clearance", "speed"]
     assert names("nudged(first, 'speed', 1)") == ["clearance", "speed"]

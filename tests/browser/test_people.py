@@ -127,7 +127,7 @@ def test_disconnected_person_stops_the_arm_on_a_phone(site: Site, windows: Windo
         visiting(windows, f"{url}/#{token}") as phone,
     ):
         phone.set_viewport_size({"width": 390, "height": 844})
-        (kai,) = (each for each in guard.people() if each.name == "Kai")
+        (kai,) = (person for person in guard.people() if person.name == "Kai")
         guard.kick(kai.person, 600.0)
         phone.get_by_text("Your STOP still works").wait_for(timeout=10_000)
         for again in (False, True):

@@ -77,7 +77,7 @@ def test_the_slider_moves_the_arm_without_a_network(browser: Browser, recording:
 
 def pan(page: Page) -> float:
     """Return the angle [rad] of axis 1 on the page."""
-    found = page.evaluate("name => harness.poses(name)", PAN)
-    node, root = (np.reshape(found[key], (4, 4)).T for key in ("node", "root"))
+    poses = page.evaluate("name => harness.poses(name)", PAN)
+    node, root = (np.reshape(poses[key], (4, 4)).T for key in ("node", "root"))
     R = (np.linalg.inv(root) @ node)[:3, :3]
     return math.atan2(R[1, 0], R[0, 0])

@@ -165,29 +165,29 @@ def opened(browser: Browser, site: str) -> Iterator[Page]:
 def test_roslib_drives_the_arm(browser: Browser, site: str) -> None:
     with AppServer((*APP, "--ros-page", site)) as server, opened(browser, site) as page:
         page.evaluate(CONNECT, server.url.replace("http", "ws") + "/rosbridge")
-        seen: dict[str, Any] = page.evaluate(SEE)
-        assert {"/joint_states", "/tf", "/tf_static"} <= set(seen["topics"])
-        assert seen["name"] == "katana450"
-        assert "tcp" in seen["links"]
-        assert "pan_link" in seen["frames"]
-        assert len(seen["meshes"]) > 30
+        sight: dict[str, Any] = page.evaluate(SEE)
+        assert {"/joint_states", "/tf", "/tf_static"} <= set(sight["topics"])
+        assert sight["name"] == "katana450"
+        assert "tcp" in sight["links"]
+        assert "pan_link" in sight["frames"]
+        assert len(sight["meshes"]) > 30
 
-        found: dict[str, Any] = page.evaluate(RUN)
-        assert found["result"]["error_code"] == 0
-        assert found["feedback"] >= 10
-        assert found["q"] == pytest.approx([0.4, -1.1, 1.4, 0.2, 0.3], abs=1e-3)
+        shown: dict[str, Any] = page.evaluate(RUN)
+        assert shown["result"]["error_code"] == 0
+        assert shown["feedback"] >= 10
+        assert shown["q"] == pytest.approx([0.4, -1.1, 1.4, 0.2, 0.3], abs=1e-3)
 
-        found = page.evaluate(CANCEL)
-        assert "5" in found["failed"] or "cancel" in found["failed"].lower()
-        assert found["q"][0] > 0.0
-        assert found["later"] == pytest.approx(found["q"], abs=0.02)
+        shown = page.evaluate(CANCEL)
+        assert "5" in shown["failed"] or "cancel" in shown["failed"].lower()
+        assert shown["q"][0] > 0.0
+        assert shown["later"] == pytest.approx(shown["q"], abs=0.02)
 
-        found = page.evaluate(JOG)
-        assert max(abs(a - b) for a, b in zip(found["before"], found["after"], strict=True)) > 0.01
-        assert found["later"] == pytest.approx(found["after"], abs=1e-6)
-        assert "five axes" in found["statuses"][0]
+        shown = page.evaluate(JOG)
+        assert max(abs(a - b) for a, b in zip(shown["before"], shown["after"], strict=True)) > 0.01
+        assert shown["later"] == pytest.approx(shown["after"], abs=1e-6)
+        assert "five axes" in shown["statuses"][0]
 
-        found = page.evaluate(STOP)
-        assert found["response"] == {"success": True, "message": "requested"}
-        assert "STOP" in found["failed"]
-        assert "pressed STOP" in found["stopped"]
+        shown = page.evaluate(STOP)
+        assert shown["response"] == {"success": True, "message": "requested"}
+        assert "STOP" in shown["failed"]
+        assert "pressed STOP" in shown["stopped"]

@@ -63,15 +63,15 @@ def wait_state(page: ViserPage, height: str) -> None:
 
 
 def box(element: Locator) -> FloatRect:
-    found = element.bounding_box()
-    assert found is not None, f"{element} is not shown"
-    return found
+    area = element.bounding_box()
+    assert area is not None, f"{element} is not shown"
+    return area
 
 
 def assert_stop_can_be_pressed(page: ViserPage) -> None:
     place = middle(page.page.locator("#stop"))
-    found = page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
-    assert found == "stop"
+    name = page.page.evaluate("(at) => document.elementFromPoint(...at).id", place)
+    assert name == "stop"
 
 
 def drag(page: ViserPage, by: float, seconds: float = 0.4) -> None:
@@ -152,7 +152,7 @@ def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefa
     phone.page.tap("#jog-button")
     wait_state(phone, "folded")
     phone.page.locator("#gripper button").first.wait_for()
-    sheet, shown, stop = (box(each) for each in (jog, handle(phone), phone.page.locator("#stop")))
+    sheet, shown, stop = (box(part) for part in (jog, handle(phone), phone.page.locator("#stop")))
     for other in (shown, stop):
         # Fractions of a pixel do not count.
         assert not overlap(sheet, other["x"], other["y"], other["width"], other["height"] - 0.5)
@@ -161,7 +161,7 @@ def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefa
     for button in jog.locator("button, .pad, .choice span").all():
         if button.is_visible():
             assert min(box(button)["width"], box(button)["height"]) >= FINGER - 0.5
-    assert not any(each.is_visible() for each in jog.locator("kbd").all())
+    assert not any(element.is_visible() for element in jog.locator("kbd").all())
     phone.keep(artefacts / "sheet-jog.png")
     # A pad that is held lets go when the panel takes the place of its sheet.
     with fingers(phone.page) as hand:
@@ -169,9 +169,9 @@ def test_one_sheet_is_open_at_a_time(phone: ViserPage, server: AppServer, artefa
         hand.put((x, y))
         hand.move((x, y - 40.0), seconds=0.1)
         truth.wait(moving=True)
-        at, low = middle(handle(phone))
-        hand.put((at, low), finger=1)
-        hand.move((at, low - 100.0), finger=1)
+        middle_x, low = middle(handle(phone))
+        hand.put((middle_x, low), finger=1)
+        hand.move((middle_x, low - 100.0), finger=1)
         # At rest, so that its speed does not count.
         phone.page.wait_for_timeout(200)
         hand.lift(1)
@@ -224,13 +224,13 @@ def test_buttons_are_finger_sized_and_covered_by_no_message(
             "katana.toast('Axis 2: 300 is not between -124.3 and 7.8. It was not sent.')"
         )
         page.page.wait_for_selector("#toast.shown")
-        found: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
-        assert {"stop", "clear-stop", opener} <= found.keys()
-        assert min(min(box[2:]) for box in found.values()) >= PRESSABLE_SIZE, found
-        toast, reason = (page.page.locator(each).bounding_box() for each in ("#toast", "#why"))
+        buttons: dict[str, list[float]] = page.page.evaluate(PRESSABLE)
+        assert {"stop", "clear-stop", opener} <= buttons.keys()
+        assert min(min(box[2:]) for box in buttons.values()) >= PRESSABLE_SIZE, buttons
+        toast, reason = (page.page.locator(name).bounding_box() for name in ("#toast", "#why"))
         assert toast is not None
         assert reason is not None
-        for name, (x, y, width, height) in found.items():
+        for name, (x, y, width, height) in buttons.items():
             assert not overlap(toast, x, y, width, height), name
             assert not overlap(reason, x, y, width, height), name
         assert page.page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")

@@ -178,7 +178,7 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
             **PHONE,
         )
         wait_whole(page, "on a phone")
-        shades = [each.evaluate("() => [...shades]") for each in (page.page.main_frame, page.frame)]
+        shades = [part.evaluate("() => [...shades]") for part in (page.page.main_frame, page.frame)]
         assert set(shades[0]) == {NIGHT}
         assert {NIGHT, "viser dark"} <= set(shades[1]) <= {NIGHT, "viser dark", "bare dark"}
         page.keep(artefacts / "phone.png")
@@ -200,8 +200,8 @@ def test_dark_theme_applies_from_the_first_frame_on_a_slow_phone(
 
 def in_view(page: ViserPage, text: str) -> bool:
     """Return whether the text in viser's document is in the window."""
-    found = page.frame.get_by_text(text, exact=True).first
-    box = found.bounding_box() if found.is_visible() else None
+    row = page.frame.get_by_text(text, exact=True).first
+    box = row.bounding_box() if row.is_visible() else None
     size = page.page.viewport_size
     assert size is not None
     return box is not None and box["y"] + box["height"] < size["height"]

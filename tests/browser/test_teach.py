@@ -47,8 +47,8 @@ def test_poses_are_taught_reordered_played_and_kept(
     teach(sheet, truth)
     sheet.frame.evaluate("() => harness.draw(false)")
     pictures = [pose["picture"] for pose in kept(sheet)["poses"]]
-    for each in pictures:
-        head, _, data = each.partition(",")
+    for picture in pictures:
+        head, _, data = picture.partition(",")
         assert head == "data:image/jpeg;base64"
         assert np.std(imageio.imread(base64.b64decode(data), extension=".jpg")) > 10.0
     assert len(set(pictures)) == 3
@@ -56,10 +56,10 @@ def test_poses_are_taught_reordered_played_and_kept(
     drag(sheet, 2, 0)
     assert turns(sheet) == [45, 20, -25]
     go_home(sheet, truth)
-    seen = play(sheet, truth)
+    done = play(sheet, truth)
     # The arm passes the poses in their order, each while it is marked.
     reached = [
-        next(i for i, (turn, number) in enumerate(seen) if abs(turn - value) < 3.0 and number == k)
+        next(i for i, (turn, number) in enumerate(done) if abs(turn - value) < 3.0 and number == k)
         for k, value in enumerate((45.0, 20.0, -25.0), 1)
     ]
     assert reached == sorted(reached)
@@ -74,12 +74,12 @@ def test_poses_are_taught_reordered_played_and_kept(
     assert downloading.value.suggested_filename == "My script.yaml"
     path = tmp_path / "My script.yaml"
     downloading.value.save_as(path)
-    found = taught(parse(path.read_text(encoding="utf-8")))
-    assert found is not None
-    assert [pose.joints for pose in found.poses] == [
+    program = taught(parse(path.read_text(encoding="utf-8")))
+    assert program is not None
+    assert [pose.joints for pose in program.poses] == [
         tuple(pose["joints"]) for pose in before["poses"]
     ]
-    assert [pose.gripper for pose in found.poses] == [pose["gripper"] for pose in before["poses"]]
+    assert [pose.gripper for pose in program.poses] == [pose["gripper"] for pose in before["poses"]]
     # The file can be opened again.
     press(sheet, "Remove pose 1")
     sheet.page.set_input_files("#teach input[type=file]", path)
@@ -139,8 +139,8 @@ def test_play_from_before_a_stop_is_refused(sheet: ViserPage, truth: Truth) -> N
 def listed(page: ViserPage, script: str) -> bool:
     """Return whether the list of the panel, which follows the folder, has a script."""
     lists = page.messages("GuiUpdateMessage") + page.messages("GuiDropdownMessage")
-    options = [each.body.get("updates", each.body.get("props", {})) for each in lists]
-    return any(script in each.get("options", ()) for each in options)
+    options = [message.body.get("updates", message.body.get("props", {})) for message in lists]
+    return any(script in option.get("options", ()) for option in options)
 
 
 def test_chosen_script_of_the_panel_is_edited_as_text(

@@ -130,7 +130,7 @@ def test_past_is_shown_in_one_window_until_stop(
     run.update()
     slider = page.page.get_by_label(NOW)
     length = float(slider.get_attribute("max") or 0.0)
-    assert length == pytest.approx(sum(each.length for each in run.spans), abs=1e-3)
+    assert length == pytest.approx(sum(span.length for span in run.spans), abs=1e-3)
     begin = run.at(run.spans[0].start)
     assert begin is not None
 
@@ -160,8 +160,8 @@ def test_past_is_shown_in_one_window_until_stop(
     titles = page.page.locator("#timeline .marks i").evaluate_all(
         "(all) => all.map((e) => e.title)"
     )
-    assert any("Ada pressed STOP" in each for each in titles), titles
-    assert any("Ada drives" in each for each in titles), titles
+    assert any("Ada pressed STOP" in title for title in titles), titles
+    assert any("Ada drives" in title for title in titles), titles
 
     # Nothing of this concerns the arm.
     assert truth.status()["q"] == before
@@ -221,7 +221,7 @@ def test_selection_is_saved_opened_and_compared(
     ring, part = PlaybackRun(lambda: recordings_in(folder)), PlaybackRun(lambda: [path])
     ring.update()
     part.update()
-    begin, end = (at_place(ring.spans, each) for each in ends.values())
+    begin, end = (at_place(ring.spans, place) for place in ends.values())
     assert part.spans[0].start == pytest.approx(begin, abs=0.05)
     assert begin < part.spans[-1].end < end + 0.05
     assert saved.verify().identical

@@ -78,18 +78,18 @@ def test_maps_show_force_and_centre_of_pressure(page: Page, arm: Client) -> None
         page.wait_for_function(
             "(each) => each.textContent === '10.0 N'", arg=force.element_handle()
         )
-        found = card.get_by_role("img", name=f"{side} pad")
-        assert 8 <= found.evaluate(INK) <= 64
-        assert "10.0 N, centre of pressure" in (found.get_attribute("aria-label") or "")
-        assert found.locator("i").is_visible()
+        pad = card.get_by_role("img", name=f"{side} pad")
+        assert 8 <= pad.evaluate(INK) <= 64
+        assert "10.0 N, centre of pressure" in (pad.get_attribute("aria-label") or "")
+        assert pad.locator("i").is_visible()
     grip(arm, OPEN)
     page.wait_for_function(
         """() => [...document.querySelectorAll(".pressure output")]
           .every((each) => each.textContent === "0.0 N")"""
     )
-    for found in card.get_by_role("img").all():
-        assert found.evaluate(INK) == 0
-        assert not found.locator("i").is_visible()
+    for pad in card.get_by_role("img").all():
+        assert pad.evaluate(INK) == 0
+        assert not pad.locator("i").is_visible()
     state = arm.query(answers.State)
     assert state.touch is not None
     assert state.touch["pads"][0]["pressure"] == []
@@ -98,8 +98,8 @@ def test_maps_show_force_and_centre_of_pressure(page: Page, arm: Client) -> None
 
 def felt(page: Page) -> list[dict[str, Any]]:
     """Return what the devices have played since the last call."""
-    found: list[dict[str, Any]] = page.evaluate("() => felt.splice(0)")
-    return found
+    pulses: list[dict[str, Any]] = page.evaluate("() => felt.splice(0)")
+    return pulses
 
 
 @pytest.mark.long
@@ -116,12 +116,12 @@ def test_devices_vibrate_only_after_they_were_turned_on(page: Page, arm: Client)
     grip(arm, CLOSED)
     page.wait_for_function("() => felt.some(({ strongMagnitude }) => strongMagnitude > 0.9)")
     played = felt(page)
-    assert {each["kind"] for each in played} == {"dual-rumble", "phone"}
-    assert max(each.get("strongMagnitude", 0.0) for each in played) <= 1.0
-    assert all(each["duration"] > 0 for each in played)
+    assert {pulse["kind"] for pulse in played} == {"dual-rumble", "phone"}
+    assert max(pulse.get("strongMagnitude", 0.0) for pulse in played) <= 1.0
+    assert all(pulse["duration"] > 0 for pulse in played)
     # A force that lasts is not felt. States that were under way may still tell of the approach.
     page.wait_for_timeout(200)
-    assert not [each for each in felt(page) if each.get("strongMagnitude")]
+    assert not [pulse for pulse in felt(page) if pulse.get("strongMagnitude")]
     page.wait_for_timeout(200)
     assert felt(page) == []
     button.click()

@@ -48,11 +48,11 @@ def face(page: ViserPage, name: str) -> tuple[float, float]:
 def wait_from(page: ViserPage, preset: Preset) -> None:
     """Wait until the camera looks in the direction of a preset; it may be fitted."""
     look = CAMERA_POSES[preset]
-    ahead = np.subtract(look.target, look.position)
+    direction = np.subtract(look.target, look.position)
 
     def there() -> bool:
         position, target = camera(page)
-        return bool(np.allclose(unit(target - position), unit(ahead), atol=0.02))
+        return bool(np.allclose(unit(target - position), unit(direction), atol=0.02))
 
     page.wait_until(there, f"the view {preset.value}")
 
@@ -66,9 +66,9 @@ def test_cube_shows_how_the_scene_is_seen(page: ViserPage) -> None:
         middle = np.mean([face(page, "front"), face(page, "back")], axis=0)
         for name, out in [*OUT.items(), ("top", UP)]:
             shown = np.subtract(top if name == "top" else face(page, name), middle)
-            seen = np.subtract(page.project(np.add(np.multiply(out, 0.02), CENTRE)), origin)
-            across = np.linalg.norm(shown) * np.linalg.norm(seen)
-            assert float(shown @ seen) / across > 0.97, (position, name)
+            offset = np.subtract(page.project(np.add(np.multiply(out, 0.02), CENTRE)), origin)
+            across = np.linalg.norm(shown) * np.linalg.norm(offset)
+            assert float(shown @ offset) / across > 0.97, (position, name)
 
 
 @pytest.mark.long

@@ -60,7 +60,7 @@ def height(page: ViserPage) -> float:
 
 def test_page_takes_camera_and_resolution_from_its_address(page: ViserPage) -> None:
     with part("PARAMETER"):
-        names = [each.partition("=")[0] for each in CAMERA.query(COARSE).split("&")]
+        names = [part.partition("=")[0] for part in CAMERA.query(COARSE).split("&")]
         assert all(ask(page, f"Viser.PARAMETER.test('{name}')") for name in names)
         assert eye(page) == pytest.approx(CAMERA.position, abs=1e-3)
         assert (
@@ -228,10 +228,10 @@ def test_page_hides_nodes_by_itself(page: ViserPage) -> None:
             with part("hasHidden"):
                 assert ask(page, "Viser.hasHidden()") is not shown
     with part("handles"):
-        sent = {each["type"] for each in ask(page, "harness.sent")}
-        assert not any(ask(page, f"Viser.handles({{ type: '{each}' }})") for each in sent)
-        for each in ("TransformControlsUpdateMessage", "SceneNodeClickMessage"):
-            assert ask(page, f"Viser.handles({{ type: '{each}' }})")
+        sent = {message["type"] for message in ask(page, "harness.sent")}
+        assert not any(ask(page, f"Viser.handles({{ type: '{kind}' }})") for kind in sent)
+        for handled in ("TransformControlsUpdateMessage", "SceneNodeClickMessage"):
+            assert ask(page, f"Viser.handles({{ type: '{handled}' }})")
     with part("controls"):
         assert ask(page, "Viser.controls({ type: 'GuiUpdateMessage' })")
 
@@ -266,19 +266,19 @@ def test_number_boxes_are_found_and_filled(page: ViserPage) -> None:
     with part("NUMBER_BOX"):
         assert ask(page, f"{boxes}.length") == 4
     with part("controlOf"):
-        found = ask(page, f"{boxes}.map(Viser.controlOf)")
+        boxes_found = ask(page, f"{boxes}.map(Viser.controlOf)")
         expected = [(slider.body["uuid"], "Height", 0)]
         expected += [(vector.body["uuid"], "Point", index) for index in range(3)]
-        assert [(each["id"], each["label"], each["index"]) for each in found] == expected
+        assert [(box["id"], box["label"], box["index"]) for box in boxes_found] == expected
     with part("keepControls"):
-        kept = ask(page, "[...tapped.controls.values()]")
-        assert [(each["min"], each["max"], each["step"]) for each in kept] == [
+        controls = ask(page, "[...tapped.controls.values()]")
+        assert [(control["min"], control["max"], control["step"]) for control in controls] == [
             (-1.0, 2.0, 0.1),
             ([-5.0, -6.0, -7.0], [5.0, 6.0, 7.0], 0.5),
         ]
     with part("shownIn"):
         shown = ask(page, f"{boxes}.slice(1).map(Viser.shownIn)")
-        assert [float(each) for each in shown] == [1.0, 2.0, 3.0]
+        assert [float(text) for text in shown] == [1.0, 2.0, 3.0]
     with part("fill"):
         before = len(page.sent("GuiUpdateMessage"))
         ask(page, f"Viser.fill({boxes}[0], '1.9')")
@@ -371,12 +371,12 @@ def test_page_connects_again_only_with_the_focus(open_page: OpenPage) -> None:
     blurred = "document.hasFocus = () => false;"
     with AppServer(APP) as server, part("keepFocus"):
         left = open_page(server.url, nodes=NODES, script=script(blurred))
-        kept = open_page(server.url, nodes=NODES, script=script(f"{blurred} Viser.keepFocus();"))
+        focused = open_page(server.url, nodes=NODES, script=script(f"{blurred} Viser.keepFocus();"))
         server.kill()
         left.wait_lost()
-        kept.wait_lost()
+        focused.wait_lost()
         server.start()
-        kept.wait_ready(NODES)
+        focused.wait_ready(NODES)
         assert not left.connected
 
 

@@ -35,7 +35,7 @@ def records(recorded_run: tuple[Path, list[TickRecord]]) -> list[TickRecord]:
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     """Return a ring with a keeper of episodes, which does not wait for late records."""
     monkeypatch.setattr(running_episode, "LATE_SECONDS", 0.0)
-    found = Bench(tmp_path)
-    yield found
-    found.keeper.close()
-    found.ring.close()
+    bench = Bench(tmp_path)
+    yield bench
+    bench.keeper.close()
+    bench.ring.close()

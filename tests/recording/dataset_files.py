@@ -44,9 +44,9 @@ def write_copy(
                 copy.copy(message._replace(data=json.dumps(lost).encode()))
                 gap = None
             copy.copy(change(message))
-        at = round(1e9 * file.end)
-        for each in episodes:
-            copy.copy(Message(EPISODES, 0, at, json.dumps(each).encode()))
+        end = round(1e9 * file.end)
+        for episode in episodes:
+            copy.copy(Message(EPISODES, 0, end, json.dumps(episode).encode()))
         copy.finish()
     return out
 
@@ -59,7 +59,7 @@ def episode(
     part: tuple[float, float] = (0.5, 2.0),
 ) -> dict[str, Any]:
     """Return the message of an episode of the ``part`` [s] of ``file``."""
-    begin, end = (file.start + each for each in part)
+    begin, end = (file.start + t for t in part)
     about = {"number": number, "task": task, "start": begin, "end": end, "outcome": outcome}
     return {"t": file.end, "kind": "judged", **about, "note": "", "by": BY}
 

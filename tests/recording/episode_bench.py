@@ -20,9 +20,9 @@ ADA = EpisodeGiver("Ada", "operator", "0a1b2c3d4e5f")
 @cache
 def motion() -> tuple[TickRecord, ...]:
     """Return the ticks of a random session."""
-    found: list[TickRecord] = []
-    run(450, 9, found.append, odd=False)
-    return tuple(found)
+    records: list[TickRecord] = []
+    run(450, 9, records.append, odd=False)
+    return tuple(records)
 
 
 class Bench:
@@ -45,9 +45,9 @@ class Bench:
 
     def move(self, ticks: int) -> None:
         """Record the next ``ticks``."""
-        for each in self.records[:ticks]:
-            self.ring.put(each)
-            self.t = each.t
+        for record in self.records[:ticks]:
+            self.ring.put(record)
+            self.t = record.t
         del self.records[:ticks]
 
     def ask(self, **request: object) -> dict[str, object]:

@@ -24,8 +24,8 @@ def rows_of(folder: Path) -> dict[str, list[Any]]:
 
 
 def episodes_of(folder: Path) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = pq.read_table(folder / FORM["files"][3]).to_pylist()
-    return found
+    rows: list[dict[str, Any]] = pq.read_table(folder / FORM["files"][3]).to_pylist()
+    return rows
 
 
 def check_dataset(folder: Path) -> dict[str, Any]:
@@ -35,7 +35,7 @@ def check_dataset(folder: Path) -> dict[str, Any]:
     info: dict[str, Any] = json.loads((folder / "meta" / "info.json").read_text())
     assert set(info) == set(FORM["info"])
     features = info["features"]
-    videos = {name for name, each in features.items() if each["dtype"] == "video"}
+    videos = {name for name, feature in features.items() if feature["dtype"] == "video"}
     for name, wanted in FORM["info"].items():
         if name == "video_path" and not videos:
             assert info[name] is None
@@ -47,17 +47,17 @@ def check_dataset(folder: Path) -> dict[str, Any]:
     assert set(features) - videos == set(FORM["features"])
     assert not any("/" in name for name in features)
     for name, wanted in FORM["features"].items():
-        shape = [width if each == "N" else each for each in wanted["shape"]]
+        shape = [width if length == "N" else length for length in wanted["shape"]]
         assert (features[name]["dtype"], features[name]["shape"]) == (wanted["dtype"], shape)
     for name in videos:
         assert features[name]["names"] == FORM["video"]["names"]
         assert set(features[name]["info"]) == set(FORM["video"]["info"])
-        height, wide = (features[name]["info"][f"video.{each}"] for each in ("height", "width"))
+        height, wide = (features[name]["info"][f"video.{side}"] for side in ("height", "width"))
         assert features[name]["shape"] == [height, wide, 3]
     for file in sorted((folder / "data").glob("*/*.parquet")):
         schema = pq.read_schema(file)
-        found = {each.name: str(each.type) for each in schema}
-        assert found == {
+        columns = {field.name: str(field.type) for field in schema}
+        assert columns == {
             name: kind.replace("N", str(width)) for name, kind in FORM["columns"].items()
         }
     _check_episodes(folder, videos)
@@ -66,14 +66,14 @@ def check_dataset(folder: Path) -> dict[str, Any]:
 
 
 def _check_episodes(folder: Path, videos: set[str]) -> None:
-    found = {each.name: str(each.type) for each in pq.read_schema(folder / FORM["files"][3])}
-    stats = {name: kind for name, kind in found.items() if name.startswith("stats/")}
+    columns = {field.name: str(field.type) for field in pq.read_schema(folder / FORM["files"][3])}
+    stats = {name: kind for name, kind in columns.items() if name.startswith("stats/")}
     places = {
         f"videos/{video}/{name}": kind
         for video in videos
         for name, kind in FORM["episode_videos"].items()
     }
-    rest = {name: kind for name, kind in found.items() if name not in stats}
+    rest = {name: kind for name, kind in columns.items() if name not in stats}
     assert rest == {**FORM["episodes"], **places}
     wanted = {
         f"stats/{feature}/{name}"
@@ -82,36 +82,36 @@ def _check_episodes(folder: Path, videos: set[str]) -> None:
     }
     assert set(stats) == wanted
     tasks = pq.read_table(folder / "meta" / "tasks.parquet")
-    assert {each.name: str(each.type) for each in tasks.schema} == FORM["tasks"]
+    assert {field.name: str(field.type) for field in tasks.schema} == FORM["tasks"]
     described = json.loads(tasks.schema.metadata[b"pandas"])
     assert described["index_columns"] == ["__index_level_0__"]
 
 
 def _check_counts(folder: Path, info: dict[str, Any], features: dict[str, Any]) -> None:
     rows, episodes = rows_of(folder), episodes_of(folder)
-    assert len(rows["index"]) == info["total_frames"] == sum(each["length"] for each in episodes)
+    assert len(rows["index"]) == info["total_frames"] == sum(row["length"] for row in episodes)
     assert len(episodes) == info["total_episodes"]
     assert info["splits"] == {"train": f"0:{len(episodes)}"}
     assert rows["index"] == list(range(info["total_frames"]))
     begin = 0
     tasks = pq.read_table(folder / "meta" / "tasks.parquet").to_pydict()
     assert tasks["task_index"] == list(range(info["total_tasks"]))
-    for number, each in enumerate(episodes):
-        assert each["episode_index"] == number
-        end = begin + each["length"]
-        assert (each["dataset_from_index"], each["dataset_to_index"]) == (begin, end)
+    for number, row in enumerate(episodes):
+        assert row["episode_index"] == number
+        end = begin + row["length"]
+        assert (row["dataset_from_index"], row["dataset_to_index"]) == (begin, end)
         part = {name: values[begin:end] for name, values in rows.items()}
         assert set(part["episode_index"]) == {number}
-        assert part["frame_index"] == list(range(each["length"]))
-        grid = np.arange(each["length"]) / info["fps"]
+        assert part["frame_index"] == list(range(row["length"]))
+        grid = np.arange(row["length"]) / info["fps"]
         np.testing.assert_allclose(part["timestamp"], grid, rtol=0, atol=1e-4)
-        assert part["next.done"] == [*[False] * (each["length"] - 1), True]
-        assert part["next.success"] == [*[False] * (each["length"] - 1), each["success"] is True]
-        assert each["tasks"] == [tasks["__index_level_0__"][part["task_index"][0]]]
+        assert part["next.done"] == [*[False] * (row["length"] - 1), True]
+        assert part["next.success"] == [*[False] * (row["length"] - 1), row["success"] is True]
+        assert row["tasks"] == [tasks["__index_level_0__"][part["task_index"][0]]]
         begin = end
     stats = json.loads((folder / "meta" / "stats.json").read_text())
     assert set(stats) == set(features)
-    for name, found in stats.items():
-        assert set(found) == set(FORM["statistics"])
-        assert found["count"] == [info["total_frames"]], name
-        assert np.isfinite(np.array(found["q50"])).all()
+    for name, stat in stats.items():
+        assert set(stat) == set(FORM["statistics"])
+        assert stat["count"] == [info["total_frames"]], name
+        assert np.isfinite(np.array(stat["q50"])).all()

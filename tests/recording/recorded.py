@@ -108,10 +108,10 @@ def random_commands(
             with suppress(KatanaError):
                 yield cmd.Follow(plan_to(session.session.require_arm(), world, state, goal))
     elif kind < 0.6:
-        at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.Position(at)
+        p = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
+        yield cmd.Position(p)
         DRAGGED[id(rng)] = np.clip(
-            at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
+            p + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
         )
     elif kind < 0.7:
         yield from seldom_commands(rng, session)
@@ -156,18 +156,18 @@ def run(
 
     ``odd``: whether its driver sometimes answers otherwise, or fails. ``driver``: another one.
     """
-    found = described()
+    katana = described()
     rng, clock = np.random.default_rng(seed), TestClock(1000.0)
-    mailbox = Mailbox(found.session.check)
+    mailbox = Mailbox(katana.session.check)
     if driver is None:
         kind = OddDriver if odd else SimulatedDriver
-        driver = kind(found.robot.require_arm(), found.session.ready, 0.0)
-    loop = ControlLoop(found.session, driver, mailbox, clock, 1.0 / PERIOD)
+        driver = kind(katana.robot.require_arm(), katana.session.ready, 0.0)
+    loop = ControlLoop(katana.session, driver, mailbox, clock, 1.0 / PERIOD)
     loop.record = take
     for _ in range(ticks):
         resting = not loop.state_publisher.snapshot.state.moving and rng.random() < 0.1
         clock.t += REST_PERIOD if resting else PERIOD * (1.0 + 0.01 * rng.random())
-        for command in commands(rng, loop.state_publisher.snapshot.state, found):
+        for command in commands(rng, loop.state_publisher.snapshot.state, katana):
             try:
                 mailbox.put(command, ADA if rng.random() < 0.8 else SERVER)
             except InputError:
@@ -182,18 +182,18 @@ def dragging(
 ) -> Iterator[cmd.Command]:
     """Yield a drag in 60 % of all ticks, without a pause, as a restless hand sends it."""
     if rng.random() < 0.6:
-        at = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
-        yield cmd.Position(at)
+        p = DRAGGED.setdefault(id(rng), np.array((0.3, 0.0, 0.05)))
+        yield cmd.Position(p)
         DRAGGED[id(rng)] = np.clip(
-            at + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
+            p + 0.01 * rng.normal(size=3), (0.05, -0.4, -0.26), (0.5, 0.4, 0.3)
         )
 
 
 def header(*attachments: Attachment) -> RecordingHeader:
     """Return the header of a recording of the shipped arm."""
-    found = described()
+    katana = described()
     return header_of(
-        found.robot, Settings(), URDF_PATH, None, found.session.environment, attachments
+        katana.robot, Settings(), URDF_PATH, None, katana.session.environment, attachments
     )
 
 

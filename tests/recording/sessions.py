@@ -47,9 +47,11 @@ def record_session(
     return path
 
 
-def drag(ticks: int, at: Mapping[int, cmd.Command] | None = None, circles: float = 1.0) -> Commands:
-    """Return a drag of the tool on a flat spiral for ``ticks`` ticks; ``at``: other commands."""
-    others = dict(at or {})
+def drag(
+    ticks: int, extra: Mapping[int, cmd.Command] | None = None, circles: float = 1.0
+) -> Commands:
+    """Return a drag of the tool on a flat spiral for ``ticks`` ticks; ``extra``: other commands."""
+    others = dict(extra or {})
 
     def commands(tick: int, state: State) -> Iterator[cmd.Command]:
         if tick in others:
@@ -68,8 +70,8 @@ def drag(ticks: int, at: Mapping[int, cmd.Command] | None = None, circles: float
 
 def program(text: str) -> Commands:
     """Return the commands of the script ``text``, planned for the first state."""
-    found = described()
-    context = PlanContext(found.session, found.robot.require_arm().T_base_shoulder)
+    katana = described()
+    context = PlanContext(katana.session, katana.robot.require_arm().T_base_shoulder)
     progress: list[tuple[object, Run]] = []
 
     def commands(tick: int, state: State) -> Iterator[cmd.Command]:
@@ -77,9 +79,9 @@ def program(text: str) -> Commands:
             progress.append((compiled(parse(text), context, state), Run(0.0)))
         plan, before = progress[-1]
         if before.phase is Phase.RUNNING:
-            after, given = runner.step(plan, before, state, PERIOD * tick)  # type: ignore[arg-type]
+            after, sent = runner.step(plan, before, state, PERIOD * tick)  # type: ignore[arg-type]
             progress[-1] = plan, after
             assert after.phase in (Phase.RUNNING, Phase.DONE), after.why
-            yield from given
+            yield from sent
 
     return commands

@@ -42,9 +42,9 @@ NOD = "name: Nod\nsteps:\n  - wait: 0.2\n  - joints: [5, -55, 80, 20, 0]\n"
 def scripts_of(path: Path) -> dict[str, str]:
     """Return the texts of the scripts that are attached to the recording at ``path``."""
     with RecordingFile.open(path) as file:
-        found = [each for each in file.attachments() if each.name.startswith(FOLDER)]
-    assert len({each.name for each in found}) == len(found)
-    return {each.name: each.data.decode() for each in found}
+        scripts = [script for script in file.attachments() if script.name.startswith(FOLDER)]
+    assert len({script.name for script in scripts}) == len(scripts)
+    return {script.name: script.data.decode() for script in scripts}
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def kept(folder: Path, *options: str) -> Path:
     return path
 
 
-LEFT, RIGHT = (TURN.format(name=f"Turn {each}", angle=each) for each in (20, -20))
+LEFT, RIGHT = (TURN.format(name=f"Turn {angle}", angle=angle) for angle in (20, -20))
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def ran(server: AppServer, folder: Path) -> tuple[Path, Path]:
 
     def has_all() -> bool:
         with suppress(InputError), RecordingFile.open(kept(folder)) as file:
-            return [each.end is None for each in script_runs([file])] == [False] * 4
+            return [run.end is None for run in script_runs([file])] == [False] * 4
         return False
 
     until(has_all)
@@ -97,23 +97,23 @@ def test_texts_of_a_server_are_attached_once_with_their_runs(
 ) -> None:
     path, episode = ran
     nod = script_text(folder / "nod.yaml")
-    found = scripts_of(path)
-    assert sorted(found.values()) == sorted((LEFT, nod, RIGHT))
-    for name, text in found.items():
+    scripts = scripts_of(path)
+    assert sorted(scripts.values()) == sorted((LEFT, nod, RIGHT))
+    for name, text in scripts.items():
         assert hashlib.sha256(text.encode()).hexdigest()[:12] in name
     programs = katana450.open(path).programs
-    assert [each.name for each in programs] == ["Turn 20", "Nod", "Turn 20", "Turn -20"]
-    assert [each.text for each in programs] == [LEFT, nod, LEFT, RIGHT]
-    for each in programs:
-        assert each.end is not None
-        assert 0.1 < each.end - each.start < 20.0
+    assert [program.name for program in programs] == ["Turn 20", "Nod", "Turn 20", "Turn -20"]
+    assert [program.text for program in programs] == [LEFT, nod, LEFT, RIGHT]
+    for program in programs:
+        assert program.end is not None
+        assert 0.1 < program.end - program.start < 20.0
     # The file of an episode has what ran in it.
     assert list(scripts_of(episode).values()) == [nod]
     # The timeline shows when each began.
     shown = PlaybackRun(lambda: [path])
     shown.update()
-    begun = [each.text for each in shown.marks() if each.kind == "program"]
-    assert begun == [f"Script {each.name} begins" for each in programs]
+    beginnings = [mark.text for mark in shown.marks() if mark.kind == "program"]
+    assert beginnings == [f"Script {program.name} begins" for program in programs]
 
 
 def test_parts_have_the_scripts_that_ran_in_them(ran: tuple[Path, Path], folder: Path) -> None:
@@ -130,7 +130,7 @@ def test_parts_have_the_scripts_that_ran_in_them(ran: tuple[Path, Path], folder:
         cut = ["trim", str(path), "--from", str(begin), "--to", str(end), "--out", str(part)]
         assert main(["record", *cut]) == 0
         assert list(scripts_of(part).values()) == [text]
-        assert [each.text for each in katana450.open(part).programs] == [text]
+        assert [program.text for program in katana450.open(part).programs] == [text]
         assert katana450.open(part).verify().identical
     # A part of that part has it, too.
     again = folder / "again.mcap"
@@ -142,19 +142,19 @@ def test_info_repair_and_export_keep_scripts(
     ran: tuple[Path, Path], folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, broken, bag = ran[0], folder / "broken.mcap", folder / "bag"
-    found = scripts_of(path)
+    attached = scripts_of(path)
     assert main(["record", "info", str(path)]) == 0
     shown = capsys.readouterr().out
-    for name, text in found.items():
+    for name, text in attached.items():
         digest = hashlib.sha256(text.encode()).hexdigest()
         assert f"attached: {name}, {len(text.encode())} bytes, SHA-256 {digest}" in shown
     assert shown.count("script Turn 20 from ") == 2
     broken.write_bytes(path.read_bytes()[:-200])
     assert recover(broken, broken) is not None
-    assert scripts_of(broken) == found
+    assert scripts_of(broken) == attached
     assert main(["record", "export", str(path), "--format", "rosbag2", "--out", str(bag)]) == 0
-    scripts = {f"{FOLDER}{each.name}": each.read_text() for each in (bag / FOLDER).iterdir()}
-    assert scripts == found
+    exported = {f"{FOLDER}{path.name}": path.read_text() for path in (bag / FOLDER).iterdir()}
+    assert exported == attached
     with Reader(bag) as reader:
         assert reader.message_count > 100
 
@@ -164,14 +164,14 @@ def recorded_ring(folder: Path, times: tuple[tuple[float, float | None], ...]) -
     records: list[TickRecord] = []
     run(300, 1, records.append, swinging, odd=False)
     scripts = RunningScripts()
-    kept = Ring(folder, header(), scripts=scripts)
+    store = Ring(folder, header(), scripts=scripts)
     for number, (began, ended) in enumerate(times):
         scripts.note(ScriptNote(f"S{number}", f"name: S{number}\n", began, ended))
-    for number, each in enumerate(records):
-        kept.put(each)
+    for number, record in enumerate(records):
+        store.put(record)
         if number % 50 == 49:
-            kept.sync()
-    kept.close()
+            store.sync()
+    store.close()
     return scripts
 
 
@@ -184,14 +184,14 @@ def test_each_file_of_a_ring_has_the_scripts_that_run(
     # One that ended before the first tick, one that ended, and one that runs to the end.
     scripts = recorded_ring(folder, ((900.0, 901.0), (1000.1, 1000.5), (1000.2, None)))
     files = recordings_in(folder)
-    assert [list(scripts_of(each).values()) for each in files] == [
+    assert [list(scripts_of(file).values()) for file in files] == [
         ["name: S1\n", "name: S2\n"],
         ["name: S2\n"],
         ["name: S2\n"],
     ]
     for path in files:
         with RecordingFile.open(path) as file:
-            (last,) = (each for each in script_runs([file]) if each.name == "S2")
+            (last,) = (run for run in script_runs([file]) if run.name == "S2")
         assert last.start == 1000.2
         assert last.end is None
     assert [run.name for run in scripts.read()] == ["S2"]
@@ -201,21 +201,21 @@ def test_same_text_is_attached_once_and_each_run_is_listed(tmp_path: Path) -> No
     folder, scripts = tmp_path / "ring", RunningScripts()
     records: list[TickRecord] = []
     run(50, 1, records.append, swinging, odd=False)
-    kept = Ring(folder, header(), scripts=scripts)
+    store = Ring(folder, header(), scripts=scripts)
     for began in (1000.1, 1000.2):
         # Names become names of files.
         scripts.note(ScriptNote("../a b", "name: ../a b\nsteps: []\n", began, began + 0.05))
-    kept.put_all(records)
-    kept.close()
+    store.put_all(records)
+    store.close()
     (path,) = recordings_in(folder)
     ((name, _),) = scripts_of(path).items()
     assert re.fullmatch(r"scripts/a-b-[0-9a-f]{12}\.yaml", name)
     programs = katana450.open(path).programs
-    assert [(each.name, each.start) for each in programs] == [
+    assert [(program.name, program.start) for program in programs] == [
         ("../a b", 1000.1),
         ("../a b", 1000.2),
     ]
-    assert [each.end for each in programs] == pytest.approx([1000.15, 1000.25])
+    assert [program.end for program in programs] == pytest.approx([1000.15, 1000.25])
 
 
 def test_notes_that_nobody_takes_are_bounded() -> None:
@@ -234,7 +234,7 @@ def test_changed_text_is_refused(tmp_path: Path) -> None:
     changed = tmp_path / "changed.mcap"
     with RecordingFile.open(path) as file, changed.open("wb") as out:
         attachments = [
-            replace(each, data=each.data.replace(b"S0", b"S1")) for each in file.attachments()
+            replace(part, data=part.data.replace(b"S0", b"S1")) for part in file.attachments()
         ]
         copy = MessageWriter(out, file.metadata, attachments)
         for message in file.messages(*file.counts()):

@@ -86,13 +86,13 @@ def follow(arm: ArmModel) -> cmd.Follow:
     chain = session.require_arm().chain
     near = session.ready
     point = ToolTarget.at(chain, near)
-    there = ToolTarget(point.position + np.array((0.0, 0.05, 0.0)), point.pitch, 0.3)
+    target = ToolTarget(point.position + np.array((0.0, 0.05, 0.0)), point.pitch, 0.3)
     branch = branch_of(chain, near)
     centre = point.position + np.array((0.0, 0.0, 0.03))
     swing = Swing(point.pitch, 0.05, 0.02, 0.0, 1.0)
     curves: list[Curve] = [
-        ToolLine(point, there),
-        ToolLines((there, point, ToolTarget(there.position, point.pitch, 0.0)), np.array([0.5])),
+        ToolLine(point, target),
+        ToolLines((target, point, ToolTarget(target.position, point.pitch, 0.0)), np.array([0.5])),
         ToolArc(
             point.position, centre, np.array((0.3, 0.1, 0.2)), 0.7, Linear(point.pitch, 0.5), swing
         ),
@@ -102,7 +102,7 @@ def follow(arm: ArmModel) -> cmd.Follow:
     bounds = Bounds(session.require_arm().limits, 0.5)
     # Each alone, because they do not meet.
     plans = [plan([path], bounds, session.world, 0.1) for path in paths]
-    segments = [plans[0].segments[0], *(each.segments[0] for each in plans)]
+    segments = [plans[0].segments[0], *(plan.segments[0] for plan in plans)]
     return cmd.Follow(replace(plans[0], segments=tuple(segments)))
 
 
@@ -112,7 +112,7 @@ def test_every_command_survives_to_the_bit(
     solid = Solid("abc123", (0.1, 0.1, 0.1), np.random.default_rng(3).random((12, 3)))
     mesh = SceneObject("mesh", Shape.MESH, (), np.eye(4), solid=solid)
     cause = pressed("Ada", "key", "press", 1e9 + 0.1)
-    given = [
+    commands = [
         *examples(session, state),
         follow,
         cmd.PlaceObject(mesh),
@@ -123,11 +123,11 @@ def test_every_command_survives_to_the_bit(
         cmd.MoveObject("mesh", np.full(3, -0.0), np.eye(3).T),
         cmd.Batch((cmd.ReplaceScene((mesh,)), cmd.Follow(follow.plan, 0.01))),
     ]
-    assert {type(each) for each in given} == set(KINDS) == set(classes_of(cmd.Command))
-    for each in given:
-        back = copied(cmd.Command, each)
-        assert type(back) is type(each)
-        assert text_of(back) == text_of(each), each
+    assert {type(command) for command in commands} == set(KINDS) == set(classes_of(cmd.Command))
+    for command in commands:
+        back = copied(cmd.Command, command)
+        assert type(back) is type(command)
+        assert text_of(back) == text_of(command), command
 
 
 def test_water_of_older_versions_is_read_and_other_liquids_are_refused(state: State) -> None:
@@ -164,11 +164,11 @@ def test_repeated_segment_is_one_object_again(follow: cmd.Follow) -> None:
     back = copied(cmd.Command, follow)
     first, again, *others = back.plan.segments
     assert first is again
-    assert all(each is not first for each in others)
+    assert all(segment is not first for segment in others)
     # The derived values are computed again from the same numbers.
     for tau in np.linspace(0.0, follow.plan.span, 50).tolist():
         assert back.plan.q(tau).tobytes() == follow.plan.q(tau).tobytes()
-    arcs = [each.plan.segments[3].path.curve for each in (back, cast(Any, follow))]
+    arcs = [step.plan.segments[3].path.curve for step in (back, cast(Any, follow))]
     assert arcs[0].axis.tobytes() == arcs[1].axis.tobytes()
 
 
@@ -186,10 +186,10 @@ def test_shared_value_is_written_once(follow: cmd.Follow) -> None:
 
 def test_actors_survive() -> None:
     person = Person("k", "Ada \u0001\N{ROBOT FACE} é", Role.ADMIN, "3", "::1")
-    for each in (SERVER, Actor(person, CommandChannel.TCP, 3, Grounds.LEASE), None):
-        back = copied(Actor | None, each)
-        assert text_of(back) == text_of(each)
-        assert back == each
+    for actor in (SERVER, Actor(person, CommandChannel.TCP, 3, Grounds.LEASE), None):
+        back = copied(Actor | None, actor)
+        assert text_of(back) == text_of(actor)
+        assert back == actor
 
 
 def bits(value: float) -> bytes:
@@ -293,16 +293,16 @@ def mutated(data: st.DataObject, kind: Any, value: Any) -> None:
     writer, reader = Codec(), Codec()
     form = json_form(json_text(writer.encoded(value)))
     texts = list(writer.shared.take_new())
-    found = list(places(form))
+    all_places = list(places(form))
     for _ in range(data.draw(st.integers(1, 3))):
-        path = data.draw(st.sampled_from(found))
+        path = data.draw(st.sampled_from(all_places))
         how = data.draw(st.sampled_from(("replace", "remove", "add")))
         try:
             changed(form, path, how, data.draw(WRONG))
         except (KeyError, IndexError, TypeError):
             continue
-    for each in texts:
-        reader.shared.add(each)
+    for text in texts:
+        reader.shared.add(text)
     with suppress(FormError):
         reader.decoded(kind, json_form(json_text(form)))
 

@@ -78,12 +78,12 @@ def test_folder_of_episodes_is_a_dataset(
         *(f"theta{n}.pos" for n in range(1, 6)),
         "gripper.pos",
     ]
-    found = episodes_of(out)
-    assert [each["success"] for each in found] == [True, False]
+    rows = episodes_of(out)
+    assert [episode["success"] for episode in rows] == [True, False]
     # The last message of an episode counts.
-    assert {each["tasks"][0] for each in found} == {"pour the water"}
-    assert [each["length"] for each in found] == [1 + int(0.85 * FPS), 1 + int(0.95 * FPS)]
-    assert [each.name for each in tmp_path.iterdir()] == ["set"]
+    assert {episode["tasks"][0] for episode in rows} == {"pour the water"}
+    assert [episode["length"] for episode in rows] == [1 + int(0.85 * FPS), 1 + int(0.95 * FPS)]
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
 def test_outcomes_are_chosen(episodes: Path, tmp_path: Path) -> None:
@@ -96,17 +96,17 @@ def test_outcomes_are_chosen(episodes: Path, tmp_path: Path) -> None:
         words = ("--format", "lerobot", "--outcomes", outcomes, "--fps", "10", "--out", out)
         assert export(episodes, *words) == 0
         check_dataset(out)
-        assert [each["success"] for each in episodes_of(out)] == success
+        assert [episode["success"] for episode in episodes_of(out)] == success
 
 
-def between(t: FloatArray, values: FloatArray, at: float) -> FloatArray:
+def between(t: FloatArray, values: FloatArray, time: float) -> FloatArray:
     """Return the value at a time: states hold, and change within the tick before the next one."""
-    last = int(np.searchsorted(t, at, side="right")) - 1
+    last = int(np.searchsorted(t, time, side="right")) - 1
     if last + 1 == len(t):
         return np.asarray(values[last])
     length = t[last + 1] - t[last]
     begin = t[last] if length < 0.025 else t[last + 1] - 0.01
-    place = max((at - begin) / (t[last + 1] - begin), 0.0)
+    place = max((time - begin) / (t[last + 1] - begin), 0.0)
     return np.asarray(values[last] + place * (values[last + 1] - values[last]))
 
 
@@ -123,11 +123,11 @@ def test_frames_are_the_states_on_the_grid(episodes: Path, tmp_path: Path) -> No
         for t in begin + np.arange(int((end - begin) * 40 + 1e-6) + 1) / 40:
             states.append(between(table["t"], q, t))
             actions.append(between(table["t"], setpoint, min(t + 1 / 40, end)))
-    found, action = np.array(rows["observation.state"]), np.array(rows["action"])
-    np.testing.assert_allclose(found, np.array(states), rtol=0, atol=1e-6)
+    observed, action = np.array(rows["observation.state"]), np.array(rows["action"])
+    np.testing.assert_allclose(observed, np.array(states), rtol=0, atol=1e-6)
     np.testing.assert_allclose(action, np.array(actions), rtol=0, atol=1e-6)
     # The arm moves, so actions are ahead of states.
-    assert np.abs(action - found).max() > 1e-3
+    assert np.abs(action - observed).max() > 1e-3
 
 
 def test_statistics_are_exact_over_all_frames(episodes: Path, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_statistics_are_exact_over_all_frames(episodes: Path, tmp_path: Path) ->
     assert export(episodes, "--format", "lerobot", *words) == 0
     stats, rows = json.loads((out / "meta" / "stats.json").read_text()), rows_of(out)
     states = np.array(rows["observation.state"])
-    found = stats["observation.state"]
+    row = stats["observation.state"]
     for name, wanted in {
         "q01": np.quantile(states, 0.01, axis=0),
         "q50": np.median(states, axis=0),
@@ -146,14 +146,14 @@ def test_statistics_are_exact_over_all_frames(episodes: Path, tmp_path: Path) ->
         "min": states.min(axis=0),
         "max": states.max(axis=0),
     }.items():
-        np.testing.assert_allclose(found[name], wanted, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(row[name], wanted, rtol=0, atol=1e-12)
     described_by = episodes_of(out)
-    means = np.mean([each["stats/observation.state/q99"] for each in described_by], axis=0)
-    assert np.abs(means - found["q99"]).max() > 1e-3
-    for each in described_by:
-        part = states[each["dataset_from_index"] : each["dataset_to_index"]]
+    means = np.mean([row["stats/observation.state/q99"] for row in described_by], axis=0)
+    assert np.abs(means - row["q99"]).max() > 1e-3
+    for one in described_by:
+        part = states[one["dataset_from_index"] : one["dataset_to_index"]]
         wanted = np.quantile(part, 0.9, axis=0)
-        np.testing.assert_allclose(each["stats/observation.state/q90"], wanted, atol=1e-12)
+        np.testing.assert_allclose(one["stats/observation.state/q90"], wanted, atol=1e-12)
 
 
 def test_whole_recording_is_an_episode_with_the_given_task(
@@ -164,8 +164,8 @@ def test_whole_recording_is_an_episode_with_the_given_task(
     words = ("--format", "lerobot", "--task", " put it\n down ", "--from", "0.5", "--to", "1.5")
     assert export(run, *words, "--out", out) == 0
     check_dataset(out)
-    (found,) = episodes_of(out)
-    assert (found["tasks"], found["length"], found["success"]) == (["put it down"], 31, None)
+    (episode,) = episodes_of(out)
+    assert (episode["tasks"], episode["length"], episode["success"]) == (["put it down"], 31, None)
 
 
 def test_odd_input_is_refused(
@@ -247,7 +247,7 @@ def test_folder_appears_complete_or_not_at_all(tmp_path: Path) -> None:
         with pytest.raises(KeyError):
             failing(KeyError())()
         assert first.is_dir()
-    assert [each.name for each in out.iterdir()] == ["content"]
+    assert [path.name for path in out.iterdir()] == ["content"]
     assert sorted(tmp_path.iterdir()) == [foreign, out]
 
 
@@ -262,9 +262,9 @@ def test_frames_lie_on_the_grid(start: float, fps: int, count: int) -> None:
 def test_state_holds_while_the_arm_rests() -> None:
     t = np.array([0.0, 0.01, 0.02, 3.0, 3.01, 3.01])
     values = np.array([[0.0], [1.0], [2.0], [3.0], [4.0], [5.0]])
-    at = np.array([-1.0, 0.0, 0.005, 0.02, 1.5, 2.99, 2.995, 3.0, 3.005, 3.01, 9.0])
-    found = sampled(t, values, at)[:, 0]
-    np.testing.assert_allclose(found, [0, 0, 0.5, 2, 2, 2, 2.5, 3, 3.5, 5, 5], atol=1e-9)
+    times = np.array([-1.0, 0.0, 0.005, 0.02, 1.5, 2.99, 2.995, 3.0, 3.005, 3.01, 9.0])
+    values_then = sampled(t, values, times)[:, 0]
+    np.testing.assert_allclose(values_then, [0, 0, 0.5, 2, 2, 2, 2.5, 3, 3.5, 5, 5], atol=1e-9)
 
 
 def test_states_for_pictures_have_recorded_joints_objects_and_water(
@@ -273,13 +273,13 @@ def test_states_for_pictures_have_recorded_joints_objects_and_water(
     chosen = records[20:200:20]
     with RecordingFile.open(run) as file:
         reader = RecordedStates(file, described().session)
-        found = list(reader.at(np.array([each.t for each in chosen])))
+        states = list(reader.at(np.array([record.t for record in chosen])))
     assert reader.unknown == 0
     environment = described().session.environment
-    for state, known in zip(found, (each.state for each in chosen), strict=True):
+    for state, known in zip(states, (record.state for record in chosen), strict=True):
         np.testing.assert_allclose(state.q, known.q, atol=1e-9)
         assert state.gripper == pytest.approx(known.gripper, abs=1e-9)
-        assert [each.name for each in state.objects] == [each.name for each in known.objects]
+        assert [prop.name for prop in state.objects] == [prop.name for prop in known.objects]
         for one, other in zip(state.objects, known.objects, strict=True):
             np.testing.assert_allclose(
                 environment.pose(one, state.x), environment.pose(other, known.x), atol=1e-9

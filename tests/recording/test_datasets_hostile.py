@@ -49,8 +49,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recorded")
     record(folder / "plain.mcap", 30, 5)
     with RecordingFile.open(folder / "plain.mcap") as file:
-        found = episode(file, 1, "success", part=(0.05, 0.2))
-    return write_copy(folder / "plain.mcap", folder / "run.mcap", [found])
+        form = episode(file, 1, "success", part=(0.05, 0.2))
+    return write_copy(folder / "plain.mcap", folder / "run.mcap", [form])
 
 
 def changed(form: Any, chance: random.Random) -> Any:
@@ -58,7 +58,7 @@ def changed(form: Any, chance: random.Random) -> Any:
     if isinstance(form, dict) and form:
         name = chance.choice(sorted(form))
         if chance.random() < 0.1:
-            return {each: value for each, value in form.items() if each != name}
+            return {key: value for key, value in form.items() if key != name}
         return {**form, name: changed(form[name], chance)}
     if isinstance(form, list) and form and chance.random() < 0.7:
         place = chance.randrange(len(form))
@@ -97,7 +97,7 @@ def exports(path: Path, out: Path) -> None:
 def test_changed_recording_is_refused_or_exported(run: Path, tmp_path: Path, number: int) -> None:
     path = write_copy(run, tmp_path / "changed.mcap", change=changing(random.Random(number)))
     exports(path, tmp_path)
-    assert {each.name for each in tmp_path.iterdir()} <= {
+    assert {path.name for path in tmp_path.iterdir()} <= {
         "changed.mcap", "part", "bag", "set",
     }  # fmt: skip
 

@@ -84,7 +84,7 @@ def test_statistics_of_pictures_are_those_of_all_pixels() -> None:
     for picture in pictures[3:]:
         other.add(picture)
     counts.merge(other)
-    found, pixels = counts.statistics, pictures.reshape(-1, 3) / 255.0
+    row, pixels = counts.statistics, pictures.reshape(-1, 3) / 255.0
     for name, value in {
         "min": pixels.min(axis=0),
         "max": pixels.max(axis=0),
@@ -95,8 +95,8 @@ def test_statistics_of_pictures_are_those_of_all_pixels() -> None:
             for name, fraction in QUANTILES.items()
         },
     }.items():
-        np.testing.assert_allclose(np.array(found[name]).reshape(3), value, atol=1e-12)
-    assert found["count"] == [5]
+        np.testing.assert_allclose(np.array(row[name]).reshape(3), value, atol=1e-12)
+    assert row["count"] == [5]
 
 
 @pytest.mark.long
@@ -141,7 +141,7 @@ def test_film_and_page_of_a_part(run: Path, tmp_path: Path) -> None:
     assert decoded(film, SIZE).shape == (6, 48, 64, 3)
     assert main([*words, "--format", "html", "--out", str(page)]) == 0
     assert "<title>katana450: run</title>" in page.read_text(encoding="utf-8")
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["run.html", "run.mp4"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.html", "run.mp4"]
 
 
 def begun(files: list[Path], out: Path, *words: str) -> subprocess.Popen[str]:
@@ -176,16 +176,16 @@ def test_killed_export_leaves_no_dataset(run: Path, tmp_path: Path, number: int)
     words = ["record", "export", str(run), "--format", "lerobot", "--task", "x", "--out", str(out)]
     assert main(words) == 0
     check_dataset(out)
-    assert [each.name for each in tmp_path.iterdir()] == ["set"]
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
 def descendants(pid: int) -> set[int]:
     """Return the processes that the process ``pid`` has started, and those that they have."""
-    found = set()
+    children_found = set()
     for children in Path(f"/proc/{pid}/task").glob("*/children"):
         for child in map(int, children.read_text().split()):
-            found |= {child, *descendants(child)}
-    return found
+            children_found |= {child, *descendants(child)}
+    return children_found
 
 
 def running(pid: int) -> bool:

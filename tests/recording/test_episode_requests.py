@@ -35,8 +35,8 @@ def attempt(bench: Bench, **stop: object) -> None:
 
 def numbers(bench: Bench) -> tuple[list[int], list[int]]:
     """Return the numbers of the kept and of the discarded episodes."""
-    kept, gone = bench.folder.kept(), bench.folder.discarded()
-    return [each.episode.number for each in kept], [each.episode.number for each in gone]
+    stored, discarded = bench.folder.kept(), bench.folder.discarded()
+    return [entry.episode.number for entry in stored], [entry.episode.number for entry in discarded]
 
 
 def test_request_for_an_episode_that_has_ended_reaches_no_other(bench: Bench) -> None:
@@ -101,11 +101,11 @@ def test_judgements_are_in_the_last_minutes_too(bench: Bench) -> None:
     bench.ring.close()
     (path,) = recordings_in(bench.ring_folder)
     with RecordingFile.open(path) as file:
-        messages = [each.data for each in file.messages(EPISODES)]
-    kinds = [json.loads(each)["kind"] for each in messages]
+        messages = [message.data for message in file.messages(EPISODES)]
+    kinds = [json.loads(message)["kind"] for message in messages]
     assert kinds == ["begun", "ended", "judged", "noted"]
-    (found,) = episodes_of(messages)
-    assert (found.outcome, found.note) == (EpisodeOutcome.FAILURE, "spilled")
+    (episode,) = episodes_of(messages)
+    assert (episode.outcome, episode.note) == (EpisodeOutcome.FAILURE, "spilled")
 
 
 def test_interrupted_episode_is_finished_while_others_are_recorded(
@@ -116,9 +116,9 @@ def test_interrupted_episode_is_finished_while_others_are_recorded(
     bench.ring.sync()
     may_finish, cut_out = threading.Event(), running_episode.cut_out
 
-    def slow(*given: Any) -> Episode:
+    def slow(*args: Any) -> Episode:
         assert may_finish.wait(20.0)
-        return cut_out(*given)
+        return cut_out(*args)
 
     monkeypatch.setattr(running_episode, "cut_out", slow)
     run = bench.header.metadata["utc_offset_ns"]
@@ -143,9 +143,9 @@ def test_people_who_only_watch_do_not_learn_where_files_are(tmp_path: Path) -> N
     context = RouteContext(hub, None, None, None, None)  # type: ignore[arg-type]
     routes = EpisodeRoutes(context, tmp_path, None)  # type: ignore[arg-type]
     for paths in (True, False):
-        told = json.dumps(routes._listed(paths=paths))
-        assert "episode-0001.mcap" in told
-        assert (str(tmp_path) in told) is paths
+        answer = json.dumps(routes._listed(paths=paths))
+        assert "episode-0001.mcap" in answer
+        assert (str(tmp_path) in answer) is paths
 
 
 def test_problem_of_the_folder_is_shown_without_its_path(bench: Bench) -> None:

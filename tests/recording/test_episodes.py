@@ -48,8 +48,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("recorded") / "run.mcap"
     with path.open("wb") as file:
         writer = RecordingWriter(file, header())
-        for number, each in enumerate(motion()[:300]):
-            writer.put(each)
+        for number, record in enumerate(motion()[:300]):
+            writer.put(record)
             if number % 100 == 99:
                 writer.flush()
         writer.close()
@@ -96,7 +96,7 @@ def test_description_is_appended_without_changing_the_rest(recorded: Path, tmp_p
         assert path.read_bytes()[: len(content) // 2] == content[: len(content) // 2]
     with path.open("rb") as stream:
         messages = list(make_reader(stream, validate_crcs=True).iter_messages(topics=[EPISODES]))
-    assert [json.loads(each[2].data)["outcome"] for each in messages][-1] == "failure"
+    assert [json.loads(message[2].data)["outcome"] for message in messages][-1] == "failure"
     with pytest.raises(InputError, match="is of episode 1, not 2"):
         with_episode(path, attempt(recorded, 2), "judged")
 
@@ -108,7 +108,7 @@ def test_episode_without_motion_in_its_time_is_refused(recorded: Path, tmp_path:
 
 
 texts = st.text(max_size=20)
-outcomes = st.sampled_from([each for each in EpisodeOutcome if each is not EpisodeOutcome.RUNNING])
+outcomes = st.sampled_from([end for end in EpisodeOutcome if end is not EpisodeOutcome.RUNNING])
 episodes = st.builds(
     lambda number, task, begin, length, outcome, note: Episode(
         number, task, begin, begin + length, outcome, note, ADA
@@ -124,9 +124,9 @@ episodes = st.builds(
 
 @settings(max_examples=30)
 @given(st.lists(episodes, max_size=12))
-def test_last_description_of_each_number_counts(found: list[Episode]) -> None:
-    messages = [json_text(message_of(each, 0.0, "judged")) for each in found]
-    last = {each.number: each for each in found}
+def test_last_description_of_each_number_counts(described: list[Episode]) -> None:
+    messages = [json_text(message_of(episode, 0.0, "judged")) for episode in described]
+    last = {episode.number: episode for episode in described}
     assert episodes_of(messages) == tuple(last[number] for number in sorted(last))
 
 
@@ -156,22 +156,22 @@ def test_wrong_description_is_refused(text: str, why: str) -> None:
 
 def test_episode_is_begun_judged_and_undone(bench: Bench) -> None:
     bench.move(50)
-    begun = bench.ask(do="start", task="pour")
-    assert begun["number"] == 1
+    answer = bench.ask(do="start", task="pour")
+    assert answer["number"] == 1
     bench.move(100)
     running = bench.keeper.status()["running"]
     assert running["number"] == 1
-    assert running["seconds"] == int(bench.t - 1000.0 - (begun["start"] - 1000.0))  # type: ignore[operator]
+    assert running["seconds"] == int(bench.t - 1000.0 - (answer["start"] - 1000.0))  # type: ignore[operator]
     with pytest.raises(InputError, match="runs already"):
         bench.ask(do="start", task="again")
     bench.ask(do="judge", outcome="success")
-    (kept,) = bench.folder.kept()
-    assert kept.episode.outcome is EpisodeOutcome.SUCCESS
-    assert kept.episode.task == "pour"
-    assert kept.episode.start == begun["start"]
-    assert kept.episode.end == bench.t
+    (entry,) = bench.folder.kept()
+    assert entry.episode.outcome is EpisodeOutcome.SUCCESS
+    assert entry.episode.task == "pour"
+    assert entry.episode.start == answer["start"]
+    assert entry.episode.end == bench.t
     # All ticks between are there, and nothing is held any more.
-    assert len(katana450.open(kept.path).t) > 50
+    assert len(katana450.open(entry.path).t) > 50
     assert bench.ring.held is None
     assert not bench.folder.markers()
     bench.ask(do="undo")
@@ -190,7 +190,7 @@ def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Benc
         bench.ask(do="stop")
     bench.ask(do="discard")
     assert bench.keeper.status()["count"] == 1
-    assert [each.episode.number for each in bench.folder.discarded()] == [2]
+    assert [entry.episode.number for entry in bench.folder.discarded()] == [2]
     bench.ask(do="undo")
     assert bench.keeper.status()["count"] == 2
     # Again: the last one is discarded, and the next has its task.
@@ -204,8 +204,8 @@ def test_discarded_episodes_come_back_and_numbers_are_not_used_twice(bench: Benc
     bench.ask(do="undo")
     bench.ask(do="discard", number=3)
     bench.ask(do="stop", outcome="success")
-    assert [each.episode.number for each in bench.folder.kept()] == [1, 4]
-    assert [each.episode.number for each in bench.folder.discarded()] == [2, 3]
+    assert [entry.episode.number for entry in bench.folder.kept()] == [1, 4]
+    assert [entry.episode.number for entry in bench.folder.discarded()] == [2, 3]
     bench.ask(do="restore", number=2)
     assert bench.keeper.status()["count"] == 3
     with pytest.raises(InputError, match="no discarded episode 2"):
@@ -218,8 +218,8 @@ def test_episode_is_trimmed_described_and_widened_again(bench: Bench) -> None:
     bench.ask(do="start", task="pour")
     bench.move(150)
     bench.ask(do="stop")
-    (kept,) = bench.folder.kept()
-    size = kept.size
+    (entry,) = bench.folder.kept()
+    size = entry.size
     bench.ask(do="trim", number=1, start=0.2, end=0.9)
     trimmed = bench.folder.find(1)
     assert trimmed.episode.length == pytest.approx(0.7)
@@ -227,11 +227,11 @@ def test_episode_is_trimmed_described_and_widened_again(bench: Bench) -> None:
     bench.ask(do="describe", number=1, note="spilled", task="pour more")
     described = bench.folder.find(1).episode
     assert (described.note, described.task) == ("spilled", "pour more")
-    bench.ask(do="trim", number=1, start=0.0, end=kept.end - kept.start)
-    assert bench.folder.find(1).episode.length == pytest.approx(kept.episode.length)
+    bench.ask(do="trim", number=1, start=0.0, end=entry.end - entry.start)
+    assert bench.folder.find(1).episode.length == pytest.approx(entry.episode.length)
     # Each description makes another file, of which the newest alone is remembered.
     assert len(bench.folder._known) == 1
-    length = kept.end - kept.start
+    length = entry.end - entry.start
     for begin, end in ((1.0, 1.0), (0.0, 1000.0), (length + 0.02, length + 0.05)):
         with pytest.raises(InputError, match="choose a start"):
             bench.ask(do="trim", number=1, start=begin, end=end)
@@ -248,8 +248,8 @@ def test_episode_longer_than_the_ring_is_whole(
         bench.ring.sync()
     assert len(list(bench.ring_folder.glob("*.mcap"))) > ring_module.MAX_FILES
     bench.ask(do="stop")
-    (kept,) = bench.folder.kept()
-    with RecordingFile.open(kept.path) as file:
+    (entry,) = bench.folder.kept()
+    with RecordingFile.open(entry.path) as file:
         assert verify_recording(file, session_for(file).session).ticks >= 159
         assert next(iter(file.messages(STATE))).t == pytest.approx(first, abs=0.2)
     # The next file of the ring removes what is not needed any more.
@@ -342,10 +342,10 @@ def test_crash_leaves_the_running_episode_unfinished(bench: Bench) -> None:
     bench.ask(do="start", task="second")
     bench.move(100)
     bench.ring.sync()
-    begun = bench.keeper.status()["running"]["number"]
+    number = bench.keeper.status()["running"]["number"]
     # As after kill -9: nothing was ended, and the newest file of the ring has no end.
     again = bench.made()
-    assert begun == 2
+    assert number == 2
     assert "unfinished" in again.status()["notice"]
     assert again.status()["task"] == "second"
     first, second = bench.folder.kept()
@@ -402,4 +402,4 @@ def test_folder_lists_files_only(bench: Bench, recorded: Path) -> None:
     assert "episode-0008.mcap" in bench.folder.unreadable()[0]
     assert bench.folder.next_number() == 9
     os.remove(folder / "episode-0001.mcap")
-    assert [each.path.name for each in bench.folder.kept()] == ["episode-0007.mcap"]
+    assert [entry.path.name for entry in bench.folder.kept()] == ["episode-0007.mcap"]

@@ -42,11 +42,11 @@ def test_end_of_an_interrupted_episode_keeps_the_files_of_a_new_one(
     read, reading, may_end = bench.folder.markers, threading.Event(), threading.Event()
 
     def slowly() -> list[EpisodeMarker]:
-        found = read()
+        result = read()
         if threading.current_thread() is finishing:
             reading.set()
             assert may_end.wait(5.0)
-        return found
+        return result
 
     monkeypatch.setattr(bench.folder, "markers", slowly)
     # As the thread that finishes interrupted episodes.

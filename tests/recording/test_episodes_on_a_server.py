@@ -121,17 +121,17 @@ def test_killed_server_leaves_an_episode_that_is_recovered(
         move(server, *POSTURES)
         time.sleep(1.5)
         processes = [server.pid, server.child(RECORDER), server.arm, server.front]
-        for each in processes:
+        for process in processes:
             with suppress(ProcessLookupError):
-                os.kill(each, signal.SIGKILL)
+                os.kill(process, signal.SIGKILL)
         with suppress(ServerError):
             server.stop()
     capsys.readouterr()
     until(partial(_recovered, folder))
     assert "Episode 1 was interrupted and is kept as unfinished" in capsys.readouterr().out
-    (kept,) = EpisodeFolder(folder).kept()
-    assert kept.episode.task == "cut off"
-    assert kept.episode.length > 1.0
+    (entry,) = EpisodeFolder(folder).kept()
+    assert entry.episode.task == "cut off"
+    assert entry.episode.length > 1.0
 
 
 def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) -> None:
@@ -139,9 +139,9 @@ def test_server_that_ends_finishes_its_episode(server: AppServer, folder: Path) 
     move(server, *POSTURES)
     server.stop()
     assert "Traceback" not in server.output
-    (kept,) = EpisodeFolder(folder).kept()
-    assert kept.episode.outcome is EpisodeOutcome.UNFINISHED
-    assert kept.episode.length > 1.0
+    (entry,) = EpisodeFolder(folder).kept()
+    assert entry.episode.outcome is EpisodeOutcome.UNFINISHED
+    assert entry.episode.length > 1.0
 
 
 def _recovered(folder: Path) -> bool:

@@ -74,9 +74,9 @@ def test_recording_is_verified_and_scored(name: str, tmp_path: Path) -> None:
                 mailbox.put(command, ADA)
         writer.close()
     assert (run.phase, run.why) == (Phase.DONE, "")
-    found = katana450.open(recorded)
-    assert found.verify(urdf).identical
-    score = found.score(targets={"box": np.array((0.16, -0.12, 0.0))}, urdf=urdf)
+    recording = katana450.open(recorded)
+    assert recording.verify(urdf).identical
+    score = recording.score(targets={"box": np.array((0.16, -0.12, 0.0))}, urdf=urdf)
     # The file of the SO-101 rounds its angles.
     error = 1e-6 if name == "SO-101" else 1e-9
     np.testing.assert_allclose(score.places["box"], (0.16, -0.12, 0.0), atol=error)

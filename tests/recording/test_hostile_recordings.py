@@ -83,8 +83,8 @@ def test_mutations_raise_only_input_errors(path: Path, tmp_path: Path) -> None:
 
 def packed(*records: object) -> bytes:
     builder = RecordBuilder()
-    for each in records:
-        each.write(builder)  # type: ignore[attr-defined]
+    for part in records:
+        part.write(builder)  # type: ignore[attr-defined]
     return bytes(builder.end())
 
 
@@ -133,8 +133,8 @@ def test_length_beyond_the_file_reserves_no_memory(path: Path, tmp_path: Path) -
     # The first one is in the metadata.
     place = data.index(b"katana450.urdf", data.index(b"katana450.urdf") + 1)
     # The length of the attached file, after its name and its media type.
-    at = place + len("katana450.urdf") + 4 + len("application/xml")
-    data[at : at + 8] = struct.pack("<Q", 200_000_000)
+    start = place + len("katana450.urdf") + 4 + len("application/xml")
+    data[start : start + 8] = struct.pack("<Q", 200_000_000)
     (tmp_path / "long.mcap").write_bytes(data)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with (

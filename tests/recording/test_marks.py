@@ -19,7 +19,7 @@ def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
     marks: list[Mark] = []
     # The name can be in a later part of the file, which is read when it is complete.
     add_marks(marks, [event(1, kind="stop", why=stop), event(2, kind="driver", name="Anna")])
-    assert [each.text for each in marks] == [stop, "Anna drives"]
+    assert [mark.text for mark in marks] == [stop, "Anna drives"]
     add_marks(marks, [event(3, kind="stop", why=named, named=True)])
     assert marks == [Mark(1.0, "stop", named), Mark(2.0, "driver", "Anna drives")]
     # A recording that begins in between does not show the press.

@@ -142,7 +142,7 @@ def test_download_is_sent_in_parts_and_removed(
         await answer(scope, parts(), send)
 
     asyncio.run(fetch())
-    assert b"".join(each.get("body", b"") for each in sent).startswith(b"\x89MCAP")
+    assert b"".join(message.get("body", b"") for message in sent).startswith(b"\x89MCAP")
     assert not list(temporary.rglob("katana450.mcap"))
 
     async def lost(_: dict[str, Any]) -> None:
@@ -174,4 +174,4 @@ def test_folder_that_another_process_takes_for_abandoned_is_not_used(
     with new_folder(out) as folder:
         (folder / "content").write_text("whole")
     assert len(raced) == 1
-    assert [each.name for each in out.iterdir()] == ["content"]
+    assert [path.name for path in out.iterdir()] == ["content"]

@@ -54,7 +54,7 @@ def path(urdf: Path, described: DescribedRobot) -> Path:
     driver = SimulatedDriver(described.robot.require_arm(), session.ready, 0.0)
     loop = ControlLoop(session, driver, mailbox, clock, 1.0 / PERIOD)
     p = forward(arm.chain, session.ready)[:3, 3]
-    at = {5: p + np.array((0.0, 0.05, -0.05)), 120: p - np.array((0.0, 0.05, 0.0))}
+    drags = {5: p + np.array((0.0, 0.05, -0.05)), 120: p - np.array((0.0, 0.05, 0.0))}
     recorded = urdf.with_name("run.mcap")
     head = header_of(described.robot, Settings(), urdf, None, session.environment)
     with recorded.open("wb") as file:
@@ -62,8 +62,8 @@ def path(urdf: Path, described: DescribedRobot) -> Path:
         loop.record = writer.put
         for tick in range(260):
             clock.t += PERIOD
-            if tick in at:
-                mailbox.put(cmd.Position(at[tick]), ADA)
+            if tick in drags:
+                mailbox.put(cmd.Position(drags[tick]), ADA)
             loop.tick()
         writer.close()
     return recorded
@@ -84,14 +84,14 @@ def test_score_has_the_measures_of_the_tool(
     path: Path, urdf: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["score", str(path), "--urdf", str(urdf), "--json"]) == 0
-    (found,) = json.loads(capsys.readouterr().out)
+    (row,) = json.loads(capsys.readouterr().out)
     run = katana450.open(path)
     length = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).sum()
-    assert found["tool_path_mm"] == pytest.approx(length, rel=0.01)
+    assert row["tool_path_mm"] == pytest.approx(length, rel=0.01)
     step = 1e3 * np.linalg.norm(np.diff(run.position, axis=0), axis=1).max() / PERIOD
-    assert found["max_tool_speed_mm_s"] == pytest.approx(step, rel=0.02)
-    assert 0.0 < found["smallest_singular_value"] < 1.0
-    assert found["nearest_clearance_mm"] > 0.0
+    assert row["max_tool_speed_mm_s"] == pytest.approx(step, rel=0.02)
+    assert 0.0 < row["smallest_singular_value"] < 1.0
+    assert row["nearest_clearance_mm"] > 0.0
 
 
 def test_motion_runs_again(
@@ -120,7 +120,7 @@ def test_tables_bags_and_datasets_have_six_axes(path: Path, tmp_path: Path) -> N
     assert names[:7] == ["t", *(f"theta{axis}" for axis in range(1, 7))]
     store = get_typestore(Stores.ROS2_HUMBLE)
     with AnyReader([tmp_path / "rosbag2"], default_typestore=store) as reader:
-        (wanted,) = (each for each in reader.connections if each.topic == "/joint_setpoints")
+        (wanted,) = (link for link in reader.connections if link.topic == "/joint_setpoints")
         *_, (connection, _, data) = reader.messages(connections=[wanted])
         last: Any = reader.deserialize(data, connection.msgtype)
     run = katana450.open(path)

@@ -65,22 +65,22 @@ def test_moments_are_the_recorded_states(recorded: tuple[Path, list[TickRecord]]
     run = read(path)
     shift = run.spans[0].start - records[0].t
     assert run.spans[-1].end == pytest.approx(records[-1].t + shift, abs=1e-6)
-    for each in random.Random(1).sample(records, 40):
-        moment = run.at(each.t + shift + 1e-6)
+    for tick in random.Random(1).sample(records, 40):
+        moment = run.at(tick.t + shift + 1e-6)
         assert moment is not None
-        assert moment.row.joints == each.state.q.tolist()
-        assert moment.row.gripper == each.state.gripper
-        poses = {found.name: found.T for found in moment.objects}
-        for wanted in each.state.objects:
+        assert moment.row.joints == tick.state.q.tolist()
+        assert moment.row.gripper == tick.state.gripper
+        poses = {prop.name: prop.T for prop in moment.objects}
+        for wanted in tick.state.objects:
             if not wanted.carried and wanted.name in poses:
                 np.testing.assert_allclose(poses[wanted.name], wanted.T, atol=2e-6)
         assert {"cup", "basin"} <= poses.keys()
-        (row,) = run.rows_at([each.t + shift + 1e-6])
+        (row,) = run.rows_at([tick.t + shift + 1e-6])
         assert row is not None
         assert row.joints == moment.row.joints
-        if each.state.poured is not None and moment.water is not None:
-            kept = each.state.poured.water.cup.kept
-            assert moment.water.cup.volume == pytest.approx(kept, abs=1e3)
+        if tick.state.poured is not None and moment.water is not None:
+            inside = tick.state.poured.water.cup.kept
+            assert moment.water.cup.volume == pytest.approx(inside, abs=1e3)
     # Before the start, the first state is shown.
     first = run.at(0.0)
     assert first is not None
@@ -94,7 +94,7 @@ def test_file_that_grows_is_read_as_far_as_it_is_written(
     path = tmp_path / "growing.mcap"
     ends = []
     run = PlaybackRun(lambda: [path])
-    begins = [each.offset for each in ChunkIndex(recorded[0]).chunks]
+    begins = [chunk.offset for chunk in ChunkIndex(recorded[0]).chunks]
     for size in (begins[1], begins[1] + 9, begins[-1] - 1, len(content)):
         path.write_bytes(content[:size])
         run.update()
@@ -130,7 +130,7 @@ def test_broken_files_are_refused(recorded: tuple[Path, list[TickRecord]], tmp_p
         path.write_bytes(damaged)
         try:
             run = read(path)
-            for t in [each for span in run.spans for each in span]:
+            for t in [time for span in run.spans for time in span]:
                 run.at(t)
             run.marks()
         except InputError:
@@ -209,15 +209,15 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     ring.close()
     played = PlaybackRun(lambda: recordings_in(tmp_path / "ring"))
     played.update()
-    found = played.marks()
-    kinds = [each.kind for each in found]
+    marks = played.marks()
+    kinds = [mark.kind for mark in marks]
     assert kinds.count("stop") == 1
     assert kinds.index("driver") < kinds.index("stop") < kinds.index("clear_stop")
     assert kinds.index("clear_stop") < kinds.index("step")
-    words = {each.kind: each.text for each in found}
+    words = {mark.kind: mark.text for mark in marks}
     assert words["stop"] == "Ada pressed STOP."
     assert words["driver"] in ("Ada drives", "the server drives")
-    (stop,) = (each for each in found if each.kind == "stop")
+    (stop,) = (mark for mark in marks if mark.kind == "stop")
     moment = played.at(stop.t + 1e-6)
     assert moment is not None
     assert moment.row.status == "stopped"
@@ -231,7 +231,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
     glass = SceneObject("glass", Shape.VESSEL, (0.03, 0.08), np.eye(4))
     state = session.begin(session.ready, 0.0, 1000.0)
     state = replace(state, objects=(*state.objects, glass))
-    cup = next(each for each in state.objects if each.name == "cup")
+    cup = next(prop for prop in state.objects if prop.name == "cup")
     volumes = {"cup": 120 * MILLILITRE, "glass": 30 * MILLILITRE}
     filled = pouring.settled(Water(()), state.objects, state.x, volumes)
     assert filled is not None
@@ -245,7 +245,7 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
             T = se3.from_rotation_translation(R, cup.T[:3, 3] + (0.0, 0.0, 0.2))
             water = flow.step(water, {"cup": VesselMove(T, (0.0, 0.0, 0.0))}, 0.01)
             objects = tuple(
-                replace(each, T=T) if each.name == "cup" else each for each in state.objects
+                replace(prop, T=T) if prop.name == "cup" else prop for prop in state.objects
             )
             poured = replace(filled, water=water)
             states.append(replace(state, t=t, objects=objects, poured=poured))
@@ -255,19 +255,19 @@ def test_water_is_that_of_the_moment_with_its_stream(tmp_path: Path) -> None:
         writer.close()
     run = read(path)
     shift = run.spans[0].start - 1000.0
-    assert max(len(each.poured.water.parcels) for each in states if each.poured) > 10
+    assert max(len(state.poured.water.parcels) for state in states if state.poured) > 10
     for wanted in states[::7]:
         moment = run.at(wanted.t + shift + 1e-6)
         assert moment is not None
         assert moment.water is not None
         assert wanted.poured is not None
-        found, true = still_flying(moment.water, flow.water_environment), wanted.poured.water
-        assert found.cup.volume == pytest.approx(true.cup.kept, abs=1e4)
-        assert found.basin == pytest.approx(true.basin, abs=1e4)
-        np.testing.assert_allclose(found.cup.T, true.cup.T, atol=2e-6)
-        assert [(each.name, each.volume) for each in found.others] == [("glass", volumes["glass"])]
-        assert len(found.parcels) == pytest.approx(len(true.parcels), abs=1)
-        for a, b in zip(found.parcels[::-1], true.parcels[::-1], strict=False):
+        shown, true = still_flying(moment.water, flow.water_environment), wanted.poured.water
+        assert shown.cup.volume == pytest.approx(true.cup.kept, abs=1e4)
+        assert shown.basin == pytest.approx(true.basin, abs=1e4)
+        np.testing.assert_allclose(shown.cup.T, true.cup.T, atol=2e-6)
+        assert [(cup.name, cup.volume) for cup in shown.others] == [("glass", volumes["glass"])]
+        assert len(shown.parcels) == pytest.approx(len(true.parcels), abs=1)
+        for a, b in zip(shown.parcels[::-1], true.parcels[::-1], strict=False):
             np.testing.assert_allclose(a.at(a.age), b.at(b.age), atol=1e-4)
 
 
@@ -287,11 +287,11 @@ def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
     first = state_message([0.0, 0.1], position=(0.3, 0.0, 0.1))
     second = structs.replace(first, q=[np.radians(3.0), 0.1], position=(0.3, 0.004, 0.103))
     times, turning = [0.0, 1.0, 2.0], (False, False)
-    found = difference(times, [first, first, None], [first, second, second], turning)
-    assert found.t == [0.0, 1.0]
-    assert found.joints == pytest.approx([0.0, 3.0])
-    assert found.tool == pytest.approx([0.0, 5.0])
-    assert found.slides == []
+    report = difference(times, [first, first, None], [first, second, second], turning)
+    assert report.t == [0.0, 1.0]
+    assert report.joints == pytest.approx([0.0, 3.0])
+    assert report.tool == pytest.approx([0.0, 5.0])
+    assert report.slides == []
     with pytest.raises(InputError, match="2 and 1 joints"):
         difference([0.0], [first], [structs.replace(first, q=[0.0])], turning)
     # Two runs of another robot than that of the server.
@@ -302,10 +302,10 @@ def test_difference_is_that_of_the_worst_joint_and_of_the_tools() -> None:
 def test_difference_of_joints_that_slide_is_a_length() -> None:
     first = state_message([0.0, 0.1])
     second = structs.replace(first, q=[np.radians(3.0), 0.107])
-    found = difference([0.0], [first], [second], (False, True))
-    assert found.joints == pytest.approx([3.0])
-    assert found.slides == pytest.approx([7.0])
-    assert found.tool == []
+    report = difference([0.0], [first], [second], (False, True))
+    assert report.joints == pytest.approx([3.0])
+    assert report.slides == pytest.approx([7.0])
+    assert report.tool == []
     assert difference([0.0], [first], [second], (True, True)).joints == []
 
 
@@ -332,7 +332,7 @@ def test_any_moment_of_an_hour_has_its_state(tmp_path: Path) -> None:
     assert first is not None
     for _ in range(100):
         after = rng.uniform(0.0, end - start)
-        found = run.at(start + after)
-        assert found is not None
+        state = run.at(start + after)
+        assert state is not None
         # It is the last state before. The arm of this recording pauses for up to 1.4 s.
-        assert -1e-3 < after - (found.row.t - first.row.t) < 1.5
+        assert -1e-3 < after - (state.row.t - first.row.t) < 1.5

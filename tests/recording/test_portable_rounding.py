@@ -54,8 +54,8 @@ OLD_LIBM = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA"}
 OTHERS = [
     pytest.param({"OPENBLAS_CORETYPE": "Zen", "PYTHONHASHSEED": "4711", **NO_SIMD}),
     *(
-        pytest.param(each, marks=pytest.mark.long)
-        for each in (
+        pytest.param(case, marks=pytest.mark.long)
+        for case in (
             {"OPENBLAS_CORETYPE": "SkylakeX"},
             OLD_LIBM,
             {**OLD_LIBM, **NO_SIMD, "OPENBLAS_CORETYPE": "Sandybridge"},
@@ -69,15 +69,15 @@ def path(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureReques
     return recorded(tmp_path_factory.mktemp("portable") / "run.mcap", request.param)
 
 
-def recorded(made: Path, kind: str) -> Path:
+def recorded(path: Path, kind: str) -> Path:
     """Record a session of one of KINDS in a process like those of a server."""
     script, ticks = KINDS[kind]
     # The processes of a server get this environment.
     environment = portable_rounding(os.environ | {"OPENBLAS_CORETYPE": "Haswell"})
     subprocess.run(
-        [sys.executable, "-c", script, str(made), str(ticks)], env=environment, check=True
+        [sys.executable, "-c", script, str(path), str(ticks)], env=environment, check=True
     )
-    return made
+    return path
 
 
 def test_recording_names_its_rounding(path: Path) -> None:
@@ -86,7 +86,7 @@ def test_recording_names_its_rounding(path: Path) -> None:
         assert file.metadata["blas_core"] == "Nehalem"
 
 
-@pytest.mark.parametrize("environment", OTHERS, ids=lambda each: " ".join(each.values()))
+@pytest.mark.parametrize("environment", OTHERS, ids=lambda case: " ".join(case.values()))
 def test_simulation_is_identical_on_other_processors(
     path: Path, environment: dict[str, str]
 ) -> None:
@@ -113,22 +113,22 @@ def test_another_kind_of_processor_simulates_in_this_process(
 
 
 def test_tunables_of_the_user_are_kept_and_ours_come_last() -> None:
-    given = {"GLIBC_TUNABLES": "glibc.malloc.arena_max=2", "HOME": "/root"}
-    found = portable_rounding(given)
-    assert found["GLIBC_TUNABLES"].startswith("glibc.malloc.arena_max=2:glibc.cpu.hwcaps=-")
-    assert found["HOME"] == "/root"
-    assert found["OPENBLAS_NUM_THREADS"] == "1"
-    assert portable_rounding(found) == found
-    assert rounds_portably(found)
-    assert not rounds_portably(given)
-    assert not rounds_portably(found | {"OPENBLAS_CORETYPE": "Zen"})
+    environment = {"GLIBC_TUNABLES": "glibc.malloc.arena_max=2", "HOME": "/root"}
+    changed = portable_rounding(environment)
+    assert changed["GLIBC_TUNABLES"].startswith("glibc.malloc.arena_max=2:glibc.cpu.hwcaps=-")
+    assert changed["HOME"] == "/root"
+    assert changed["OPENBLAS_NUM_THREADS"] == "1"
+    assert portable_rounding(changed) == changed
+    assert rounds_portably(changed)
+    assert not rounds_portably(environment)
+    assert not rounds_portably(changed | {"OPENBLAS_CORETYPE": "Zen"})
 
 
 def interpreter(version: str) -> str | None:
     """Return an interpreter of Python ``version``, on the path or of pyenv; None without one."""
     home = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
-    found = shutil.which(f"python{version}")
-    names = [found] if found else []
+    program = shutil.which(f"python{version}")
+    names = [program] if program else []
     names += map(str, sorted((home / "versions").glob(f"{version}.*/bin/python")))
     ask = "import sys; print('%d.%d' % sys.version_info[:2])"
     for name in names:

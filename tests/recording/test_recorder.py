@@ -59,7 +59,7 @@ def verified(path: Path) -> int:
 
 def tick_times(path: Path) -> list[float]:
     with RecordingFile.open(path) as file:
-        return [each.t for each in file.messages(COMMANDS)]
+        return [message.t for message in file.messages(COMMANDS)]
 
 
 @pytest.fixture
@@ -86,27 +86,27 @@ def test_motion_is_recorded_and_simulated_again_to_the_bit(
         for posture in POSTURES:
             state = client.joints(posture)
         client.stop()
-        kept = tmp_path / "kept.mcap"
+        copy = tmp_path / "kept.mcap"
         until(lambda: list(folder.glob("*")))
         # After the delay of its start, and then a second for the disk.
-        until(lambda: main(["record", "keep", str(folder), "--out", str(kept)]) == 0)
-        until(lambda: _keeps(folder, kept, "stop"))
+        until(lambda: main(["record", "keep", str(folder), "--out", str(copy)]) == 0)
+        until(lambda: _keeps(folder, copy, "stop"))
         address, cookie = f"{server.url}/api/v1/recording", enter(server.url)
         for query, status in (("?last=0", 400), ("?last=x", 400), ("", 200)):
             answer = ask(address + query, Cookie=cookie)
             assert answer[0] == status, answer[2]
     downloaded = tmp_path / "downloaded.mcap"
     downloaded.write_bytes(answer[2])
-    assert verified(downloaded) == verified(kept)
+    assert verified(downloaded) == verified(copy)
     server.stop()
-    assert verified(kept) > 100
+    assert verified(copy) > 100
     (path,) = recordings_in(folder)
     assert verified(path) > 100
     recording = katana450.open(path)
     assert np.abs(recording.q - state.q).max(axis=1).min() < 1e-9
     # It begins with the first motion, although the process started later.
     assert recording.t[-1] - recording.t[0] > 1.0
-    names = [type(each.command).__name__ for each in recording.commands]
+    names = [type(command.command).__name__ for command in recording.commands]
     assert names.count("Joints") == len(POSTURES)
     assert "Stop" in names
     assert path.stat().st_mode & 0o077 == 0
@@ -134,14 +134,14 @@ def test_script_leaves_no_file_even_if_nobody_takes_it(
     answer = asyncio.run(RecordingRoutes(context, store).routes()[1].endpoint(request))
     assert answer.body == b"recorded"
     # The answer was not sent: the connection broke.
-    assert not [each for each in store.new_path().parent.iterdir() if each.is_dir()]
+    assert not [path for path in store.new_path().parent.iterdir() if path.is_dir()]
 
 
-def _keeps(folder: Path, kept: Path, command: str) -> bool:
+def _keeps(folder: Path, copy: Path, command: str) -> bool:
     """Keep the ring in the file ``kept``; return whether it contains ``command``."""
-    assert main(["record", "keep", str(folder), "--out", str(kept)]) == 0
-    with RecordingFile.open(kept) as file:
-        return any(f'"{command}"'.encode() in each.data for each in file.messages(COMMANDS))
+    assert main(["record", "keep", str(folder), "--out", str(copy)]) == 0
+    with RecordingFile.open(copy) as file:
+        return any(f'"{command}"'.encode() in message.data for message in file.messages(COMMANDS))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
@@ -189,14 +189,14 @@ def _has_newer(folder: Path, before: Path) -> bool:
 
 def test_ring_keeps_the_newest_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ring, "MAX_FILE_TICKS", 10)
-    kept = Ring(folder, header())
+    store = Ring(folder, header())
 
     def put(record: TickRecord) -> None:
-        kept.put(record)
-        kept.sync()
+        store.put(record)
+        store.sync()
 
     run(400, 5, put)
-    kept.close()
+    store.close()
     files = recordings_in(folder)
     assert len(files) == ring.MAX_FILES
     # The first tick of a file is that of its complete state.
@@ -215,23 +215,23 @@ def test_ticks_wait_in_memory_for_a_disk_that_takes_nothing(
     # A file stands where the folder should be.
     folder.write_text("in the way")
     now = [0.0]
-    kept = Ring(folder, header(), lambda: now[0])
+    store = Ring(folder, header(), lambda: now[0])
     records: list[TickRecord] = []
     run(200, 6, records.append, odd=False)
     for record in records[:20]:
-        kept.put(record)
+        store.put(record)
     assert "is interrupted" in caplog.text
     folder.unlink()
     # Not before the time of the next attempt.
-    kept.put(records[20])
+    store.put(records[20])
     assert not folder.exists()
     now[0] = ring.RETRY_SECONDS
     # An arm at rest has no more ticks.
-    kept.sync()
-    assert not kept.problem
-    assert not kept.unsynced
-    kept.put_all(records[21:])
-    kept.close()
+    store.sync()
+    assert not store.problem
+    assert not store.unsynced
+    store.put_all(records[21:])
+    store.close()
     (path,) = recordings_in(folder)
     assert tick_times(path) == pytest.approx([record.t for record in records], abs=1e-8)
     assert verified(path) == len(records) - 1
@@ -247,28 +247,28 @@ def test_ticks_that_a_full_disk_did_not_take_are_written_later_or_counted(
 
     monkeypatch.setattr(ring, "MAX_UNSYNCED", memory)
     now = [0.0]
-    kept = Ring(folder, header(), lambda: now[0])
+    store = Ring(folder, header(), lambda: now[0])
     records: list[TickRecord] = []
     run(400, 6, records.append, odd=False)
-    kept.put_all(records[:100])
-    kept.sync()
+    store.put_all(records[:100])
+    store.sync()
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     for place in (100, 140, 180):
         now[0] += ring.RETRY_SECONDS
-        kept.put_all(records[place : place + 40])
+        store.put_all(records[place : place + 40])
         (*_, path) = recordings_in(folder)
         resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 100, before[1]))
         try:
-            kept.sync()
+            store.sync()
             # Before the next attempt.
-            kept.put_all([])
+            store.put_all([])
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        assert "Nothing is recorded now" in kept.problem
+        assert "Nothing is recorded now" in store.problem
     now[0] += ring.RETRY_SECONDS
-    kept.put_all(records[220:260])
-    kept.sync()
-    kept.close()
+    store.put_all(records[220:260])
+    store.sync()
+    store.close()
     joined = folder.with_name("joined.mcap")
     # Files that took nothing are gone, and no tick is there twice.
     assert len(recordings_in(folder)) == 2
@@ -289,10 +289,10 @@ def test_ticks_that_a_full_disk_did_not_take_are_written_later_or_counted(
 def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record_end, "MAX_WAITING", 50)
     ours, theirs = Pipe()
-    taken: list[TickRecord] = []
+    sent: list[TickRecord] = []
 
     def take(record: TickRecord) -> None:
-        taken.append(record)
+        sent.append(record)
         end.put(record)
 
     end = RecordEnd()
@@ -318,11 +318,11 @@ def test_reader_that_hangs_costs_records_but_no_tick(monkeypatch: pytest.MonkeyP
         else:
             received += records
     assert lost > 0
-    assert len(received) + lost == len(taken)
-    assert received[0].t == taken[0].t
+    assert len(received) + lost == len(sent)
+    assert received[0].t == sent[0].t
     # The same objects in every record in which they were the same before.
     same = [a.state.objects is b.state.objects for a, b in pairwise(received[:before_gap])]
-    were = [a.state.objects is b.state.objects for a, b in pairwise(taken[:before_gap])]
+    were = [a.state.objects is b.state.objects for a, b in pairwise(sent[:before_gap])]
     assert same == were
 
 
@@ -330,8 +330,8 @@ def test_ticks_are_sent_in_batches_and_the_last_ones_soon() -> None:
     ours, theirs = Pipe()
     end, records = RecordEnd(), list[TickRecord]()
     run(2 * record_end.BATCH + 3, 9, records.append)
-    for each in records[:-3]:
-        end.put(each)
+    for record in records[:-3]:
+        end.put(record)
     end.attach(ours)
     deserializer = RecordDeserializer()
 
@@ -343,13 +343,13 @@ def test_ticks_are_sent_in_batches_and_the_last_ones_soon() -> None:
     batches = [batch() for _ in range(2)]
     assert list(map(len, batches)) == [record_end.BATCH] * 2
     # After a motion nothing comes that fills the batch.
-    for each in records[-3:]:
-        end.put(each)
-    received = [each for some in batches for each in some]
+    for record in records[-3:]:
+        end.put(record)
+    received = [record for some in batches for record in some]
     while len(received) < len(records):
         assert theirs.poll(4 * record_end.COLLECTING), "the last ticks were not sent"
         received += batch()
-    assert [each.t for each in received] == [each.t for each in records]
+    assert [record.t for record in received] == [record.t for record in records]
     end.close()
 
 
@@ -358,31 +358,31 @@ def test_batches_are_written_as_single_ticks_are(folder: Path) -> None:
     run(200, 9, records.append)
     written, places = [], list[FloatArray]()
     for name in ("alone", "together"):
-        kept = Ring(folder / name, header())
+        store = Ring(folder / name, header())
         for start in range(0, len(records), record_end.BATCH):
             batch = records[start : start + record_end.BATCH]
             if name == "together":
-                kept.put_all(batch)
+                store.put_all(batch)
             else:
-                for each in batch:
-                    kept.put(each)
-        kept.close()
+                for record in batch:
+                    store.put(record)
+        store.close()
         (path,) = recordings_in(folder / name)
         with RecordingFile.open(path) as file:
-            written.append([each[:3] for each in file.messages(COMMANDS, EVENTS, STATE)])
-            states = [json.loads(each.data) for each in file.messages(STATE)]
-        places.append(np.array([each["position"] for each in states]))
+            written.append([message[:3] for message in file.messages(COMMANDS, EVENTS, STATE)])
+            states = [json.loads(message.data) for message in file.messages(STATE)]
+        places.append(np.array([state["position"] for state in states]))
     assert written[0] == written[1]
     assert len(places[0]) > 100
     assert np.abs(places[0] - places[1]).max() < 2e-6
 
 
 def test_findings_are_events(folder: Path) -> None:
-    kept = Ring(folder, header())
-    run(400, 8, kept.put)
-    kept.close()
+    store = Ring(folder, header())
+    run(400, 8, store.put)
+    store.close()
     (path,) = recordings_in(folder)
     with RecordingFile.open(path) as file:
-        events = [each.data for each in file.messages(EVENTS)]
+        events = [message.data for message in file.messages(EVENTS)]
         assert file.counts()[STATE] > 0
-    assert any(b'"began":true' in each for each in events)
+    assert any(b'"began":true' in event for event in events)

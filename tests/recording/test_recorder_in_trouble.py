@@ -74,11 +74,11 @@ def recorder(server: AppServer) -> int | None:
 
 def whole_times(path: Path, copy: Path) -> list[float]:
     """Return the times of the ticks in ``path``, which may have no end yet."""
-    found = whole_copy(path, copy)
-    if found is None:
+    file = whole_copy(path, copy)
+    if file is None:
         return []
     with suppress(katana450.InputError):
-        return tick_times(found)
+        return tick_times(file)
     return []
 
 
@@ -87,20 +87,20 @@ def gaps_of(path: Path) -> list[tuple[float, int, str]]:
     before, gaps = 0.0, []
     with RecordingFile.open(path) as file:
         for message in file.messages(COMMANDS):
-            found = json.loads(message.data)
-            if "missing" in found:
-                gaps.append((found["t"] - before, found["ticks"], found["missing"]))
-            before = found["t"]
+            content = json.loads(message.data)
+            if "missing" in content:
+                gaps.append((content["t"] - before, content["ticks"], content["missing"]))
+            before = content["t"]
     return gaps
 
 
 def mounted(folder: Path, line: tuple[str, ...]) -> tuple[str, ...] | None:
     """Return ``line`` with a disk of 1 MB at ``folder``; None where that is not allowed."""
     folder.mkdir()
-    found = ("unshare", "-rm", "sh", "-c", SMALL_DISK.format(folder=folder), "sh")
+    command = ("unshare", "-rm", "sh", "-c", SMALL_DISK.format(folder=folder), "sh")
     with suppress(OSError):
-        if subprocess.run([*found, "true"], capture_output=True, check=False).returncode == 0:
-            return (*found, *line)
+        if subprocess.run([*command, "true"], capture_output=True, check=False).returncode == 0:
+            return (*command, *line)
     return None
 
 
@@ -112,18 +112,18 @@ def test_full_disk_delays_and_loses_no_tick_and_is_reported(
 ) -> None:
     line = command(folder)
     if disk == "full":
-        found = mounted(folder, line)
-        if found is None:
+        on_disk = mounted(folder, line)
+        if on_disk is None:
             pytest.skip("no file system can be mounted here; `limited` shows the same")
-        line = found
+        line = on_disk
     with AppServer(line) as server, swinging(server):
-        there = Path(f"/proc/{server.pid}/root/{folder}")
-        until(lambda: recordings_in(there), 60.0)
-        first, copy = recordings_in(there)[0], tmp_path / "copy.mcap"
+        inside = Path(f"/proc/{server.pid}/root/{folder}")
+        until(lambda: recordings_in(inside), 60.0)
+        first, copy = recordings_in(inside)[0], tmp_path / "copy.mcap"
         until(lambda: whole_times(first, copy), 60.0)
         process = recorder(server)
         assert process is not None
-        fill, free = actions(disk, process, there)
+        fill, free = actions(disk, process, inside)
         fill()
         until(lambda: "is interrupted" in server.output, 60.0)
         with connect(server.url, "Look") as look:
@@ -134,20 +134,20 @@ def test_full_disk_delays_and_loses_no_tick_and_is_reported(
         assert end.t - begin.t > 0.8 * ring.RETRY_SECONDS
         assert timing.late_p50 < PERIOD
         free()
-        newest = recordings_in(there)[-1].name
+        newest = recordings_in(inside)[-1].name
 
         def again() -> bool:
-            last = recordings_in(there)[-1]
+            last = recordings_in(inside)[-1]
             return last.name > newest and bool(whole_times(last, copy))
 
         until(again, 60.0)
-        kept = tmp_path / "kept.mcap"
-        assert main(["record", "keep", str(there), "--out", str(kept)]) == 0
+        whole = tmp_path / "kept.mcap"
+        assert main(["record", "keep", str(inside), "--out", str(whole)]) == 0
         reason = {"full": "No space left on device", "limited": "File too large"}[disk]
         assert f"is interrupted: {reason}" in server.output
     # The ticks of 30 s wait in memory.
-    assert gaps_of(kept) == []
-    assert katana450.open(kept).verify().identical
+    assert gaps_of(whole) == []
+    assert katana450.open(whole).verify().identical
 
 
 def actions(

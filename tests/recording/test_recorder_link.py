@@ -51,8 +51,8 @@ def listen(bench: Bench, tmp_path: Path) -> Iterator[Callable[..., RunningScript
     def begin(keeper: object = None) -> RunningScripts:
         scripts, address = RunningScripts(), pipe_address(tmp_path, "test")
         file = recorder_file(tmp_path, 8080)
-        given = keeper or bench.keeper
-        listeners.append(RecorderListener(given, scripts, file, address, b"salt"))  # type: ignore[arg-type]
+        present = keeper or bench.keeper
+        listeners.append(RecorderListener(present, scripts, file, address, b"salt"))  # type: ignore[arg-type]
         return scripts
 
     yield begin
@@ -82,12 +82,12 @@ def test_requests_are_answered_and_the_state_is_shown(
         link.ask(StartEpisode(), ADA)
     listen()
     # It waits for the process that records.
-    begun = link.ask(StartEpisode(task="pour"), ADA, 5.0)
+    answer = link.ask(StartEpisode(task="pour"), ADA, 5.0)
     until(lambda: page.shown.get(ENTRY))
     assert caplog.text.count("Too many open files") == 1
-    assert begun["number"] == 1
+    assert answer["number"] == 1
     # People are named by pseudonyms in a recording.
-    assert begun["by"]["key"] not in ("", ADA.key)
+    assert answer["by"]["key"] not in ("", ADA.key)
     until(lambda: page.shown[ENTRY]["running"])
     with pytest.raises(InputError, match="runs already"):
         link.ask(StartEpisode(), ADA)

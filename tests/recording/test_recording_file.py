@@ -77,9 +77,9 @@ def test_stock_reader_finds_every_message_valid_by_its_schema(
             assert schema is not None
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
             if schema.name not in checks:
-                found = json.loads(schema.data)
-                jsonschema.Draft202012Validator.check_schema(found)
-                checks[schema.name] = jsonschema.Draft202012Validator(found)
+                form = json.loads(schema.data)
+                jsonschema.Draft202012Validator.check_schema(form)
+                checks[schema.name] = jsonschema.Draft202012Validator(form)
             checks[schema.name].validate(json.loads(message.data))
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
     assert counts[COMMANDS] == len(records)
@@ -100,21 +100,21 @@ def test_index_is_that_of_the_mcap_library(tmp_path: Path, file: RecordingFile) 
             )
             channels[topic.name] = writer.register_channel(topic.name, "json", schema)
         writer.add_metadata(METADATA, dict(file.metadata))
-        for each in file.attachments():
-            writer.add_attachment(0, 0, each.name, each.media_type, each.data)
+        for attachment in file.attachments():
+            writer.add_attachment(0, 0, attachment.name, attachment.media_type, attachment.data)
         ours = tmp_path / "ours.mcap"
         with ours.open("wb") as target, pytest.MonkeyPatch.context() as patch:
             patch.setattr(recording_writer, "CHUNK_BYTES", 2000)
             mine = MessageWriter(target, file.metadata, list(file.attachments()))
             for message in file.messages(*file.counts()):
                 mine.add(message.topic, message.number, message.log_time, message.data)
-                at = message.log_time
-                writer.add_message(channels[message.topic], at, message.data, at, message.number)
+                t = message.log_time
+                writer.add_message(channels[message.topic], t, message.data, t, message.number)
             mine.finish()
         writer.finish()
-    found = []
-    for made in (ours, copy):
-        with made.open("rb") as opened:
+    indices = []
+    for path in (ours, copy):
+        with path.open("rb") as opened:
             summary = make_reader(opened, validate_crcs=True).get_summary()
         assert summary is not None
         for chunk in summary.chunk_indexes:
@@ -125,14 +125,14 @@ def test_index_is_that_of_the_mcap_library(tmp_path: Path, file: RecordingFile) 
             chunk.compressed_size = 0
             first = min(chunk.message_index_offsets.values())
             offsets = chunk.message_index_offsets.items()
-            chunk.message_index_offsets = {key: at - first for key, at in offsets}
+            chunk.message_index_offsets = {key: offset - first for key, offset in offsets}
         for attached in summary.attachment_indexes:
             attached.offset = 0
         for metadata in summary.metadata_indexes:
             metadata.offset = 0
-        found.append(vars(summary))
-    assert found[0] == found[1]
-    assert len(found[0]["chunk_indexes"]) > 10
+        indices.append(vars(summary))
+    assert indices[0] == indices[1]
+    assert len(indices[0]["chunk_indexes"]) > 10
 
 
 def test_all_topics_have_channels(file: RecordingFile) -> None:
@@ -143,30 +143,30 @@ def test_all_topics_have_channels(file: RecordingFile) -> None:
 def test_states_are_the_changed_ones_to_the_bit(
     run: Path, file: RecordingFile, records: list[TickRecord]
 ) -> None:
-    by_time = {each.state.t: each.state for each in records}
-    messages = [json.loads(each.data) for each in file.messages(STATE)]
+    by_time = {record.state.t: record.state for record in records}
+    messages = [json.loads(message.data) for message in file.messages(STATE)]
     assert 0.3 * len(records) < len(messages) <= len(records)
     robot = described().robot
     arm = robot.require_arm()
-    for each in messages:
-        state = by_time[each["t"]]
-        assert np.array(each.get("q", each["setpoint"])).tobytes() == state.q.tobytes()
-        assert np.array(each["setpoint"]).tobytes() == state.setpoint.tobytes()
-        assert each["status"] == state.status.value
+    for row in messages:
+        state = by_time[row["t"]]
+        assert np.array(row.get("q", row["setpoint"])).tobytes() == state.q.tobytes()
+        assert np.array(row["setpoint"]).tobytes() == state.setpoint.tobytes()
+        assert row["status"] == state.status.value
         T = arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q)
-        np.testing.assert_allclose(each["position"], T[:3, 3], atol=2e-5)
+        np.testing.assert_allclose(row["position"], T[:3, 3], atol=2e-5)
     # The orientation is not in the file; it follows from the joints.
     found_orientations = katana450.open(run).orientation
     assert found_orientations.shape == (len(messages), 4)
-    for each, (x, y, z, w) in zip(messages[::10], found_orientations[::10], strict=True):
-        state = by_time[each["t"]]
+    for row, (x, y, z, w) in zip(messages[::10], found_orientations[::10], strict=True):
+        state = by_time[row["t"]]
         T = arm.T_base_shoulder @ forward(arm.chain_to(state.tool), state.q)
         np.testing.assert_allclose(so3.from_quaternion((w, x, y, z)), T[:3, :3], atol=1e-12)
     # A state holds until the next.
     for tick in records:
-        found = file.last_before(STATE, tick.t)
-        assert found is not None
-        assert json.loads(found.data)["setpoint"] == tick.state.setpoint.tolist()
+        newest = file.last_before(STATE, tick.t)
+        assert newest is not None
+        assert json.loads(newest.data)["setpoint"] == tick.state.setpoint.tolist()
 
 
 def test_state_at_any_moment_has_all_objects(
@@ -177,26 +177,26 @@ def test_state_at_any_moment_has_all_objects(
     with RecordingFile.open(part) as cut:
         for number in (0, 3, 149, 150, 175, 200, 210):
             state = records[number].state
-            for each in (file, cut):
-                found = state_at(each, state.t)
-                if each is cut and number > 200:
+            for source in (file, cut):
+                known = state_at(source, state.t)
+                if source is cut and number > 200:
                     continue
-                assert found is not None
-                assert found.joints == state.q.tolist()
-                assert {one.name for one in found.objects} == {o.name for o in state.objects}
+                assert known is not None
+                assert known.joints == state.q.tolist()
+                assert {one.name for one in known.objects} == {o.name for o in state.objects}
     assert state_at(file, file.start - 1.0) is None
 
 
 def test_displays_get_joints_and_frames(file: RecordingFile, records: list[TickRecord]) -> None:
     first = next(file.messages(JOINT_STATES))
-    names = [each["name"] for each in json.loads(first.data)["joints"]]
+    names = [joint["name"] for joint in json.loads(first.data)["joints"]]
     assert set(names) == set(described().robot.joints)
     frames = json.loads(next(file.messages(TF)).data)["transforms"]
-    assert {each["parent_frame_id"] for each in frames} == {described().robot.links[0].name}
-    assert {"tcp", "object/cup"} <= {each["child_frame_id"] for each in frames}
+    assert {frame["parent_frame_id"] for frame in frames} == {described().robot.links[0].name}
+    assert {"tcp", "object/cup"} <= {frame["child_frame_id"] for frame in frames}
     *_, last = file.messages(JOINT_STATES)
-    values = {each["name"]: each["position"] for each in json.loads(last.data)["joints"]}
-    state = next(each.state for each in records if abs(each.t - last.t) < 1e-6)
+    values = {joint["name"]: joint["position"] for joint in json.loads(last.data)["joints"]}
+    state = next(record.state for record in records if abs(record.t - last.t) < 1e-6)
     for name, value in described().robot.joint_values(state.q, state.gripper).items():
         assert values[name] == pytest.approx(value, abs=1e-5)
 
@@ -209,19 +209,19 @@ def test_metadata_and_attachments_tell_what_made_it(file: RecordingFile) -> None
     assert differences({**file.metadata, "blas_core": "Other"}) == [
         f"blas_core: Other there, {file.metadata['blas_core']} here"
     ]
-    attached = {each.name: each.data for each in file.attachments()}
+    attached = {attachment.name: attachment.data for attachment in file.attachments()}
     assert attached == {"katana450.urdf": URDF_PATH.read_bytes(), "scene.json": b"{}"}
 
 
 def test_seeking_reads_only_what_is_asked_for(file: RecordingFile) -> None:
     middle = 0.5 * (file.start + file.end)
-    found = file.last_before(STATE, middle)
-    assert found is not None
-    assert file.start <= found.t <= middle
+    message = file.last_before(STATE, middle)
+    assert message is not None
+    assert file.start <= message.t <= middle
     assert file.last_before(STATE, file.start - 1.0) is None
     assert file.last_before(CHECKPOINTS, file.end) is not None
     part = list(file.messages(COMMANDS, start=middle, end=middle + 0.1))
-    assert all(middle <= each.t <= middle + 0.1 for each in part)
+    assert all(middle <= message.t <= middle + 0.1 for message in part)
     assert 5 <= len(part) <= 12
 
 
@@ -231,17 +231,17 @@ def test_files_of_a_ring_are_joined(records: list[TickRecord], tmp_path: Path) -
         paths.append(tmp_path / f"{number}.mcap")
         with paths[-1].open("wb") as opened:
             writer = RecordingWriter(opened, head)
-            for each in records[number * 80 : (number + 1) * 80]:
-                writer.put(each)
+            for record in records[number * 80 : (number + 1) * 80]:
+                writer.put(record)
             writer.close()
-    found = trim(paths[::-1], tmp_path / "whole.mcap", -math.inf, math.inf)
-    kept = records[:240]
-    assert [found.start, found.end] == pytest.approx([kept[0].t, kept[-1].t])
+    joined = trim(paths[::-1], tmp_path / "whole.mcap", -math.inf, math.inf)
+    rest = records[:240]
+    assert [joined.start, joined.end] == pytest.approx([rest[0].t, rest[-1].t])
     with RecordingFile.open(tmp_path / "whole.mcap") as whole:
         result = verify_recording(whole, described().session)
-        assert str(result) == f"identical to the bit over {len(kept) - 1} ticks"
+        assert str(result) == f"identical to the bit over {len(rest) - 1} ticks"
         # The first tick is not simulated: the complete state is that after it.
-        assert whole.counts()[COMMANDS] == len(kept) - 1
+        assert whole.counts()[COMMANDS] == len(rest) - 1
     with pytest.raises(InputError, match="There is nothing from"):
         trim(paths, tmp_path / "nothing.mcap", 1.0, 2.0)
     assert not (tmp_path / "nothing.mcap").exists()
@@ -275,8 +275,8 @@ def test_file_that_is_being_written_is_not_replaced(
     with path.open("wb") as opened:
         claim_file(opened.fileno())
         writer = RecordingWriter(opened, header())
-        for each in records[:20]:
-            writer.put(each)
+        for record in records[:20]:
+            writer.put(record)
         writer.flush()
         assert main(["record", "recover", str(path)]) == 1
         assert "is being written by a running program" in capsys.readouterr().err
@@ -316,14 +316,14 @@ def test_scene_of_a_server_is_attached_to_its_recordings(
     address = ArmAddress(str(tmp_path / "arm"), b"key")
     facts = ServerFacts(Settings(), URDF_PATH, None, 8080, address, Namespace(), tmp_path)
     config = recorder.RecorderConfig(facts, tmp_path / "ring", tmp_path / "episodes", scene)
-    kept, _ = recorder._ring(config, RunningScripts())
-    run(20, 1, kept.put, swinging, odd=False)
-    kept.close()
+    ring, _ = recorder._ring(config, RunningScripts())
+    run(20, 1, ring.put, swinging, odd=False)
+    ring.close()
     (path,) = recordings_in(tmp_path / "ring")
     with RecordingFile.open(path) as file:
-        found = {each.name: each for each in file.attachments()}
-    assert set(found) == {URDF_PATH.name, "scene.yaml"}
-    assert found["scene.yaml"].data == scene.read_bytes()
+        attached = {attachment.name: attachment for attachment in file.attachments()}
+    assert set(attached) == {URDF_PATH.name, "scene.yaml"}
+    assert attached["scene.yaml"].data == scene.read_bytes()
     # What cannot be attached does not keep the server from recording.
     scene.write_bytes(bytes(MAX_SCENE_BYTES + 1))
     assert attached_scene(scene) == attached_scene(tmp_path / "none.zip") == ()

@@ -170,11 +170,11 @@ def test_export_of_one_state_says_so(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def folders(temporary: Path) -> list[Path]:
     """Return the folders of jobs in ``temporary``."""
-    return [each for each in temporary.glob(f"{PREFIX}*/*") if each.is_dir()]
+    return [path for path in temporary.glob(f"{PREFIX}*/*") if path.is_dir()]
 
 
 def test_job_that_is_cancelled_leaves_nothing(page: Page, temporary: Path) -> None:
-    others = {each.name for each in temporary.iterdir()}
+    others = {path.name for path in temporary.iterdir()}
     name = page.begun("do=html")
     until(lambda: len(list(folders(temporary)[-1].iterdir())) > 0)
     # One at a time.
@@ -189,7 +189,7 @@ def test_job_that_is_cancelled_leaves_nothing(page: Page, temporary: Path) -> No
     assert page.ask(f"/jobs/{name}/file")[0] == 409
     assert page.ask(f"/jobs/{name}/cancel", post=True)[0] == 204
     assert page.ask("/jobs/none")[0] == 404
-    assert {each.name for each in temporary.iterdir()} == others
+    assert {path.name for path in temporary.iterdir()} == others
     # The next one begins at once.
     assert page.made("do=csv")
 
@@ -235,16 +235,16 @@ def test_job_ends_with_a_server_that_is_killed(
             client.joints(POSTURES[0])
         page = Page(server)
         until(lambda: page.ask("")[0] == 200)
-        others = {each.name for each in temporary.iterdir()}
+        others = {path.name for path in temporary.iterdir()}
         page.begun("do=html")
 
         def working() -> list[int]:
             return [
-                int(each.name)
-                for each in Path("/proc").iterdir()
-                if each.name.isdigit()
-                and str(temporary) in _environment(each)
-                and "job_process" in _command(each)
+                int(path.name)
+                for path in Path("/proc").iterdir()
+                if path.name.isdigit()
+                and str(temporary) in _environment(path)
+                and "job_process" in _command(path)
             ]
 
         until(working)
@@ -254,7 +254,7 @@ def test_job_ends_with_a_server_that_is_killed(
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     RecordingStore(None)
     assert not folders(temporary)
-    assert {each.name for each in temporary.iterdir() if not each.name.startswith(PREFIX)} <= others
+    assert {path.name for path in temporary.iterdir() if not path.name.startswith(PREFIX)} <= others
 
 
 def _command(process: Path) -> str:

@@ -42,8 +42,8 @@ def test_hour_without_a_pause_takes_at_most_60_mb(
         writer = RecordingWriter(opened, header())
         records: list[TickRecord] = []
         run(TICKS, seed, records.append, commands, odd=False)
-        for number, each in enumerate(records):
-            writer.put(each)
+        for number, record in enumerate(records):
+            writer.put(record)
             # As often as a server syncs.
             if number % 60 == 59:
                 writer.flush()

@@ -49,8 +49,8 @@ TOLERANCE = 1.5e-4
 @pytest.fixture(scope="module")
 def dragged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A drag of 2.5 s, and a motion to the ready posture after a rest."""
-    at: dict[int, cmd.Command] = {380: cmd.Joints(described().session.ready)}
-    return record_session(tmp_path_factory.mktemp("again") / "drag.mcap", 600, drag(250, at))
+    commands: dict[int, cmd.Command] = {380: cmd.Joints(described().session.ready)}
+    return record_session(tmp_path_factory.mktemp("again") / "drag.mcap", 600, drag(250, commands))
 
 
 def read(path: Path, start: float = 0.0, end: float = math.inf) -> tuple[RecordedPart, str]:
@@ -89,7 +89,7 @@ def test_drag_runs_again_within_a_tenth_of_a_milliradian(dragged: Path) -> None:
 
 def test_rests_are_kept(dragged: Path) -> None:
     part, text = read(dragged)
-    waits = [float(each) for each in re.findall(r"wait: ([\d.]+)", text)]
+    waits = [float(word) for word in re.findall(r"wait: ([\d.]+)", text)]
     rests = np.diff(part.t)[part.rests]
     assert len(waits) == 1
     assert waits[0] == pytest.approx(rests.max(), abs=0.02)
@@ -112,12 +112,12 @@ def test_pause_or_stop_in_the_middle_is_left_out(tmp_path: Path, disturbance: st
     end: cmd.Command = cmd.Resume()
     if disturbance == "stop":
         begin, end = cmd.Stop(pressed("Ada", "key", "press", 1e9)), cmd.ClearStop()
-    at = {120: begin, 420: end, 430: cmd.Position(np.array((0.33, 0.05, 0.08)))}
-    path = record_session(tmp_path / "disturbed.mcap", 700, drag(120, at))
+    commands = {120: begin, 420: end, 430: cmd.Position(np.array((0.33, 0.05, 0.08)))}
+    path = record_session(tmp_path / "disturbed.mcap", 700, drag(120, commands))
     part, text = read(path)
     trace = run_by_clock(planned(text)).trace
     assert distance(part, trace.q) < TOLERANCE
-    assert sum(float(each) for each in re.findall(r"wait: ([\d.]+)", text)) < 0.3
+    assert sum(float(word) for word in re.findall(r"wait: ([\d.]+)", text)) < 0.3
     # The time of the pause is not in the recorded time either.
     assert part.t[-1] - part.duration > 1.5
     assert trace.t[-1] < 2.5 * part.duration
@@ -136,9 +136,9 @@ def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
         *_, recorded = recorded_states(file, described().session)
     environment = described().session.environment
     places = [
-        environment.pose(each.held, each.x_setpoint)[:3, 3]
-        for each in (recorded, last)
-        if each.held is not None
+        environment.pose(state.held, state.x_setpoint)[:3, 3]
+        for state in (recorded, last)
+        if state.held is not None
     ]
     np.testing.assert_allclose(places[0], places[1], atol=2e-4)
     # Without the cup the fingers would close on nothing.
@@ -152,8 +152,8 @@ def test_grasp_and_carried_object_are_repeated(tmp_path: Path) -> None:
 def _without(state: State, name: str) -> State:
     from dataclasses import replace  # noqa: PLC0415
 
-    kept = tuple(each for each in state.objects if each.name != name)
-    return replace(state, objects=kept, poured=None)
+    others = tuple(prop for prop in state.objects if prop.name != name)
+    return replace(state, objects=others, poured=None)
 
 
 def test_present_obstacle_is_refused_with_moment_and_pair(dragged: Path) -> None:
@@ -188,11 +188,11 @@ def test_gap_is_refused_with_its_time(tmp_path: Path) -> None:
         writer = RecordingWriter(file, header())
         records: list[TickRecord] = []
         run(260, 1, records.append, lambda _r, s, _f: commands(next(count), s), odd=False)
-        for number, each in enumerate(records):
+        for number, record in enumerate(records):
             if number == 150:
-                writer.lost(each.t, 20, "the disk was full")
+                writer.lost(record.t, 20, "the disk was full")
             elif not 130 <= number < 150:
-                writer.put(each)
+                writer.put(record)
         writer.close()
     with pytest.raises(
         InputError, match=r"gap at 1\.\d+ s: 20 ticks are missing \(the disk was full\)"

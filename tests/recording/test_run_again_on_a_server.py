@@ -100,7 +100,7 @@ def test_script_is_made_for_the_robot_of_the_server_only(recorded: Path, tmp_pat
 def test_server_with_another_arm_is_refused(server: AppServer, recorded: Path) -> None:
     with katana450.connect(server.url, "Ada") as client:
         arm = client.query(answers.Arm)
-        other = msgspec.structs.replace(arm, upper=[each + 0.1 for each in arm.upper])
+        other = msgspec.structs.replace(arm, upper=[angle + 0.1 for angle in arm.upper])
 
         class OtherArm:
             """The client of a server whose joints go farther; it takes no script."""

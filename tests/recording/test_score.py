@@ -94,13 +94,13 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A drag with a stop, during which nobody moves the arm for 1.5 s."""
-    at: dict[int, cmd.Command] = {
+    commands: dict[int, cmd.Command] = {
         90: cmd.Stop(pressed("Ada", "key", "press", 1e9)),
         250: cmd.ClearStop(),
         260: cmd.Position(np.array((0.33, 0.05, 0.08))),
     }
     path = tmp_path_factory.mktemp("score") / "stopped.mcap"
-    return record_session(path, 420, drag(90, at))
+    return record_session(path, 420, drag(90, commands))
 
 
 def score(path: Path, **options: object) -> Scored:
@@ -109,23 +109,23 @@ def score(path: Path, **options: object) -> Scored:
 
 
 def test_line_has_its_length_and_the_measures_of_the_report(line: Path) -> None:
-    found = score(line)
-    assert found.values["tool_path_mm"] == pytest.approx(60.0, abs=0.05)
-    assert found.t[-1] == pytest.approx(found.values["duration_s"], abs=0.02)
-    assert float(found.speed.max()) == pytest.approx(
-        1e-3 * (found.values["max_tool_speed_mm_s"] or 0.0), rel=0.02
+    result = score(line)
+    assert result.values["tool_path_mm"] == pytest.approx(60.0, abs=0.05)
+    assert result.t[-1] == pytest.approx(result.values["duration_s"], abs=0.02)
+    assert float(result.speed.max()) == pytest.approx(
+        1e-3 * (result.values["max_tool_speed_mm_s"] or 0.0), rel=0.02
     )
-    assert np.linalg.norm(found.tool[-1] - found.tool[0]) == pytest.approx(0.06, abs=1e-4)
+    assert np.linalg.norm(result.tool[-1] - result.tool[0]) == pytest.approx(0.06, abs=1e-4)
     plan = plan_script(parse(LINE), URDF_PATH)
     report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
     for name in ("margin_to_limits_deg", "smallest_singular_value", "max_speed_fraction"):
-        assert found.values[name] == pytest.approx(report[name], rel=0.02), name
+        assert result.values[name] == pytest.approx(report[name], rel=0.02), name
     # Samples find a place that is a little farther away.
-    assert found.values["nearest_clearance_mm"] == pytest.approx(
+    assert result.values["nearest_clearance_mm"] == pytest.approx(
         report["nearest_clearance_mm"], rel=0.15
     )
-    assert found.values["stops"] == found.values["contacts"] == 0.0
-    assert found.values["emptied_ml"] is None
+    assert result.values["stops"] == result.values["contacts"] == 0.0
+    assert result.values["emptied_ml"] is None
 
 
 def test_measured_arm_is_scored_apart_from_its_setpoints(line: Path, tmp_path: Path) -> None:
@@ -133,29 +133,29 @@ def test_measured_arm_is_scored_apart_from_its_setpoints(line: Path, tmp_path: P
     arm, offset = described().robot.require_arm(), np.array((0.005, 0.0, 0.0, 0.0, 0.0))
     driver = LaggingDriver(arm, described().session.ready, 0.0, 7, offset)
     path = record_session(tmp_path / "measured.mcap", 260, program(LINE), driver)
-    exact, found = score(line), score(path)
+    exact, result = score(line), score(path)
     for name in ("tool_path_mm", "executed_position_error_mm", "sparc"):
         # The test clock of both runs differs by random fractions of a tick.
-        assert found.values[name] == pytest.approx(exact.values[name], rel=1e-3, abs=1e-9), name
-    assert (found.values["executed_position_error_mm"] or 1.0) < 1e-9
-    assert found.values["tracking_lag_ms"] == pytest.approx(70.0, abs=3.0)
-    assert found.values["joint_tracking_error_deg"] == pytest.approx(math.degrees(0.005))
+        assert result.values[name] == pytest.approx(exact.values[name], rel=1e-3, abs=1e-9), name
+    assert (result.values["executed_position_error_mm"] or 1.0) < 1e-9
+    assert result.values["tracking_lag_ms"] == pytest.approx(70.0, abs=3.0)
+    assert result.values["joint_tracking_error_deg"] == pytest.approx(math.degrees(0.005))
     # 5 mrad about the axis of the base, upwards along which the line leads.
-    radius = float(np.linalg.norm(found.tool[0, :2]))
-    assert found.values["measured_position_error_mm"] == pytest.approx(5.0 * radius, rel=0.01)
+    radius = float(np.linalg.norm(result.tool[0, :2]))
+    assert result.values["measured_position_error_mm"] == pytest.approx(5.0 * radius, rel=0.01)
     assert not len(exact.measured)
-    sent, turned = (np.arctan2(p[:, 1], p[:, 0]) for p in (found.tool, found.measured[10:]))
+    sent, turned = (np.arctan2(p[:, 1], p[:, 0]) for p in (result.tool, result.measured[10:]))
     np.testing.assert_allclose(turned, sent[0] + 0.005, atol=1e-4)
 
 
 def test_stops_are_counted(stopped: Path) -> None:
-    found = score(stopped)
-    assert found.values["stops"] == 1.0
+    result = score(stopped)
+    assert result.values["stops"] == 1.0
     # From the first motion to the last, with the stop.
-    assert 3.0 < (found.values["duration_s"] or 0.0) < 8.0
+    assert 3.0 < (result.values["duration_s"] or 0.0) < 8.0
     part = score(stopped, start=0.0, end=0.8)
     assert part.values["stops"] == 0.0
-    assert (part.values["sparc"] or 0.0) > (found.values["sparc"] or 0.0)
+    assert (part.values["sparc"] or 0.0) > (result.values["sparc"] or 0.0)
 
 
 def test_rest_before_the_first_motion_does_not_count(stopped: Path) -> None:
@@ -163,32 +163,32 @@ def test_rest_before_the_first_motion_does_not_count(stopped: Path) -> None:
     run = katana450.open(stopped)
     moved = run.t[1:][np.abs(np.diff(run.setpoint, axis=0)).max(axis=1) > 0.0]
     rest = int(np.argmax(np.diff(moved)))
-    found = score(stopped, start=float(moved[rest] - run.start + 0.02))
+    result = score(stopped, start=float(moved[rest] - run.start + 0.02))
     lasted = moved[-1] - moved[rest + 1] + PERIOD
-    assert found.values["duration_s"] == pytest.approx(lasted, abs=1e-6)
-    assert found.t[-1] == pytest.approx(lasted, abs=0.02)
+    assert result.values["duration_s"] == pytest.approx(lasted, abs=1e-6)
+    assert result.t[-1] == pytest.approx(lasted, abs=0.02)
 
 
 @pytest.mark.long
 def test_contacts_are_counted(tmp_path: Path) -> None:
     """The arm waits before the table, below the shoulder by 274.5 mm."""
-    at: dict[int, cmd.Command] = {1: cmd.Position(np.array((0.3, 0.0, -0.4)))}
-    found = score(record_session(tmp_path / "table.mcap", 300, drag(0, at)))
-    assert found.values["contacts"] == 1.0
-    assert 0.0 < (found.values["nearest_clearance_mm"] or 0.0) < 8.0
+    commands: dict[int, cmd.Command] = {1: cmd.Position(np.array((0.3, 0.0, -0.4)))}
+    result = score(record_session(tmp_path / "table.mcap", 300, drag(0, commands)))
+    assert result.values["contacts"] == 1.0
+    assert 0.0 < (result.values["nearest_clearance_mm"] or 0.0) < 8.0
 
 
 @pytest.mark.long
 def test_pour_has_the_measures_of_its_report(tmp_path: Path) -> None:
     text = script_text(library_file("pour"))
-    found = score(record_session(tmp_path / "pour.mcap", 3700, program(text)))
+    result = score(record_session(tmp_path / "pour.mcap", 3700, program(text)))
     plan = plan_script(parse(text), URDF_PATH)
     report = measurements(plan.program, plan.session.require_arm(), run_by_clock(plan).trace)
     for name in ("emptied_percent", "spilled_ml", "margin_to_limits_deg"):
-        assert found.values[name] == pytest.approx(report[name], rel=0.02, abs=0.01), name
-    assert found.values["emptied_ml"] == pytest.approx(199.7, abs=0.3)
+        assert result.values[name] == pytest.approx(report[name], rel=0.02, abs=0.01), name
+    assert result.values["emptied_ml"] == pytest.approx(199.7, abs=0.3)
     cup = described().session.begin(described().session.ready, 0.0, 0.0).objects[0].T[:3, 3]
-    np.testing.assert_allclose(found.places["cup"], cup, atol=6e-3)
+    np.testing.assert_allclose(result.places["cup"], cup, atol=6e-3)
 
 
 def test_placing_error_is_the_distance_from_the_target(line: Path) -> None:
@@ -248,9 +248,9 @@ def test_trimmed_episode_is_scored_and_run_again_in_its_range(
 def test_leaderboard_is_sorted_and_marks_the_best(line: Path, stopped: Path) -> None:
     scores = (score(stopped), score(line))
     board = Leaderboard.of(scores)
-    assert [each.name for each in board.rows] == ["line.mcap", "stopped.mcap"]
+    assert [row.name for row in board.rows] == ["line.mcap", "stopped.mcap"]
     assert Leaderboard.of(scores, "tool_path_mm").rows[0].name == "line.mcap"
-    by_sparc = [each.values["sparc"] for each in Leaderboard.of(scores, "sparc").rows]
+    by_sparc = [row.values["sparc"] for row in Leaderboard.of(scores, "sparc").rows]
     assert by_sparc == sorted(by_sparc, key=lambda value: -(value or 0.0))
     assert board.is_best(board.rows[0], "stops")
     assert not board.is_best(board.rows[1], "stops")
@@ -285,11 +285,11 @@ def test_command_prints_table_and_json(
     assert re.search(r"Stops +0 \* +1\n", printed), printed
     assert re.search(r"Placing error mm +0 +0\n", printed), printed
     assert main(["score", str(line), "--json", "--target", "cup=340,-260"]) == 0
-    (found,) = json.loads(capsys.readouterr().out)
-    assert found["name"] == "line.mcap"
-    assert set(MEASURES) <= set(found)
-    assert found["placing_error_mm"] == pytest.approx(0.0, abs=0.01)
-    assert found["places_mm"]["cup"] == pytest.approx([340.0, -260.0, 0.0], abs=0.01)
+    (row,) = json.loads(capsys.readouterr().out)
+    assert row["name"] == "line.mcap"
+    assert set(MEASURES) <= set(row)
+    assert row["placing_error_mm"] == pytest.approx(0.0, abs=0.01)
+    assert row["places_mm"]["cup"] == pytest.approx([340.0, -260.0, 0.0], abs=0.01)
 
 
 def test_useless_input_is_refused(line: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -307,6 +307,6 @@ def test_useless_input_is_refused(line: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.long
 def test_library_scores(line: Path) -> None:
     run = katana450.open(line)
-    found = run.score(targets={"cup": (0.34, -0.25, math.nan)})
-    assert found.values["placing_error_mm"] == pytest.approx(10.0, abs=0.01)
-    assert repr(found).startswith("Scored('line.mcap', duration_s=")
+    result = run.score(targets={"cup": (0.34, -0.25, math.nan)})
+    assert result.values["placing_error_mm"] == pytest.approx(10.0, abs=0.01)
+    assert repr(result).startswith("Scored('line.mcap', duration_s=")

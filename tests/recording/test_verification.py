@@ -48,14 +48,14 @@ def records(path: Path) -> list[TickRecord]:
 
 
 def test_random_session_is_identical_to_the_bit(path: Path, records: list[TickRecord]) -> None:
-    kinds = Counter(type(each.command).__name__ for r in records for each in r.submissions)
+    kinds = Counter(type(s.command).__name__ for r in records for s in r.submissions)
     assert kinds["Position"] > 40
     assert {"Stop", "ClearStop", "Follow", "ReplaceScene", "Batch"} <= set(kinds), kinds
-    assert any(each.failed for each in records)
-    assert sum(each.state.following is not None for each in records) > 40
+    assert any(record.failed for record in records)
+    assert sum(record.state.following is not None for record in records) > 40
     assert any(r.t_before != b.state.t for b, r in pairwise(records))
     if LONG:
-        assert any(found.reason is Reason.CONTACT for r in records for found in r.state.findings)
+        assert any(f.reason is Reason.CONTACT for r in records for f in r.state.findings)
         assert any(r.state.poured and r.state.poured.water.parcels for r in records)
     with RecordingFile.open(path) as file:
         result = verify_recording(file, fresh().session)
@@ -67,12 +67,12 @@ def test_every_part_is_identical_from_its_first_complete_state(
 ) -> None:
     """A new session begins in the middle of drags, plans and pouring."""
     with RecordingFile.open(path) as file:
-        starts = [each.t for each in file.messages(CHECKPOINTS)]
+        starts = [message.t for message in file.messages(CHECKPOINTS)]
     assert len(starts) >= len(records) // 1500 + 1
     for start in starts[1:]:
         part = tmp_path / f"{start}.mcap"
-        found = trim([path], part, start, start + 4.0)
-        assert found.simulated_from == start
+        part_file = trim([path], part, start, start + 4.0)
+        assert part_file.simulated_from == start
         with RecordingFile.open(part) as file:
             result = verify_recording(file, described().session)
         assert result.identical, result
@@ -83,7 +83,7 @@ def test_every_part_is_identical_from_its_first_complete_state(
 def test_identities_of_people_are_not_in_the_file(path: Path, records: list[TickRecord]) -> None:
     del records
     with RecordingFile.open(path) as file:
-        data = b"".join(each.data for each in file.messages(COMMANDS, CHECKPOINTS))
+        data = b"".join(message.data for message in file.messages(COMMANDS, CHECKPOINTS))
     assert b'"name":"Ada"' in data
     assert b"session-of-ada" not in data
     assert b"10.0.0.7" not in data
@@ -93,11 +93,11 @@ def write(path: Path, records: list[TickRecord], lost: range = range(0)) -> Path
     """Write ``records``; those with the numbers ``lost`` are lost."""
     with path.open("wb") as file:
         writer = RecordingWriter(file, header())
-        for number, each in enumerate(records):
+        for number, record in enumerate(records):
             if number in lost[-1:]:
-                writer.lost(each.t, len(lost), "the disk was full")
+                writer.lost(record.t, len(lost), "the disk was full")
             elif number not in lost:
-                writer.put(each)
+                writer.put(record)
         writer.close()
     return path
 
@@ -145,7 +145,7 @@ def test_value_without_a_form_is_a_gap(records: list[TickRecord], tmp_path: Path
     part[30] = part[30]._replace(submissions=[Submission(odd, None)])
     with RecordingFile.open(write(tmp_path / "odd.mcap", part)) as file:
         result = verify_recording(file, described().session)
-        text = b"".join(each.data for each in file.messages(COMMANDS))
+        text = b"".join(message.data for message in file.messages(COMMANDS))
     assert b"not Unicode" in text
     assert result.identical
     assert result.unknown == 1
@@ -154,20 +154,20 @@ def test_value_without_a_form_is_a_gap(records: list[TickRecord], tmp_path: Path
 def test_mechanism_without_an_arm_is_recorded(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = find_robot(Settings(), GANTRY, None)
-    assert found.robot.arm is None
+    gantry = find_robot(Settings(), GANTRY, None)
+    assert gantry.robot.arm is None
     path, records = tmp_path / "gantry.mcap", []
-    state = found.session.begin(found.session.ready, 0.0, 10.0)
+    state = gantry.session.begin(gantry.session.ready, 0.0, 10.0)
     for number in range(60):
-        given = [cmd.Joint(1, 0.2)] if number == 5 else []
+        orders = [cmd.Joint(1, 0.2)] if number == 5 else []
         before, t = state, 10.0 + 0.01 * (number + 1)
-        state = stepped(found.session, before, list(given), t, lambda q, g, *_: DriverAnswer(q, g))
-        inputs = [Submission(each, ADA) for each in given]
+        state = stepped(gantry.session, before, [*orders], t, lambda q, g, *_: DriverAnswer(q, g))
+        inputs = [Submission(command, ADA) for command in orders]
         records.append(TickRecord(before.t, t, inputs, False, state))
     with path.open("wb") as file:
-        writer = RecordingWriter(file, header_of(found.robot, Settings(), GANTRY))
-        for each in records:
-            writer.put(each)
+        writer = RecordingWriter(file, header_of(gantry.robot, Settings(), GANTRY))
+        for record in records:
+            writer.put(record)
         writer.close()
     assert main(["record", "verify", str(path), "--urdf", str(GANTRY)]) == 0
     assert "identical to the bit over 59 ticks" in capsys.readouterr().out
@@ -175,8 +175,8 @@ def test_mechanism_without_an_arm_is_recorded(
     assert "Name the same URDF" in capsys.readouterr().err
     out = tmp_path / "gantry.csv"
     assert main(["record", "export", str(path), "--out", str(out)]) == 0
-    motion = load_motion(out, found.robot)
-    assert motion.values[found.robot.driven[0]][-1] == state.setpoint[0]
+    motion = load_motion(out, gantry.robot)
+    assert motion.values[gantry.robot.driven[0]][-1] == state.setpoint[0]
     with pytest.raises(InputError, match="has no position"):
         _ = katana450.open(path).position
 
@@ -194,8 +194,8 @@ def test_digest_sees_every_bit(records: list[TickRecord]) -> None:
         replace(state, objects=state.objects[1:]),
         replace(state, presses=("x",)),
     ]
-    found = {digest, *(digester.digest(each) for each in changes)}
-    assert len(found) == len(changes) + 1
+    digests = {digest, *(digester.digest(change) for change in changes)}
+    assert len(digests) == len(changes) + 1
     assert digester.digest(state) == digest == Digester().digest(state)
 
 
@@ -213,14 +213,14 @@ def test_command_describes_cuts_and_explains(
     assert 1.0 < run.end - run.start < 1.52
     assert run.verify().identical
     assert main(["record", "info", str(part)]) == 0
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     for words in (
         f"{part}: {run.end - run.start:.1f} s from 20",
         "/commands: ",
         "attached: katana450.urdf",
         "numpy: ",
     ):
-        assert words in told
+        assert words in output
 
     def change(message: Message) -> Message:
         if message.topic != COMMANDS or message.t < run.start + 0.5:
@@ -234,10 +234,10 @@ def test_command_describes_cuts_and_explains(
     ):
         write_copy(part, foreign, metadata=metadata, change=change)
         assert main(["record", "verify", str(foreign)]) == 1
-        told = capsys.readouterr().out
-        assert "first difference at t = " in told
-        assert words in told
-        assert ("libm_rounding" in told) is bool(metadata)
+        output = capsys.readouterr().out
+        assert "first difference at t = " in output
+        assert words in output
+        assert ("libm_rounding" in output) is bool(metadata)
 
 
 @pytest.mark.parametrize(
