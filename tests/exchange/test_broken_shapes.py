@@ -52,9 +52,15 @@ def test_the_unchanged_files_are_read() -> None:
         assert len(read_shape(data, format, "a").faces) == 1
 
 
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
+def deep(levels: int) -> bytes:
+    return b'{"asset": ' + b"[" * levels + b"]" * levels + b"}"
+
+
+ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
+
+
+INVALID: dict[Format, list[tuple[bytes | str, str]]] = {
+    Format.STL: [
         (b"", "not an STL file"),
         (stl(0), "declares 0 triangles"),
         (stl()[:-1], "declares 1 triangles, which take 134 bytes, but has 133"),
@@ -73,15 +79,7 @@ def test_the_unchanged_files_are_read() -> None:
         (f"solid\n{FACET.format('1e999')}\nendsolid".encode(), "not finite numbers"),
         (f"solid\nsolid\n{FACET.format(1)}\nendsolid".encode(), "corrupt at line 2"),
     ],
-)
-def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_shape(data, Format.STL, "a.stl")
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+    Format.OBJ: [
         ("", "has no triangles"),
         ("v 0 0 0\np 1\n", "has no triangles. It has points"),
         ("v 1 2", "line 1: a vertex must have three finite coordinates"),
@@ -96,41 +94,7 @@ def test_invalid_stl_is_refused(data: bytes, said: str) -> None:
         ("f 1/2/3 x/1/1", "'x/1/1' is not a corner"),
         ("hello", "line 1: 'hello' is not an OBJ statement"),
     ],
-)
-def test_invalid_obj_is_refused(text: str, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_shape(text.encode(), Format.OBJ, "a.obj")
-
-
-@pytest.mark.parametrize(
-    ("data", "format"),
-    [
-        (bytes(80) + struct.pack("<I", 101) + bytes(50 * 101), Format.STL),
-        (f"solid\n{FACET.format(1) * 101}\nendsolid".encode(), Format.STL),
-        (b"v 0 0 0\n" + b"f" + b" 1" * 103, Format.OBJ),
-        (ply("103" + " 1" * 103 + "\n"), Format.PLY),
-        (b"#VRML V2.0 utf8\nShape { geometry Sphere { } }", Format.WRL),
-    ],
-)
-def test_too_many_triangles_are_refused(
-    monkeypatch: pytest.MonkeyPatch, data: bytes, format: Format
-) -> None:
-    monkeypatch.setattr(surface, "MAX_TRIANGLES", 100)
-    with pytest.raises(InputError, match="has more than 100 triangles, the maximum"):
-        read_shape(data, format, "a")
-
-
-def test_statements_of_obj() -> None:
-    shape = read_shape(OBJ, Format.OBJ, "a.obj")
-    assert (len(shape.vertices), len(shape.faces)) == (4, 3)
-    assert "Left out: lines. It names files that are not there: ../../etc/passwd." in shape.text
-    assert shape.colours is not None
-    assert shape.colours[0].tolist() == [255, 0, 0, 255]
-
-
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
+    Format.PLY: [
         (b"", "must begin with 'ply'"),
         (b"ply\n", "header does not end"),
         (ply(vertices="x"), "'element vertex x' in its header is invalid"),
@@ -155,44 +119,7 @@ def test_statements_of_obj() -> None:
         (ply().replace(b"0 1 0\n", b"0 inf 0\n"), "not finite numbers"),
         (ply().replace(b"ascii", b"binary_little_endian"), "ends too early"),
     ],
-)
-def test_invalid_ply_is_refused(data: bytes, said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        read_shape(data, Format.PLY, "a.ply")
-
-
-def test_rows_of_ply_may_differ() -> None:
-    """Polygons of several sizes, text and binary, other lists, and colours as numbers 0..1."""
-    header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
-    header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
-    header = header.replace("element face", "property float blue\nelement face")
-    header = header.replace("end_h", "property list uint8 float32 extra\nelement edge 1\n"
-                            "property int a\nend_h")  # fmt: skip
-    square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
-    text = "".join(f"{x} {y} {z} 1 .5 0\n" for x, y, z in square)
-    text += "4 0 1 2 3 0\n3 2 1 0 2 7 8\n5\n"
-    body = b"".join(struct.pack(">6f", *corner, 1.0, 0.5, 0.0) for corner in square)
-    body += struct.pack(">B4iB", 4, 0, 1, 2, 3, 0) + struct.pack(">B3iB2f", 3, 2, 1, 0, 2, 7, 8)
-    body += struct.pack(">i", 5)
-    binary = header.replace("ascii", "binary_big_endian").encode() + body
-    for data in ((header + text).encode(), binary):
-        shape = read_shape(data, Format.PLY, "a.ply")
-        assert shape.faces.shape == (3, 3)
-        assert shape.colours is not None
-        assert shape.colours[0].tolist() == [255, 128, 0, 255]
-        assert shape.text.endswith("Left out: 1 edge.")
-
-
-def deep(levels: int) -> bytes:
-    return b'{"asset": ' + b"[" * levels + b"]" * levels + b"}"
-
-
-ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
-
-
-@pytest.mark.parametrize(
-    ("data", "said"),
-    [
+    Format.GLB: [
         (b"", "corrupt or not glTF"),
         (b"glTF", "not GLB 2.0"),
         (gltf()[:-4], "shorter than its header says"),
@@ -228,10 +155,63 @@ ACCESSOR = {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}
             "wrong type",
         ),
     ],
+}
+
+
+@pytest.mark.parametrize(
+    ("format", "data", "said"), [(format, *case) for format in INVALID for case in INVALID[format]]
 )
-def test_invalid_gltf_is_refused(data: bytes, said: str) -> None:
+def test_invalid_shape_is_refused(format: Format, data: bytes | str, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        read_shape(data, Format.GLB, "a.glb")
+        read_shape(data.encode() if isinstance(data, str) else data, format, "a.stl")
+
+
+@pytest.mark.parametrize(
+    ("data", "format"),
+    [
+        (bytes(80) + struct.pack("<I", 101) + bytes(50 * 101), Format.STL),
+        (f"solid\n{FACET.format(1) * 101}\nendsolid".encode(), Format.STL),
+        (b"v 0 0 0\n" + b"f" + b" 1" * 103, Format.OBJ),
+        (ply("103" + " 1" * 103 + "\n"), Format.PLY),
+        (b"#VRML V2.0 utf8\nShape { geometry Sphere { } }", Format.WRL),
+    ],
+)
+def test_too_many_triangles_are_refused(
+    monkeypatch: pytest.MonkeyPatch, data: bytes, format: Format
+) -> None:
+    monkeypatch.setattr(surface, "MAX_TRIANGLES", 100)
+    with pytest.raises(InputError, match="has more than 100 triangles, the maximum"):
+        read_shape(data, format, "a")
+
+
+def test_statements_of_obj() -> None:
+    shape = read_shape(OBJ, Format.OBJ, "a.obj")
+    assert (len(shape.vertices), len(shape.faces)) == (4, 3)
+    assert "Left out: lines. It names files that are not there: ../../etc/passwd." in shape.text
+    assert shape.colours is not None
+    assert shape.colours[0].tolist() == [255, 0, 0, 255]
+
+
+def test_rows_of_ply_may_differ() -> None:
+    """Polygons of several sizes, text and binary, other lists, and colours as numbers 0..1."""
+    header = ply(faces=2, vertices=4).decode().partition("0 0 0")[0]
+    header = header.replace("z\n", "z\nproperty float red\nproperty float green\n")
+    header = header.replace("element face", "property float blue\nelement face")
+    header = header.replace("end_h", "property list uint8 float32 extra\nelement edge 1\n"
+                            "property int a\nend_h")  # fmt: skip
+    square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    text = "".join(f"{x} {y} {z} 1 .5 0\n" for x, y, z in square)
+    text += "4 0 1 2 3 0\n3 2 1 0 2 7 8\n5\n"
+    body = b"".join(struct.pack(">6f", *corner, 1.0, 0.5, 0.0) for corner in square)
+    body += struct.pack(">B4iB", 4, 0, 1, 2, 3, 0) + struct.pack(">B3iB2f", 3, 2, 1, 0, 2, 7, 8)
+    body += struct.pack(">i", 5)
+    binary = header.replace("ascii", "binary_big_endian").encode() + body
+    for data in ((header + text).encode(), binary):
+        shape = read_shape(data, Format.PLY, "a.ply")
+        assert shape.faces.shape == (3, 3)
+        assert shape.colours is not None
+        assert shape.colours[0].tolist() == [255, 128, 0, 255]
+        assert shape.text.endswith("Left out: 1 edge.")
 
 
 @pytest.mark.parametrize(("mode", "faces"), [(4, 1), (5, 2), (6, 2)])
