@@ -15,6 +15,7 @@ import pytest
 
 from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
+from katana450.arm.control.state.state import State
 from katana450.arm.robot.loader import load
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
@@ -98,3 +99,9 @@ def arm(robot: Robot) -> MountedArm:
 def session(arm: ArmModel) -> Session:
     """A session of it with the app's own ready posture."""
     return Session(arm, np.array(Settings().ready))
+
+
+@pytest.fixture
+def state(session: Session) -> State:
+    """The arm at rest in its ready posture."""
+    return session.begin(session.ready, 0.0, 0.0)

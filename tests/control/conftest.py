@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from katana450.arm.control.session.session import Session
-from katana450.arm.control.state.state import State
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
 from katana450.assembly.robot_session import describe_robot
@@ -15,12 +14,6 @@ from katana450.maths.collision.world import CollisionWorld, obstacle
 from katana450.maths.geometry import se3
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
-
-
-@pytest.fixture
-def state(session: Session) -> State:
-    """The arm at rest in its ready posture."""
-    return session.begin(session.ready, 0.0, 0.0)
 
 
 @pytest.fixture(scope="session")

@@ -14,10 +14,9 @@ from katana450.arm.control.session.plans import plan_along, plan_to
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import MAX_OBJECTS, SceneObject, Shape
 from katana450.arm.control.state.state import Reason, State
-from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
+from katana450.arm.robot.collision import scene_objects_of
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.props import load_props
-from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.extensions.programs.planning.curve_path import ToolPath
 from katana450.extensions.programs.planning.curves import ToolLine
@@ -25,7 +24,6 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.solver import inverse
 from katana450.maths.kinematics.tool import ToolTarget
-from katana450.settings import Settings
 from tests.ticks import rested
 
 OPEN = 0.3
@@ -39,16 +37,8 @@ the grasp frame came nearer, the tilted palm would be in the cup."""
 
 
 @pytest.fixture(scope="module")
-def session(robot: Robot, arm: MountedArm) -> Session:
-    world, _ = world_of(robot)
-    assert world is not None
-    return Session(
-        arm,
-        arm.ready(Settings().ready),
-        world.with_obstacles((table(),)),
-        hand=hand_of(robot, world),
-        objects=scene_objects_of(load_props()),
-    )
+def session(shipped: Session) -> Session:
+    return shipped
 
 
 def cup_of(session: Session, state: State) -> tuple[SceneObject, FloatArray]:

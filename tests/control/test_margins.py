@@ -9,22 +9,13 @@ import pytest
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.margins import margins
-from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.props import load_props
-from katana450.arm.robot.robot import Robot
 from katana450.maths.kinematics.forward import jacobian_body
 from katana450.maths.kinematics.velocity import characteristic_length
 
 
 @pytest.fixture(scope="module")
-def session(robot: Robot, arm: MountedArm) -> Session:
-    world, _ = world_of(robot)
-    assert world is not None
-    objects = scene_objects_of(load_props())
-    ready = arm.ready((0.0, -1.2, 1.5, 0.1, 0.0))
-    world_and_table = world.with_obstacles((table(),))
-    return Session(arm, ready, world_and_table, hand=hand_of(robot, world), objects=objects)
+def session(shipped: Session) -> Session:
+    return shipped
 
 
 @pytest.mark.parametrize("seed", range(6))

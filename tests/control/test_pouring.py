@@ -12,34 +12,19 @@ from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.scene_objects import SceneObject
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.collision import hand_of, scene_objects_of, table, world_of
-from katana450.arm.robot.mounted_arm import MountedArm
-from katana450.arm.robot.props import load_props, water_environment
-from katana450.arm.robot.robot import Robot
 from katana450.errors import InputError
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.flow import VesselMove, WaterFlow
 from katana450.maths.water.units import ML, counted
-from katana450.settings import Settings
 from tests.ticks import ticked
 
 FULL = counted(200.0 * ML)
 
 
 @pytest.fixture(scope="module")
-def session(robot: Robot, arm: MountedArm) -> Session:
-    world, _ = world_of(robot)
-    assert world is not None
-    props = load_props()
-    return Session(
-        arm,
-        arm.ready(Settings().ready),
-        world.with_obstacles((table(),)),
-        hand=hand_of(robot, world),
-        objects=scene_objects_of(props),
-        water_environment=water_environment(props),
-    )
+def session(shipped: Session) -> Session:
+    return shipped
 
 
 @pytest.fixture

@@ -19,7 +19,6 @@ from katana450.arm.control.state.scene_objects import (
 )
 from katana450.arm.control.state.solid import ObjectAppearance, Solid
 from katana450.arm.control.state.state import Reason, State
-from katana450.assembly.robot_session import describe_robot
 from katana450.errors import InputError
 from katana450.extensions.convex_body import convex_body
 from katana450.extensions.free_place import free_place, girth
@@ -27,8 +26,6 @@ from katana450.maths.collision.clearance import MIN_CLEARANCE
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.water.units import MILLILITRE
-from katana450.resources import URDF_PATH
-from katana450.settings import Settings
 from tests.ticks import TICK, until_rest
 
 SLIGHTLY = 2e-5  # m
@@ -54,8 +51,8 @@ def knot(T: FloatArray, name: str = "knot", **other: object) -> SceneObject:
 
 
 @pytest.fixture(scope="module")
-def session() -> Session:
-    return describe_robot(Settings(), URDF_PATH, None).session
+def session(shipped: Session) -> Session:
+    return shipped
 
 
 def begun(session: Session, *objects: SceneObject) -> State:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import io
 import json
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -30,6 +28,7 @@ from katana450.extensions.robot_choice.uploaded_robots import (
 from katana450.resources import URDF_PATH
 from katana450.server.api import answers, requests
 from tests.browser.server import SIMULATION_APP, AppServer
+from tests.exchange.test_several_files import zipped
 from tests.gateway.client import ask, enter, opened
 from tests.waiting import until
 
@@ -49,14 +48,6 @@ def urdf(axes: str = "zyyx", shape: str = BOX) -> bytes:
         for number, axis in enumerate(axes)
     ]
     return f'<robot name="arm">{"".join(links + joints)}</robot>'.encode()
-
-
-def zipped(files: dict[str, bytes]) -> bytes:
-    data = io.BytesIO()
-    with zipfile.ZipFile(data, "w") as archive:
-        for path, content in files.items():
-            archive.writestr(path, content)
-    return data.getvalue()
 
 
 def kept(data: bytes, name: str, main: str = "") -> Path:

@@ -49,6 +49,12 @@ def healthy(server: AppServer) -> bool:
     return False
 
 
+def state_of(server: AppServer) -> dict[str, Any]:
+    """Return the state of the arm."""
+    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
+    return state
+
+
 def ask(
     url: str, *, data: bytes | None = None, **headers: str
 ) -> tuple[int, dict[str, str], bytes]:

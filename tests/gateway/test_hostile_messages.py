@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import socket
 import time
@@ -22,11 +21,11 @@ from tests.gateway.client import (
     SUBPROTOCOL,
     UPRIGHT,
     Peer,
-    ask,
     controlling,
     enter,
     opened,
     page_name,
+    state_of,
     websocket,
 )
 from tests.gateway.virtual import VirtualServer
@@ -267,7 +266,7 @@ def test_large_message_is_refused(server: AppServer) -> None:
                 await control.socket.wait_closed()
 
     asyncio.run(attack())
-    assert json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None
+    assert state_of(server)["stopped"] is None
 
 
 def test_client_that_never_reads_does_not_delay_others(server: AppServer) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 import subprocess
 import sys
@@ -16,28 +15,16 @@ import pytest
 
 from katana450.extensions.programs.serve_options import OWNER_SILENCE
 from tests.browser.server import ATTENTIVE_APP, ROOT, AppServer
-from tests.gateway.client import ask
+from tests.gateway.client import ask, state_of
 from tests.gateway.lines import post
+from tests.gateway.test_programs import WAVE
 from tests.gateway.virtual import VirtualServer
-
-SCRIPT = """\
-name: Wave
-speed: 0.2
-steps:
-  - joints: [100, -60, 85, 8, 0]
-  - joints: [-100, -60, 85, 8, 0]
-"""
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[AppServer]:
     with AppServer(ATTENTIVE_APP) as server:
         yield server
-
-
-def state_of(server: AppServer) -> dict[str, Any]:
-    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
-    return state
 
 
 def wait(server: AppServer, status: str, seconds: float = 30.0) -> dict[str, Any]:
@@ -66,7 +53,7 @@ def clear_stop(server: AppServer) -> None:
 
 def test_silent_owner_on_an_open_socket_ends_its_program(local: VirtualServer) -> None:
     with local.speaking("Owner") as owner:
-        owner.say(do="program", text=SCRIPT)
+        owner.say(do="program", text=WAVE)
         while owner.answer(do="query")["program"]["status"] != "ready":
             local.sleep(0.05)
         owner.say(do="steer", order="run")
@@ -89,7 +76,7 @@ def test_unattended_program_outlives_its_terminal(
     server: AppServer, tmp_path: Path, end: signal.Signals
 ) -> None:
     script = tmp_path / "wave.yaml"
-    script.write_text(SCRIPT)
+    script.write_text(WAVE)
     command = [sys.executable, "-m", "katana450", "run", str(script), "--url", server.url]
     with subprocess.Popen(
         [*command, "--unattended"],

@@ -18,7 +18,7 @@ from katana450.arm.control.session.stopping import HOLD_OFF
 from katana450.client import Client, RefusedError, connect
 from katana450.server.api import answers, requests
 from tests.browser.server import APP, AppServer, ServerError
-from tests.gateway.client import ask, controlling, enter, page_name
+from tests.gateway.client import ask, controlling, enter, page_name, state_of
 from tests.gateway.postures import THERE
 from tests.gateway.test_watchdogs import under_way
 from tests.waiting import until
@@ -125,7 +125,7 @@ def test_unknown_senders_and_other_paths_are_refused(server: AppServer) -> None:
     with socket.create_connection(("127.0.0.1", int(url.rpartition(":")[2])), 5.0) as raw:
         raw.sendall(b"nonsense\r\n\r\n")
         assert raw.recv(100).startswith(b"HTTP/1.1 400 ")
-    until(lambda: json.loads(ask(f"{server.url}/api/v1/state")[2])["stopped"] is None)
+    until(lambda: state_of(server)["stopped"] is None)
 
 
 def test_stop_with_a_body_or_without_reading_the_answer_counts(

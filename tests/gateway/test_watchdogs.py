@@ -5,7 +5,6 @@ The supervisor is the process of the command itself; the others are its children
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
@@ -13,7 +12,6 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +22,7 @@ from katana450.client.files import LostError, RefusedError
 from katana450.errors import KatanaError
 from katana450.server.api import answers, requests
 from tests.browser.server import ATTENTIVE_APP, AppServer, ServerError
-from tests.gateway.client import ask, healthy
+from tests.gateway.client import ask, healthy, state_of
 from tests.gateway.lines import speaking
 from tests.gateway.postures import FAR
 from tests.waiting import until
@@ -55,12 +53,6 @@ PATIENT = 90.0
 """[s] Timeout for a new process on a machine that others keep busy."""
 
 
-def look(server: AppServer) -> dict[str, Any]:
-    """Return the state of the arm."""
-    state: dict[str, Any] = json.loads(ask(f"{server.url}/api/v1/state")[2])
-    return state
-
-
 def strike(server: AppServer, process: str, number: signal.Signals) -> None:
     """Send ``number`` to ``process`` during a motion, and check what follows."""
     victim = server.child(f"katana450 {process}")
@@ -86,8 +78,8 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
             arm.query(answers.State)
     until(lambda: healthy(server), PATIENT)
     assert server.child(f"katana450 {process}") != victim
-    until(lambda: look(server)["stop"] == "confirmed" and not look(server)["moving"], 5.0)
-    state = look(server)
+    until(lambda: state_of(server)["stop"] == "confirmed" and not state_of(server)["moving"], 5.0)
+    state = state_of(server)
     assert state["status"] == "stopped"
     q = state["q"]
     # The arm stands near its last known place, and has not reached its goal.
@@ -128,7 +120,7 @@ def test_new_process_of_the_arm_keeps_scene_lease_and_front_end(server: AppServe
         os.kill(killed, signal.SIGKILL)
         until(lambda: not healthy(server), 5.0)
         until(lambda: healthy(server), PATIENT)
-        until(lambda: look(server)["stop"] == "confirmed", 5.0)
+        until(lambda: state_of(server)["stop"] == "confirmed", 5.0)
         after = arm.query(answers.State)
         assert (after.q, after.gripper, after.holder) == (before.q, before.gripper, before.holder)
         assert after.status == "stopped"
@@ -177,7 +169,7 @@ def test_frozen_supervisor_is_reported_and_the_arm_still_obeys(server: AppServer
         os.kill(server.pid, signal.SIGCONT)
     until(lambda: healthy(server), 5.0)
     # A supervisor that was frozen does not take its own pause for silence of the processes.
-    assert look(server)["stopped"] is None
+    assert state_of(server)["stopped"] is None
 
 
 @pytest.mark.parametrize(
@@ -201,20 +193,20 @@ def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:
         until(lambda: driver.answer(do="query")["q"][0] >= 0.2, 20.0)
         with server.frozen(server.arm):
             end = time.monotonic() + 10.0
-            while look(server)["stopped"] is None:
+            while state_of(server)["stopped"] is None:
                 driver.say(do="heartbeat")
                 assert time.monotonic() < end
                 time.sleep(0.1)
             refused = driver.answer(do="clear_stop")
             assert "has not answered" in refused["why"]
-        assert "did not answer" in str(look(server)["stopped"])
+        assert "did not answer" in str(state_of(server)["stopped"])
         end = time.monotonic() + 5.0
-        while (state := look(server))["stop"] != "confirmed" or state["moving"]:
+        while (state := state_of(server))["stop"] != "confirmed" or state["moving"]:
             assert time.monotonic() < end
             time.sleep(0.05)
         assert driver.clear_stop()["is"] == "done"
         time.sleep(0.5)
-        np.testing.assert_array_equal(look(server)["q"], state["q"])
+        np.testing.assert_array_equal(state_of(server)["q"], state["q"])
 
 
 def under_way(arm: Client) -> answers.State:

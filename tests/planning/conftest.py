@@ -15,6 +15,7 @@ from katana450.maths.kinematics.branch import Branch, branch_of
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.joint_path import JointPath
 from katana450.maths.planning.path import Path
+from katana450.maths.planning.scaling import Bounds
 from katana450.settings import Settings
 
 FRONT_UP = Branch("front", "up")
@@ -23,6 +24,11 @@ FRONT_UP = Branch("front", "up")
 @pytest.fixture(scope="session")
 def ready() -> FloatArray:
     return np.array(Settings().ready)
+
+
+@pytest.fixture(scope="session")
+def bounds(arm: ArmModel) -> Bounds:
+    return Bounds(arm.limits, 0.5)
 
 
 @pytest.fixture(scope="session")

@@ -26,11 +26,6 @@ from katana450.maths.planning.scaling import Bounds
 
 
 @pytest.fixture(scope="module")
-def bounds(arm: ArmModel) -> Bounds:
-    return Bounds(arm.limits, 0.5)
-
-
-@pytest.fixture(scope="module")
 def bare(robot: Robot) -> CollisionWorld:
     """The arm without an environment."""
     world, _ = world_of(robot)

@@ -24,11 +24,6 @@ NAMES = ("circle", "line", "pour", "lines", "joints", "via")
 
 
 @pytest.fixture(scope="module")
-def bounds(arm: ArmModel) -> Bounds:
-    return Bounds(arm.limits, 0.5)
-
-
-@pytest.fixture(scope="module")
 def scalings(paths: dict[str, Path], bounds: Bounds) -> dict[str, Scaling]:
     return {name: fastest(path, bounds) for name, path in paths.items()}
 

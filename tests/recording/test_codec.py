@@ -74,11 +74,6 @@ def text_of(value: Any) -> bytes:
     return json_text(Codec().encoded(value))
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 @pytest.fixture(scope="module")
 def follow(arm: ArmModel) -> cmd.Follow:
     """A command with a plan that has every kind of curve, one segment twice."""

@@ -25,7 +25,7 @@ from robot_description.cad.hulls import (
 )
 from robot_description.cad.shoulder import RING_FOOT
 from robot_description.cad.solid import block, rod
-from tests.robot_description.solids import solid
+from tests.robot_description.solids import robot, solid
 
 STANDOFF = 5.0  # mm
 EXCESS = 0.10  # of the volume
@@ -34,11 +34,6 @@ SLOT = 0.501  # mm, between collar and ring
 CLEARANCE = 0.49  # mm
 ANGLES = 4
 LINKS = [make.__name__ for make in PARTS]
-
-
-@functools.cache
-def robot() -> yourdfpy.URDF:
-    return yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
 
 
 @functools.cache

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
-import yourdfpy
 from manifold3d import Manifold
 
-from katana450.resources import URDF_PATH
-from tests.robot_description.solids import solid
+from tests.robot_description.solids import robot, solid
 
 AXES = ("axis_1", "axis_2", "axis_3", "axis_4", "axis_5")
 SAMPLES = 9
 AIR = 0.2  # mm that two links which turn in each other keep between them
 ROUNDING = 1e-6  # mm3
-
-
-@functools.cache
-def robot() -> yourdfpy.URDF:
-    return yourdfpy.URDF.load(str(URDF_PATH), load_meshes=False)
 
 
 def pair(name: str, angle: float) -> tuple[Manifold, Manifold]:

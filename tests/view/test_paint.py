@@ -100,11 +100,6 @@ class Server:
     scene: Scene
 
 
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
-
-
 def touching(state: State, one: str, other: str) -> State:
     return replace(state, findings=(Finding(Reason.CONTACT, 0.006, parts=(one, other)),))
 

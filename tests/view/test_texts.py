@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from katana450.arm.control.session.session import Session
 from katana450.arm.control.session.tool_targets import BranchMetrics, BranchOption
 from katana450.arm.control.state.messages import (
     AXIS_NAMES,
@@ -31,11 +30,6 @@ from katana450.maths.collision.contact import Contact
 from katana450.maths.kinematics.branch import BRANCHES
 from katana450.server.view.branches import HEADINGS, cells_of
 from katana450.server.view.view import GHOST_COLOURS
-
-
-@pytest.fixture
-def state(session: Session) -> State:
-    return session.begin(session.ready, 0.0, 0.0)
 
 
 def with_findings(state: State, *findings: Finding) -> State:
