@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from katana450.arm.control.arm import ArmModel
 from katana450.arm.control.session.session import Session
 from katana450.arm.robot.collision import world_of
 from katana450.arm.robot.robot import Robot
@@ -24,6 +25,12 @@ def world(robot: Robot) -> CollisionWorld:
     cup_at = se3.from_rotation_translation(np.eye(3), (0.42, -0.10, 0.07))
     cup = obstacle("cup", cup_at, cylinder(0.035, 0.14))
     return bodies.with_obstacles([obstacle("table", np.eye(4), half_space()), cup])
+
+
+@pytest.fixture(scope="session")
+def guarded(arm: ArmModel, world: CollisionWorld) -> Session:
+    """A session of the arm on its table, with the cup."""
+    return Session(arm, np.array(Settings().ready), world)
 
 
 @pytest.fixture(scope="session")

@@ -19,11 +19,6 @@ LOW = np.radians((30.0, -40.0, 95.0, -20.0, 0.0))
 """Posture with the fingers about 10 cm above the table."""
 
 
-@pytest.fixture
-def guarded(session: Session, world: CollisionWorld) -> Session:
-    return Session(session.require_arm(), session.ready, world)
-
-
 def clearance(world: CollisionWorld, state: State) -> float:
     contact = world.nearest(np.append(state.setpoint, state.gripper_setpoint))
     assert contact is not None

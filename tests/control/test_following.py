@@ -27,7 +27,6 @@ from katana450.maths.kinematics.tool import ToolTarget, pitch_and_roll
 from katana450.maths.planning.jet import Jet
 from katana450.maths.planning.path import joint_derivatives
 from katana450.maths.planning.plan import Plan
-from katana450.settings import Settings
 from tests.control.clearing import cleared
 from tests.control.test_contact import clearance
 from tests.ticks import TICK, until_rest
@@ -54,11 +53,6 @@ def poured(arm: ArmModel) -> Plan:
     pour = ToolPath(chain, ToolLine(carried, out), branch, carry.end)
     session = Session(arm, start)
     return plan_along(arm, None, session.begin(start, 0.0, 0.0), [lift, carry, pour])
-
-
-@pytest.fixture(scope="module")
-def guarded(arm: ArmModel, world: CollisionWorld) -> Session:
-    return Session(arm, np.array(Settings().ready), world)
 
 
 @pytest.fixture(scope="module")

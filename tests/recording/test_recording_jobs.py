@@ -112,14 +112,6 @@ def page(server: AppServer) -> Page:
     return Page(server)
 
 
-def test_selection_is_verified(page: Page) -> None:
-    name = page.begun("do=verify")
-    state = page.ended(name)
-    assert state["status"] == "done"
-    assert state["words"].startswith("identical to the bit over ")
-    assert page.ask(f"/jobs/{name}/file")[0] == 409
-
-
 def test_difference_is_stated_with_its_time_and_size(page: Page, tmp_path: Path) -> None:
     path, changed = tmp_path / "all.mcap", tmp_path / "changed.mcap"
     path.write_bytes(page.ask("")[1])

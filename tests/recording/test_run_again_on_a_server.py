@@ -56,7 +56,7 @@ def recorded(server: AppServer, tmp_path_factory: pytest.TempPathFactory) -> Pat
                 return False
             return bool(np.abs(katana450.open(path).setpoint[-1] - end).max() < 1e-9)
 
-        until(kept)
+        until(kept, 60.0)
     return path
 
 
