@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import atexit
+import inspect
 import os
 import shutil
 import signal
@@ -75,6 +77,20 @@ def _long(items: list[pytest.Item]) -> set[pytest.Item]:
         chosen = {cases[len(cases) * place // number] for place in range(number)}
         left_out.update(set(cases) - chosen)
     return left_out
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
+    """Run a test that is a coroutine, in the loop of its server if that is in this process."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj) or pyfuncitem.get_closest_marker("anyio"):
+        return None
+    names = inspect.signature(pyfuncitem.obj).parameters
+    arguments: dict[str, Any] = {
+        name: value for name, value in pyfuncitem.funcargs.items() if name in names
+    }
+    server = arguments.get("local") or arguments.get("guarded")
+    (server.run if server else asyncio.run)(pyfuncitem.obj(**arguments))
+    return True
 
 
 @pytest.hookimpl(optionalhook=True)

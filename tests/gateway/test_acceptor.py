@@ -76,22 +76,19 @@ def _is_open(connection: socket.socket) -> bool:
         return False
 
 
-def test_oldest_connection_of_the_most_frequent_address_is_closed() -> None:
-    async def act() -> None:
-        async with _accepting() as (_, server):
-            lonely = await _connected(server, "127.0.0.2")
-            crowd = [await _connected(server) for _ in range(3 * WAITING)]
-            await asyncio.sleep(0.1)
-            found = [_is_open(each) for each in crowd]
-            assert found == [False] * (len(crowd) - WAITING + 1) + [True] * (WAITING - 1)
-            assert _is_open(lonely)
-            for each in (lonely, *crowd):
-                each.close()
-
-    asyncio.run(act())
+async def test_oldest_connection_of_the_most_frequent_address_is_closed() -> None:
+    async with _accepting() as (_, server):
+        lonely = await _connected(server, "127.0.0.2")
+        crowd = [await _connected(server) for _ in range(3 * WAITING)]
+        await asyncio.sleep(0.1)
+        found = [_is_open(each) for each in crowd]
+        assert found == [False] * (len(crowd) - WAITING + 1) + [True] * (WAITING - 1)
+        assert _is_open(lonely)
+        for each in (lonely, *crowd):
+            each.close()
 
 
-def test_small_messages_do_not_wait_for_acknowledgements() -> None:
+async def test_small_messages_do_not_wait_for_acknowledgements() -> None:
     opened: list[asyncio.Transport] = []
 
     class Opened(asyncio.Protocol):
@@ -99,46 +96,37 @@ def test_small_messages_do_not_wait_for_acknowledgements() -> None:
             assert isinstance(transport, asyncio.Transport)
             opened.append(transport)
 
-    async def act() -> None:
-        with listen("127.0.0.1", 0) as listening:
-            acceptor = Acceptor(listening, WAITING).start(Opened)
-            client = await _connected(listening.getsockname())
-            (transport,) = opened
-            sock = transport.get_extra_info("socket")
-            assert sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
-            client.close()
-            acceptor.close()
-            await acceptor.wait_closed()
-
-    asyncio.run(act())
+    with listen("127.0.0.1", 0) as listening:
+        acceptor = Acceptor(listening, WAITING).start(Opened)
+        client = await _connected(listening.getsockname())
+        (transport,) = opened
+        sock = transport.get_extra_info("socket")
+        assert sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY) == 1
+        client.close()
+        acceptor.close()
+        await acceptor.wait_closed()
 
 
-def test_closed_connections_make_room_for_others() -> None:
-    async def act() -> None:
-        async with _accepting() as (_, server):
-            early = [await _connected(server) for _ in range(WAITING // 2 + 1)]
-            for _ in range(3 * WAITING):
-                (await _connected(server)).close()
-                await asyncio.sleep(0.01)
-            assert all(_is_open(each) for each in early)
-            for each in early:
-                each.close()
-
-    asyncio.run(act())
+async def test_closed_connections_make_room_for_others() -> None:
+    async with _accepting() as (_, server):
+        early = [await _connected(server) for _ in range(WAITING // 2 + 1)]
+        for _ in range(3 * WAITING):
+            (await _connected(server)).close()
+            await asyncio.sleep(0.01)
+        assert all(_is_open(each) for each in early)
+        for each in early:
+            each.close()
 
 
-def test_kept_connection_is_not_closed_for_others() -> None:
-    async def act() -> None:
-        async with _accepting() as (acceptor, server):
-            driver = await _connected(server)
-            host, port = driver.getsockname()
-            with acceptor.kept((host, port)):
-                crowd = [await _connected(server) for _ in range(3 * WAITING)]
-                assert _is_open(driver)
-            for each in (driver, *crowd):
-                each.close()
-
-    asyncio.run(act())
+async def test_kept_connection_is_not_closed_for_others() -> None:
+    async with _accepting() as (acceptor, server):
+        driver = await _connected(server)
+        host, port = driver.getsockname()
+        with acceptor.kept((host, port)):
+            crowd = [await _connected(server) for _ in range(3 * WAITING)]
+            assert _is_open(driver)
+        for each in (driver, *crowd):
+            each.close()
 
 
 def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
@@ -166,7 +154,7 @@ def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
 
 
 @pytest.mark.parametrize("of", [["127.0.0.1"], [f"127.0.1.{n}" for n in range(1, 30)]])
-def test_connections_beyond_the_rate_are_opened_once_they_send(
+async def test_connections_beyond_the_rate_are_opened_once_they_send(
     of: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one, total = (3.0, 1e3) if len(of) == 1 else (1e3, 3.0)
@@ -177,23 +165,19 @@ def test_connections_beyond_the_rate_are_opened_once_they_send(
         "RATE": 0.0,
     }.items():
         monkeypatch.setattr(acceptors, name, value)
-
-    async def act() -> None:
-        async with _accepting() as (acceptor, server):
-            silent = [await _connected(server, of[n % len(of)]) for n in range(6)]
-            speaking = await _connected(server, of[-1], b"x")
-            await asyncio.sleep(0.1)
-            assert [_is_open(each) for each in silent] == [True] * 3 + [False] * 3
-            assert _is_open(speaking)
-            assert not acceptor._surplus
-            # A prefix of its own has places of its own.
-            other = await _connected(server, "127.0.2.1")
-            await asyncio.sleep(0.1)
-            assert _is_open(other) == (len(of) == 1)
-            for each in (speaking, other, *silent):
-                each.close()
-
-    asyncio.run(act())
+    async with _accepting() as (acceptor, server):
+        silent = [await _connected(server, of[n % len(of)]) for n in range(6)]
+        speaking = await _connected(server, of[-1], b"x")
+        await asyncio.sleep(0.1)
+        assert [_is_open(each) for each in silent] == [True] * 3 + [False] * 3
+        assert _is_open(speaking)
+        assert not acceptor._surplus
+        # A prefix of its own has places of its own.
+        other = await _connected(server, "127.0.2.1")
+        await asyncio.sleep(0.1)
+        assert _is_open(other) == (len(of) == 1)
+        for each in (speaking, other, *silent):
+            each.close()
 
 
 @pytest.mark.parametrize(
@@ -287,16 +271,13 @@ def test_flooding_client_does_not_delay_others() -> None:
     assert max(before - after for before, after in pairwise(taken)) == 1
 
 
-def test_unresponsive_flooder_is_disconnected() -> None:
-    async def ask() -> None:
-        hub, deaf = Hub(time.monotonic), Deaf()
-        deaf.left = 10**9
-        program = ProgramChannel(hub, deaf, Budgets(hub.clock).of("a"))
-        window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.notify)
-        async with asyncio.timeout(10.0 * CLOSE_FRAME_TIMEOUT):
-            await program.run(window)
-
-    asyncio.run(ask())
+async def test_unresponsive_flooder_is_disconnected() -> None:
+    hub, deaf = Hub(time.monotonic), Deaf()
+    deaf.left = 10**9
+    program = ProgramChannel(hub, deaf, Budgets(hub.clock).of("a"))
+    window = hub.join(Identity("session", "Deaf", Role.OPERATOR), "a-page", program.notify)
+    async with asyncio.timeout(10.0 * CLOSE_FRAME_TIMEOUT):
+        await program.run(window)
 
 
 def test_reserved_places_are_free_when_all_others_are_taken() -> None:
@@ -424,28 +405,26 @@ def test_other_requests_wait_for_the_application(web: WebServer) -> None:
         assert asked.result(10.0) == 203
 
 
-def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(web: WebServer) -> None:
+async def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(
+    web: WebServer,
+) -> None:
     hub = Hub(time.monotonic)
     proxy = Proxy(hub, web.authenticator, cast("Any", None), 0, "")
     app = Starlette(routes=control_routes(hub, Budgets(hub.clock), web, proxy))
-
-    async def trial() -> None:
-        path, cookie = f"/control?page={page_name()}", enter(url_of(web))
-        opening = asyncio.create_task(websocket(url_of(web), path, cookie).__aenter__())
-        await asyncio.sleep(0.1)
-        assert not opening.done()
-        web.loop.call_soon_threadsafe(web.show, app)
-        socket = await asyncio.wait_for(opening, 5.0)
-        await socket.send(json.dumps({"do": "heartbeat", "n": 7}))
-        with pytest.raises(TimeoutError):
-            await asyncio.wait_for(socket.recv(), 0.1)
-        web.loop.call_soon_threadsafe(web.complete)
-        async with asyncio.timeout(5.0):
-            while json.loads(await socket.recv()) != {"is": "echo", "n": 7}:
-                pass
-        await socket.close()
-
-    asyncio.run(trial())
+    path, cookie = f"/control?page={page_name()}", enter(url_of(web))
+    opening = asyncio.create_task(websocket(url_of(web), path, cookie).__aenter__())
+    await asyncio.sleep(0.1)
+    assert not opening.done()
+    web.loop.call_soon_threadsafe(web.show, app)
+    socket = await asyncio.wait_for(opening, 5.0)
+    await socket.send(json.dumps({"do": "heartbeat", "n": 7}))
+    with pytest.raises(TimeoutError):
+        await asyncio.wait_for(socket.recv(), 0.1)
+    web.loop.call_soon_threadsafe(web.complete)
+    async with asyncio.timeout(5.0):
+        while json.loads(await socket.recv()) != {"is": "echo", "n": 7}:
+            pass
+    await socket.close()
 
 
 def test_requests_for_other_hosts_are_refused_at_once(web: WebServer) -> None:

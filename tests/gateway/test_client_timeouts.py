@@ -88,16 +88,13 @@ async def _babbling(connection: ServerConnection) -> None:
         pytest.param(_babbling, _states, id="another protocol"),
     ],
 )
-def test_call_that_a_server_leaves_open_raises_an_error(handler: Handler, act: Act) -> None:
-    async def run() -> None:
-        async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
-            port = server.sockets[0].getsockname()[1]
-            async with asyncio.timeout(BOUND):
-                with pytest.raises(LostError):
-                    async with aconnect(f"http://127.0.0.1:{port}") as client:
-                        await act(client)
-            server.close(close_connections=False)
-            for connection in server.connections:
-                connection.transport.abort()
-
-    asyncio.run(run())
+async def test_call_that_a_server_leaves_open_raises_an_error(handler: Handler, act: Act) -> None:
+    async with serve(handler, "127.0.0.1", 0, compression=None, close_timeout=0.1) as server:
+        port = server.sockets[0].getsockname()[1]
+        async with asyncio.timeout(BOUND):
+            with pytest.raises(LostError):
+                async with aconnect(f"http://127.0.0.1:{port}") as client:
+                    await act(client)
+        server.close(close_connections=False)
+        for connection in server.connections:
+            connection.transport.abort()

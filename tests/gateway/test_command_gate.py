@@ -185,33 +185,29 @@ def viser_server() -> Iterator[viser.ViserServer]:
     server.stop()
 
 
-def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
+async def test_message_that_waits_in_visers_socket_during_a_stop_changes_nothing(
     table: Table, viser_server: viser.ViserServer
 ) -> None:
     """The slider moves before STOP and clear, and viser handles the message after both."""
     driver = table.join(PAGES[0])
-
-    async def slide() -> None:
-        hooked = Hooked(table, viser_server, driver)
-        slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
-        listener(hooked.gestures)(slider, lambda: cmd.Joint(1, slider.value))
-        moved = internals.value_change(slider, 0.5)
-        hooked.receive()
-        table.stop("Vera")
-        table.hub.move(driver, cmd.ClearStop())
-        await hooked.handle(moved)
-        assert (table.arm.commands, slider.value) == ([], 0.0)
-        assert "Do it again" in hooked.refusals[0]
-        # The window gets the true value.
-        (correction,) = hooked.corrections
-        assert correction.updates == {"value": 0.0}
-        hooked.receive()
-        await hooked.handle(moved)
-        assert table.arm.commands == [cmd.Joint(1, 0.5)]
-        assert table.arm.actors[-1].name == driver.person.name
-        assert table.arm.actors[-1].grounds is Grounds.LEASE
-
-    asyncio.run(slide())
+    hooked = Hooked(table, viser_server, driver)
+    slider = viser_server.gui.add_slider("S", min=0.0, max=1.0, step=0.1, initial_value=0.0)
+    listener(hooked.gestures)(slider, lambda: cmd.Joint(1, slider.value))
+    moved = internals.value_change(slider, 0.5)
+    hooked.receive()
+    table.stop("Vera")
+    table.hub.move(driver, cmd.ClearStop())
+    await hooked.handle(moved)
+    assert (table.arm.commands, slider.value) == ([], 0.0)
+    assert "Do it again" in hooked.refusals[0]
+    # The window gets the true value.
+    (correction,) = hooked.corrections
+    assert correction.updates == {"value": 0.0}
+    hooked.receive()
+    await hooked.handle(moved)
+    assert table.arm.commands == [cmd.Joint(1, 0.5)]
+    assert table.arm.actors[-1].name == driver.person.name
+    assert table.arm.actors[-1].grounds is Grounds.LEASE
 
 
 def test_event_of_a_browser_without_a_gesture_has_no_actor(

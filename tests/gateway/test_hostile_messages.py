@@ -99,67 +99,56 @@ RUDE: dict[str, Attack] = {
 }
 
 
-def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
-    async def attack() -> None:
-        async with peers(server.url) as (bad, good):
-            for send in ATTACKS.values():
-                await send(bad)
-            assert await good.listen() == []
-            for name, send in RUDE.items():
-                path, cookie = f"/viser?page={page_name()}", enter(server.url)
-                # Nobody waits for the scene, nor for an answer.
-                async with websocket(
-                    server.url, path, cookie, subprotocols=[SUBPROTOCOL]
-                ) as socket:
-                    with suppress(ConnectionClosed):
-                        await send(Peer(socket))
-                assert await good.listen(BRIEF) == [], name
-
-    asyncio.run(attack())
+async def test_message_that_no_page_sends_changes_nothing(server: AppServer) -> None:
+    async with peers(server.url) as (bad, good):
+        for send in ATTACKS.values():
+            await send(bad)
+        assert await good.listen() == []
+        for name, send in RUDE.items():
+            path, cookie = f"/viser?page={page_name()}", enter(server.url)
+            # Nobody waits for the scene, nor for an answer.
+            async with websocket(server.url, path, cookie, subprotocols=[SUBPROTOCOL]) as socket:
+                with suppress(ConnectionClosed):
+                    await send(Peer(socket))
+            assert await good.listen(BRIEF) == [], name
 
 
-def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer) -> None:
-    async def attack() -> None:
-        async with peers(server.url) as (bad, good):
-            with suppress(ConnectionClosed):
-                for _ in range(20):
-                    await bad.socket.send(b"\xff\x00\x01")
-                    await bad.listen(0.02)
-            assert bad.socket.close_code == 1008
-            assert await good.listen(BRIEF) == []
-
-    asyncio.run(attack())
+async def test_sender_of_repeated_bad_messages_is_disconnected(server: AppServer) -> None:
+    async with peers(server.url) as (bad, good):
+        with suppress(ConnectionClosed):
+            for _ in range(20):
+                await bad.socket.send(b"\xff\x00\x01")
+                await bad.listen(0.02)
+        assert bad.socket.close_code == 1008
+        assert await good.listen(BRIEF) == []
 
 
-def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
-    async def obey() -> None:
-        async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
-            await control.say("take")
-            await control.wait(mine=True)
-            for attack in ATTACKS.values():
-                await attack(bad)
-            heard = await moves_the_arm(good, 12.5)
-            turned = [m for m in heard if m["type"] == "SetOrientationMessage"]
-            assert any(m["name"].endswith("/pan_link") for m in turned)
-            # The other browser gets the slider, and the same motion.
-            messages = await bad.listen()
-            assert {"value": 12.5} in [
-                m["updates"] for m in messages if m["type"] == "GuiUpdateMessage"
-            ]
-            # The other browser does not hold the lease: it gets the true value back.
-            await bad.set("1 base turn", value=30.0)
-            truth = [m["updates"] for m in await bad.listen() if m["type"] == "GuiUpdateMessage"]
-            assert truth[-1:] == [{"value": 12.5}]
-            assert {"value": 30.0} not in truth
-            assert await good.listen(BRIEF) == []
-            await moves_the_arm(good, 0.0)
-
-    asyncio.run(obey())
+async def test_arm_obeys_a_valid_browser_after_the_attacks(server: AppServer) -> None:
+    async with opened(server.url) as (bad, _), opened(server.url) as (good, control):
+        await control.say("take")
+        await control.wait(mine=True)
+        for attack in ATTACKS.values():
+            await attack(bad)
+        heard = await moves_the_arm(good, 12.5)
+        turned = [m for m in heard if m["type"] == "SetOrientationMessage"]
+        assert any(m["name"].endswith("/pan_link") for m in turned)
+        # The other browser gets the slider, and the same motion.
+        messages = await bad.listen()
+        assert {"value": 12.5} in [
+            m["updates"] for m in messages if m["type"] == "GuiUpdateMessage"
+        ]
+        # The other browser does not hold the lease: it gets the true value back.
+        await bad.set("1 base turn", value=30.0)
+        truth = [m["updates"] for m in await bad.listen() if m["type"] == "GuiUpdateMessage"]
+        assert truth[-1:] == [{"value": 12.5}]
+        assert {"value": 30.0} not in truth
+        assert await good.listen(BRIEF) == []
+        await moves_the_arm(good, 0.0)
     assert server.running
     assert "Dropped a GuiUpdateMessage" in server.output
 
 
-def test_invalid_request_changes_nothing(local: VirtualServer) -> None:
+async def test_invalid_request_changes_nothing(local: VirtualServer) -> None:
     texts = [
         "",
         "no json",
@@ -177,22 +166,18 @@ def test_invalid_request_changes_nothing(local: VirtualServer) -> None:
         "[" * 500,
         "\x00\x01",
     ]
-
-    async def attack() -> None:
-        watching = await local.control()
-        before = dict(await watching.wait(participants=1, mood="ok"))
-        for text in texts:
-            control = await local.control()
-            await watching.wait(participants=2)
-            with suppress(ConnectionClosed):
-                for _ in range(10):
-                    await control.socket.send(text)
-            async with asyncio.timeout(5.0):
-                await control.socket.wait_closed()
-            assert control.socket.close_code == 1008, text
-            assert before == await watching.wait(participants=1), text
-
-    local.run(attack())
+    watching = await local.control()
+    before = dict(await watching.wait(participants=1, mood="ok"))
+    for text in texts:
+        control = await local.control()
+        await watching.wait(participants=2)
+        with suppress(ConnectionClosed):
+            for _ in range(10):
+                await control.socket.send(text)
+        async with asyncio.timeout(5.0):
+            await control.socket.wait_closed()
+        assert control.socket.close_code == 1008, text
+        assert before == await watching.wait(participants=1), text
 
 
 @pytest.mark.long
@@ -227,74 +212,65 @@ async def round_trip(control: Any) -> float:
     return time.perf_counter() - started
 
 
-def test_flooding_client_is_closed_without_effect_on_others(server: AppServer) -> None:
-    async def attack() -> None:
-        async with opened(server.url) as (good, control):
-            await control.say("take")
-            await control.wait(mine=True)
-            async with opened(server.url) as (bad, _):
-                camera = msgspec.msgpack.encode({"type": "GuiUpdateMessage"})
+async def test_flooding_client_is_closed_without_effect_on_others(server: AppServer) -> None:
+    async with opened(server.url) as (good, control):
+        await control.say("take")
+        await control.wait(mine=True)
+        async with opened(server.url) as (bad, _):
+            camera = msgspec.msgpack.encode({"type": "GuiUpdateMessage"})
 
-                async def flood() -> None:
-                    with suppress(ConnectionClosed):
-                        while True:
-                            await bad.socket.send(camera)
-                            await asyncio.sleep(0)
+            async def flood() -> None:
+                with suppress(ConnectionClosed):
+                    while True:
+                        await bad.socket.send(camera)
+                        await asyncio.sleep(0)
 
-                flooding = asyncio.create_task(flood())
-                trips = [await round_trip(control) for _ in range(10)]
-                async with asyncio.timeout(10.0):
-                    await flooding
-            assert sorted(trips)[5] < 0.1
-            heard = await moves_the_arm(good, 2.0)
-            assert any(m["type"] == "SetOrientationMessage" for m in heard)
-
-    asyncio.run(attack())
+            flooding = asyncio.create_task(flood())
+            trips = [await round_trip(control) for _ in range(10)]
+            async with asyncio.timeout(10.0):
+                await flooding
+        assert sorted(trips)[5] < 0.1
+        heard = await moves_the_arm(good, 2.0)
+        assert any(m["type"] == "SetOrientationMessage" for m in heard)
 
 
-def test_large_message_is_refused(server: AppServer) -> None:
-    async def attack() -> None:
-        async with peers(server.url) as (bad, good):
-            with suppress(ConnectionClosed):
-                await bad.set("1 base turn", value="x" * 10 * MAX_MESSAGE_BYTES)
-                await bad.listen(5.0)
-            assert bad.socket.close_code == 1009
-            assert await good.listen(BRIEF) == []
-        async with controlling(server.url) as control:
-            await control.say("stop", because="x" * 100_000)
-            async with asyncio.timeout(5.0):
-                await control.socket.wait_closed()
-
-    asyncio.run(attack())
+async def test_large_message_is_refused(server: AppServer) -> None:
+    async with peers(server.url) as (bad, good):
+        with suppress(ConnectionClosed):
+            await bad.set("1 base turn", value="x" * 10 * MAX_MESSAGE_BYTES)
+            await bad.listen(5.0)
+        assert bad.socket.close_code == 1009
+        assert await good.listen(BRIEF) == []
+    async with controlling(server.url) as control:
+        await control.say("stop", because="x" * 100_000)
+        async with asyncio.timeout(5.0):
+            await control.socket.wait_closed()
     assert state_of(server)["stopped"] is None
 
 
-def test_client_that_never_reads_does_not_delay_others(server: AppServer) -> None:
-    async def attack() -> None:
-        async with opened(server.url) as (good, control), AsyncExitStack() as stack:
-            await control.say("take")
-            for _ in range(4):
-                cookie, page = enter(server.url), page_name()
-                narrow = socket.create_connection(("127.0.0.1", server.port))
-                narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-                bad = await stack.enter_async_context(
-                    websocket(
-                        server.url,
-                        f"/viser?page={page}",
-                        cookie,
-                        sock=narrow,
-                        max_queue=1,
-                        subprotocols=[SUBPROTOCOL],
-                    )
+async def test_client_that_never_reads_does_not_delay_others(server: AppServer) -> None:
+    async with opened(server.url) as (good, control), AsyncExitStack() as stack:
+        await control.say("take")
+        for _ in range(4):
+            cookie, page = enter(server.url), page_name()
+            narrow = socket.create_connection(("127.0.0.1", server.port))
+            narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            bad = await stack.enter_async_context(
+                websocket(
+                    server.url,
+                    f"/viser?page={page}",
+                    cookie,
+                    sock=narrow,
+                    max_queue=1,
+                    subprotocols=[SUBPROTOCOL],
                 )
-                bad.transport.pause_reading()
-            for degrees in (5.0, 0.0):
-                started = time.perf_counter()
-                heard = await moves_the_arm(good, degrees)
-                assert any(m["type"] == "SetOrientationMessage" for m in heard)
-                assert time.perf_counter() - started < 3.0 + QUIET
-
-    asyncio.run(attack())
+            )
+            bad.transport.pause_reading()
+        for degrees in (5.0, 0.0):
+            started = time.perf_counter()
+            heard = await moves_the_arm(good, degrees)
+            assert any(m["type"] == "SetOrientationMessage" for m in heard)
+            assert time.perf_counter() - started < 3.0 + QUIET
 
 
 BRIEF = 0.1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 import time
 from argparse import Namespace
@@ -98,7 +97,7 @@ def house(tmp_path: Path, session: Session) -> House:
 
 
 @pytest.mark.parametrize("revokes", [False, True])
-def test_request_whose_sender_is_removed_before_its_end_is_refused(
+async def test_request_whose_sender_is_removed_before_its_end_is_refused(
     house: House, revokes: bool
 ) -> None:
     token = house.file.give("Oda", Role.OPERATOR, time.time() + HOUR)
@@ -110,34 +109,27 @@ def test_request_whose_sender_is_removed_before_its_end_is_refused(
         else:
             house.people.kick(Identity(number, "Oda", Role.OPERATOR), 60.0)
 
-    async def act() -> None:
-        for do in ("acquire", "release_lease"):
-            assert await house.post(b'{"do": "%s"}' % do.encode(), token) == 200
-        with pytest.raises(HTTPException) as refused:
-            await house.post(b'{"do": "acquire"}', token, remove)
-        assert refused.value.status_code == (401 if revokes else 403)
-        assert house.hub.lease.holder is None
-
-    asyncio.run(act())
+    for do in ("acquire", "release_lease"):
+        assert await house.post(b'{"do": "%s"}' % do.encode(), token) == 200
+    with pytest.raises(HTTPException) as refused:
+        await house.post(b'{"do": "acquire"}', token, remove)
+    assert refused.value.status_code == (401 if revokes else 403)
+    assert house.hub.lease.holder is None
 
 
-def test_http_programs_without_links_are_kept_out_together(
+async def test_http_programs_without_links_are_kept_out_together(
     tmp_path: Path, session: Session
 ) -> None:
     house = House(tmp_path, session, free=True)
-
-    async def act() -> None:
-        assert await house.post(b'{"do": "acquire"}') == 200
-        number = house.number("programs")
-        house.ask(requests.Kick(person=number, seconds=60.0))
-        with pytest.raises(HTTPException, match=KICKED) as refused:
-            await house.post(b'{"do": "heartbeat"}')
-        assert refused.value.status_code == 403
-        assert (await house.api._stop(house.request(b""))).status_code == 204
-        house.ask(requests.Kick(person=number, seconds=0.0))
-        assert await house.post(b'{"do": "heartbeat"}') == 200
-
-    asyncio.run(act())
+    assert await house.post(b'{"do": "acquire"}') == 200
+    number = house.number("programs")
+    house.ask(requests.Kick(person=number, seconds=60.0))
+    with pytest.raises(HTTPException, match=KICKED) as refused:
+        await house.post(b'{"do": "heartbeat"}')
+    assert refused.value.status_code == 403
+    assert (await house.api._stop(house.request(b""))).status_code == 204
+    house.ask(requests.Kick(person=number, seconds=0.0))
+    assert await house.post(b'{"do": "heartbeat"}') == 200
 
 
 VERA = Identity("vera", "Vera", Role.VIEWER, "Vera")

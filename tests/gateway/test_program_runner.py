@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 from argparse import Namespace
 from dataclasses import replace
@@ -355,7 +354,7 @@ def test_a_running_program_does_not_become_unattended(table: Staged) -> None:
 
 @pytest.mark.parametrize("revoke", [False, True])
 @pytest.mark.parametrize("present", [False, True])
-def test_unattended_program_of_a_disconnected_person_ends(
+async def test_unattended_program_of_a_disconnected_person_ends(
     table: Staged, revoke: bool, present: bool
 ) -> None:
     people = table.hub.people
@@ -373,10 +372,6 @@ def test_unattended_program_of_a_disconnected_person_ends(
     (number,) = people.shown
     kick = requests.Kick(person=number, seconds=60.0, revoke=revoke)
     table.hub.add_handler(PeopleRequests(table.hub, Namespace()))
-
-    async def act() -> None:
-        Dispatcher(table.hub).handle(admin, kick, Budgets(table.hub.clock).of("ada"))
-
-    asyncio.run(act())
+    Dispatcher(table.hub).handle(admin, kick, Budgets(table.hub.clock).of("ada"))
     assert table.status == "stopped"
     assert table.hub.lease.holder is None

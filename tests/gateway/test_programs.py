@@ -264,31 +264,28 @@ async def run_program(owner: Control) -> None:
     await owner.wait(holder="Wave")
 
 
-def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
-    async def act() -> None:
-        owner, other = await local.control(), await local.control()
-        await run_program(owner)
-        await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
-        assert not other.status["own_program"]
-        await other.say("ask")
-        await other.wait(asked=True)
-        (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
-        # No other participant may decide.
-        await other.say("decline", to=asking["number"])
-        assert "do not hold" in (await other.notice("refused"))["why"]
-        await owner.say("decline", to=asking["number"])
-        refused = await other.notice("refused")
-        assert refused["why"] == f"{owner.status['name']} declined your request."
-        await other.wait(asked=False)
-        await owner.wait(asking=[], holder="Wave")
-        await other.say("ask")
-        await owner.wait(asking=[asking])
-        await owner.say("give", to=asking["number"])
-        await other.wait(mine=True)
-        await until_program(owner, "stopped")
-        await owner.wait(mine=False, orders=[], holder=other.status["name"])
-
-    local.run(act())
+async def test_owner_of_a_running_program_decides_about_requests(local: VirtualServer) -> None:
+    owner, other = await local.control(), await local.control()
+    await run_program(owner)
+    await owner.wait(orders=["end"], pace="", planning=False, asking=[], own_program=True)
+    assert not other.status["own_program"]
+    await other.say("ask")
+    await other.wait(asked=True)
+    (asking,) = (await owner.wait(asking=[await numbered(owner, other)]))["asking"]
+    # No other participant may decide.
+    await other.say("decline", to=asking["number"])
+    assert "do not hold" in (await other.notice("refused"))["why"]
+    await owner.say("decline", to=asking["number"])
+    refused = await other.notice("refused")
+    assert refused["why"] == f"{owner.status['name']} declined your request."
+    await other.wait(asked=False)
+    await owner.wait(asking=[], holder="Wave")
+    await other.say("ask")
+    await owner.wait(asking=[asking])
+    await owner.say("give", to=asking["number"])
+    await other.wait(mine=True)
+    await until_program(owner, "stopped")
+    await owner.wait(mine=False, orders=[], holder=other.status["name"])
 
 
 async def numbered(owner: Control, other: Control) -> dict[str, Any]:
@@ -302,21 +299,20 @@ async def numbered(owner: Control, other: Control) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("by_program", [False, True])
-def test_former_driver_gets_the_name_of_the_new_one(local: VirtualServer, by_program: bool) -> None:
-    async def act() -> None:
-        driver, other = await local.control(), await local.control()
-        if by_program:
-            await run_program(driver)
-        else:
-            await driver.say("acquire")
-            await driver.wait(mine=True)
-        assert driver.status["taken"] == ""
-        await other.say("take")
-        await other.wait(mine=True, taken="")
-        await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
-        await other.say("release_lease")
-        await driver.wait(holder=None, taken="")
+async def test_former_driver_gets_the_name_of_the_new_one(
+    local: VirtualServer, by_program: bool
+) -> None:
+    driver, other = await local.control(), await local.control()
+    if by_program:
+        await run_program(driver)
+    else:
         await driver.say("acquire")
-        await driver.wait(mine=True, taken="")
-
-    local.run(act())
+        await driver.wait(mine=True)
+    assert driver.status["taken"] == ""
+    await other.say("take")
+    await other.wait(mine=True, taken="")
+    await driver.wait(mine=False, taken=f"{other.status['name']} took over from you.")
+    await other.say("release_lease")
+    await driver.wait(holder=None, taken="")
+    await driver.say("acquire")
+    await driver.wait(mine=True, taken="")

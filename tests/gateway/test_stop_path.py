@@ -50,27 +50,26 @@ def stop_processes(server: AppServer) -> list[int]:
     return []
 
 
-def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(server: AppServer) -> None:
-    async def act() -> None:
-        cookie, page = enter(server.url), page_name()
-        async with controlling(server.url, cookie, page) as control:
-            await control.wait(mood="ok")
-            path = f"/stop?press=one&page={page}"
-            status, headers, body = await asyncio.to_thread(
-                ask, f"{server.stop_url}{path}", data=b"", Cookie=cookie, Origin=server.url
-            )
-            assert (status, json.loads(body)["stop"]) == (200, "confirmed")
-            # The page may read the answer.
-            assert headers["access-control-allow-origin"] == server.url
-            assert headers["access-control-allow-credentials"] == "true"
-            shown = await control.wait(stop="confirmed")
-            assert shown["stopped"] == "You pressed STOP."
-            assert abs(shown["stopped_at"] - time.time()) < 10.0
-            await control.clear_stop()
-            await control.say("release_lease")
-            await control.wait(holder=None)
-
-    asyncio.run(act())
+async def test_stop_of_a_page_is_confirmed_and_named_like_on_the_main_port(
+    server: AppServer,
+) -> None:
+    cookie, page = enter(server.url), page_name()
+    async with controlling(server.url, cookie, page) as control:
+        await control.wait(mood="ok")
+        path = f"/stop?press=one&page={page}"
+        status, headers, body = await asyncio.to_thread(
+            ask, f"{server.stop_url}{path}", data=b"", Cookie=cookie, Origin=server.url
+        )
+        assert (status, json.loads(body)["stop"]) == (200, "confirmed")
+        # The page may read the answer.
+        assert headers["access-control-allow-origin"] == server.url
+        assert headers["access-control-allow-credentials"] == "true"
+        shown = await control.wait(stop="confirmed")
+        assert shown["stopped"] == "You pressed STOP."
+        assert abs(shown["stopped_at"] - time.time()) < 10.0
+        await control.clear_stop()
+        await control.say("release_lease")
+        await control.wait(holder=None)
 
 
 def test_page_learns_the_port_when_it_signs_in(server: AppServer) -> None:

@@ -116,74 +116,55 @@ async def exhaust(port: Port, token: str) -> None:
     raise AssertionError("No answer was delayed.")
 
 
-def test_flood_of_one_link_delays_no_press_of_another(port: Port) -> None:
-    async def act() -> None:
-        port.pipe.status = STOPPED
-        await exhaust(port, port.vera)
-        assert await port.stop(port.otto) == (200, "confirmed")
-
-    asyncio.run(act())
+async def test_flood_of_one_link_delays_no_press_of_another(port: Port) -> None:
+    port.pipe.status = STOPPED
+    await exhaust(port, port.vera)
+    assert await port.stop(port.otto) == (200, "confirmed")
 
 
-def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
-    async def act() -> None:
-        port.pipe.status = STOPPED
-        await exhaust(port, port.vera)
-        port.pipe.status, sent = RUNS, len(port.pipe.presses)
-        assert await port.stop(port.vera, "three") == (202, "requested")
-        assert [each.cause.press for each in port.pipe.presses[sent:]] == ["three"]
-
-    asyncio.run(act())
+async def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> None:
+    port.pipe.status = STOPPED
+    await exhaust(port, port.vera)
+    port.pipe.status, sent = RUNS, len(port.pipe.presses)
+    assert await port.stop(port.vera, "three") == (202, "requested")
+    assert [each.cause.press for each in port.pipe.presses[sent:]] == ["three"]
 
 
-def test_delayed_press_counts_once_the_stop_is_cleared(
+async def test_delayed_press_counts_once_the_stop_is_cleared(
     port: Port, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(port.server._often, "_rate", 0.0)
-
-    async def act() -> None:
-        port.pipe.status = STOPPED
-        await exhaust(port, port.vera)
-        monkeypatch.setattr(stop_server, "DELAY", 0.05)
-        sent = len(port.sent)
-        press = asyncio.create_task(port.stop(port.vera, "three"))
-        await asyncio.sleep(0.0)
-        port.pipe.status = RUNS
-        assert await press == (202, "requested")
-        assert port.sent[sent:] == ["three"]
-
-    asyncio.run(act())
+    port.pipe.status = STOPPED
+    await exhaust(port, port.vera)
+    monkeypatch.setattr(stop_server, "DELAY", 0.05)
+    sent = len(port.sent)
+    press = asyncio.create_task(port.stop(port.vera, "three"))
+    await asyncio.sleep(0.0)
+    port.pipe.status = RUNS
+    assert await press == (202, "requested")
+    assert port.sent[sent:] == ["three"]
 
 
-def test_repeated_press_whose_stop_was_cleared_is_not_requested_again(port: Port) -> None:
-    async def act() -> None:
-        port.pipe.status = StopStatus(None, ("two",))
-        assert await port.stop(port.vera, "two") == (200, "cleared")
-        assert port.sent == []
-        assert await port.stop(port.vera, "three") == (202, "requested")
-
-    asyncio.run(act())
+async def test_repeated_press_whose_stop_was_cleared_is_not_requested_again(port: Port) -> None:
+    port.pipe.status = StopStatus(None, ("two",))
+    assert await port.stop(port.vera, "two") == (200, "cleared")
+    assert port.sent == []
+    assert await port.stop(port.vera, "three") == (202, "requested")
 
 
-def test_old_status_confirms_nothing(port: Port) -> None:
-    async def act() -> None:
-        port.pipe.status, port.pipe.age = STOPPED, NO_STATE
-        assert await port.stop(port.vera) == (202, "requested")
-        port.pipe.age = 0.0
-        assert await port.stop(port.vera) == (200, "confirmed")
-
-    asyncio.run(act())
+async def test_old_status_confirms_nothing(port: Port) -> None:
+    port.pipe.status, port.pipe.age = STOPPED, NO_STATE
+    assert await port.stop(port.vera) == (202, "requested")
+    port.pipe.age = 0.0
+    assert await port.stop(port.vera) == (200, "confirmed")
 
 
-def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Port) -> None:
-    async def act() -> None:
-        assert await port.stop("wrong") == (401, "")
-        await exhaust(port, "wrong")
-        assert port.pipe.presses == []
-        # They do not use up the rate of a link.
-        assert await port.stop(port.vera) == (202, "requested")
-
-    asyncio.run(act())
+async def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Port) -> None:
+    assert await port.stop("wrong") == (401, "")
+    await exhaust(port, "wrong")
+    assert port.pipe.presses == []
+    # They do not use up the rate of a link.
+    assert await port.stop(port.vera) == (202, "requested")
 
 
 async def problem_with(answer: bytes, arm_age: float) -> str:

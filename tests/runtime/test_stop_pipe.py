@@ -71,7 +71,7 @@ def arm_end(arm: ArmModel, session: Session) -> Iterator[Connection]:
     loop.stop()
 
 
-def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
+async def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
     arm: ArmModel, session: Session
 ) -> None:
     pipes: queue.Queue[Connection | None] = queue.Queue()
@@ -82,55 +82,49 @@ def test_press_is_executed_and_confirmed_and_survives_a_new_arm(
             raise EOFError
         return pipe
 
-    async def act() -> None:
-        stop_pipe = StopPipe(connect)
-        # Before the arm is there.
-        stop_pipe.press(press("one"))
-        assert await stop_pipe.executed("one", 0.1) is None
-        with arm_end(arm, session) as first:
-            pipes.put(first)
-            assert await stop_pipe.executed("one", TIMEOUT) == press("one").cause
-            # The cause stays that of the first press.
-            stop_pipe.press(press("two"))
-            assert await stop_pipe.executed("two", TIMEOUT) == press("one").cause
-            assert stop_pipe.status is not None
-            assert stop_pipe.status.presses == ("one", "two")
-            assert stop_pipe.age < TIMEOUT
-        # The event loop has not learned of the end yet.
-        assert connected(stop_pipe)
-        stop_pipe.press(press("meanwhile"))
-        first.close()
-        async with asyncio.timeout(TIMEOUT):
-            while connected(stop_pipe):
-                await asyncio.sleep(0.01)
-        stop_pipe.press(press("three"))
-        with arm_end(arm, session) as second:
-            pipes.put(second)
-            assert await stop_pipe.executed("three", TIMEOUT) == press("meanwhile").cause
-            assert await stop_pipe.executed("meanwhile", TIMEOUT) is not None
-        second.close()
-        assert stop_pipe.running
-        pipes.put(None)
-        await ended(stop_pipe)
-
-    asyncio.run(act())
+    stop_pipe = StopPipe(connect)
+    # Before the arm is there.
+    stop_pipe.press(press("one"))
+    assert await stop_pipe.executed("one", 0.1) is None
+    with arm_end(arm, session) as first:
+        pipes.put(first)
+        assert await stop_pipe.executed("one", TIMEOUT) == press("one").cause
+        # The cause stays that of the first press.
+        stop_pipe.press(press("two"))
+        assert await stop_pipe.executed("two", TIMEOUT) == press("one").cause
+        assert stop_pipe.status is not None
+        assert stop_pipe.status.presses == ("one", "two")
+        assert stop_pipe.age < TIMEOUT
+    # The event loop has not learned of the end yet.
+    assert connected(stop_pipe)
+    stop_pipe.press(press("meanwhile"))
+    first.close()
+    async with asyncio.timeout(TIMEOUT):
+        while connected(stop_pipe):
+            await asyncio.sleep(0.01)
+    stop_pipe.press(press("three"))
+    with arm_end(arm, session) as second:
+        pipes.put(second)
+        assert await stop_pipe.executed("three", TIMEOUT) == press("meanwhile").cause
+        assert await stop_pipe.executed("meanwhile", TIMEOUT) is not None
+    second.close()
+    assert stop_pipe.running
+    pipes.put(None)
+    await ended(stop_pipe)
 
 
 @pytest.mark.parametrize("name", ["one", "two"])
-def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
+async def test_unknown_press_is_not_confirmed_by_an_earlier_stop(
     arm: ArmModel, session: Session, name: str
 ) -> None:
-    async def act() -> None:
-        with arm_end(arm, session) as pipe:
-            pipes = iter((pipe,))
-            stop_pipe = StopPipe(lambda: _next(pipes))
-            stop_pipe.press(press("one"))
-            cause = await stop_pipe.executed(name, TIMEOUT if name == "one" else 0.3)
-            assert (cause is not None) == (name == "one")
-        await ended(stop_pipe)
-        pipe.close()
-
-    asyncio.run(act())
+    with arm_end(arm, session) as pipe:
+        pipes = iter((pipe,))
+        stop_pipe = StopPipe(lambda: _next(pipes))
+        stop_pipe.press(press("one"))
+        cause = await stop_pipe.executed(name, TIMEOUT if name == "one" else 0.3)
+        assert (cause is not None) == (name == "one")
+    await ended(stop_pipe)
+    pipe.close()
 
 
 @pytest.mark.parametrize("failing", ["arm", "process of STOP"])

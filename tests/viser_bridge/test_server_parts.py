@@ -84,8 +84,8 @@ def test_server_has_a_websocket_server(server: viser.ViserServer) -> None:
         assert isinstance(server._websock_server, _infra.WebsockServer)
 
 
-def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> None:
-    async def trial() -> None:
+async def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> None:
+    with part("_handle_incoming_message"):
         received: list[tuple[Any, Any]] = []
         websocket = server._websock_server
         pass_on = websocket._handle_incoming_message
@@ -102,12 +102,9 @@ def test_handler_of_the_server_can_be_replaced(server: viser.ViserServer) -> Non
             assert isinstance(message, wire.ViewerCameraMessage)
             assert client_id in server.get_clients()
 
+
+async def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> None:
     with part("_handle_incoming_message"):
-        run(trial())
-
-
-def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> None:
-    async def trial() -> None:
         received: list[Any] = []
 
         async def handle(_client_id: Any, message: Any) -> None:
@@ -121,12 +118,11 @@ def test_handler_of_a_connection_can_be_replaced(server: viser.ViserServer) -> N
             await socket.send(msgspec.msgpack.encode(CAMERA))
             await until(lambda: received, "the message")
 
-    with part("_handle_incoming_message"):
-        run(trial())
 
-
-def test_first_callback_of_a_connection_comes_before_any_frame(server: viser.ViserServer) -> None:
-    async def trial() -> None:
+async def test_first_callback_of_a_connection_comes_before_any_frame(
+    server: viser.ViserServer,
+) -> None:
+    with part("_client_connect_cb"):
         websocket = server._websock_server
 
         async def refuse(connection: Any) -> None:
@@ -139,12 +135,9 @@ def test_first_callback_of_a_connection_comes_before_any_frame(server: viser.Vis
             assert closed.value.rcvd is not None
             assert closed.value.rcvd.code == 1008
 
-    with part("_client_connect_cb"):
-        run(trial())
 
-
-def test_request_of_a_connection_can_be_read(server: viser.ViserServer) -> None:
-    async def trial() -> None:
+async def test_request_of_a_connection_can_be_read(server: viser.ViserServer) -> None:
+    with part("_live_connections"):
         named: list[str] = []
         ended: list[int] = []
         websocket = server._websock_server
@@ -159,9 +152,6 @@ def test_request_of_a_connection_can_be_read(server: viser.ViserServer) -> None:
             await until(lambda: named, "the connection")
         assert named == ["here"]
         await until(lambda: ended, "the end of the connection")
-
-    with part("_live_connections"):
-        run(trial())
 
 
 def test_producer_of_frames_can_be_replaced(
@@ -224,8 +214,8 @@ def test_consumer_of_messages_can_be_replaced(
     ]
 
 
-def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> None:
-    async def trial() -> None:
+async def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> None:
+    with part("queue_message"):
         connections: list[Any] = []
         server._websock_server.on_client_connect(connections.append)
         async with browser(server) as one, browser(server) as other:
@@ -237,9 +227,6 @@ def test_message_for_one_browser_reaches_it_alone(server: viser.ViserServer) -> 
             for messages in received
         ]
         assert sorted(map(len, named)) == [0, 1]
-
-    with part("queue_message"):
-        run(trial())
 
 
 def test_control_is_found_by_its_id(server: viser.ViserServer) -> None:
@@ -323,8 +310,8 @@ def test_arrays_of_a_message_are_taken_out_of_it() -> None:
         assert [array.nbytes for array in arrays] == [32]
 
 
-def test_only_the_own_subprotocol_is_answered(server: viser.ViserServer) -> None:
-    async def trial() -> None:
+async def test_only_the_own_subprotocol_is_answered(server: viser.ViserServer) -> None:
+    with part("viser-v{version}"):
         async with browser(server) as socket:
             assert await asyncio.wait_for(socket.recv(), SECONDS)
         with suppress(ConnectionClosed):
@@ -332,22 +319,17 @@ def test_only_the_own_subprotocol_is_answered(server: viser.ViserServer) -> None
                 await asyncio.wait_for(socket.recv(), SECONDS)
                 pytest.fail("a page of another version was served")
 
-    with part("viser-v{version}"):
-        run(trial())
 
-
-def test_frames_are_built_as_ours_and_the_scene_ends_with_a_mark(server: viser.ViserServer) -> None:
+async def test_frames_are_built_as_ours_and_the_scene_ends_with_a_mark(
+    server: viser.ViserServer,
+) -> None:
     server.scene.add_frame("/frame")
-
-    async def trial() -> None:
+    with part("frame"):
         async with browser(server) as socket:
             messages = await Peer(socket).listen()
         kinds = [message["type"] for message in messages]
         assert "FrameMessage" in kinds
         assert kinds[-1] == "ReplayDoneMessage"
-
-    with part("frame"):
-        run(trial())
 
 
 def test_page_is_packed_as_its_loader_unpacks_it() -> None:
