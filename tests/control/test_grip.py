@@ -167,9 +167,8 @@ def test_opened_fingers_leave_the_cup_on_the_table(
 
 
 def test_one_touching_finger_does_not_grasp_and_is_reported(
-    session: Session, arm: MountedArm
+    session: Session, state: State, arm: MountedArm
 ) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
     state = rested(session, state, cmd.Gripper(OPEN), cmd.Tool("grasp"))
     for back in (BEFORE, AT):
         q = before_cup(session, arm, state, back, offset=0.008)
@@ -197,8 +196,7 @@ def scene_object(name: str = "box", **changed: Any) -> SceneObject:
     return SceneObject(**(fields | changed))
 
 
-def test_objects_are_replaced_by_name_and_limited_in_number(session: Session) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
+def test_objects_are_replaced_by_name_and_limited_in_number(session: Session, state: State) -> None:
     commands: list[cmd.Command] = [
         cmd.PlaceObject(scene_object(f"box {n}")) for n in range(2 * MAX_OBJECTS)
     ]

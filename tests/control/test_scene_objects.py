@@ -156,8 +156,7 @@ def test_detached_object_stays_in_place_or_is_put_on_the_table(
         np.testing.assert_allclose(left.T[:3, 2], (0.0, 0.0, 1.0), atol=1e-12)
 
 
-def test_scene_is_replaced_in_one_step(session: Session) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
+def test_scene_is_replaced_in_one_step(session: Session, state: State) -> None:
     cup = next(scene_object for scene_object in state.objects if scene_object.name == "cup")
     state = session.step(state, [cmd.ReplaceScene((cup, knot(standing(0.4, 0.3))), 1e-4)], TICK)
     assert [scene_object.name for scene_object in state.objects] == ["cup", "knot"]

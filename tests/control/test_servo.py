@@ -266,8 +266,7 @@ def test_other_command_ends_the_stream(session: Session) -> None:
         assert state.servo is None
 
 
-def test_sample_drives_the_fingers_too(session: Session) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
+def test_sample_drives_the_fingers_too(session: Session, state: State) -> None:
     gripper = session.require_arm().gripper
     target = gripper.clamp(0.5 * (gripper.opened + gripper.closed))
     for _ in range(3):

@@ -53,12 +53,11 @@ def seen(state: State, *objects: SceneObject, near: str = "") -> State:
 
 
 def test_mesh_is_drawn_again_only_when_necessary(
-    server: viser.ViserServer, session: Session, mesh: Mesh
+    server: viser.ViserServer, state: State, mesh: Mesh
 ) -> None:
     meshes = Meshes()
     meshes.put([mesh], ())
     nodes = SceneObjectNodes(server, load_props(), Environment(None, None), meshes)
-    state = session.begin(session.ready, 0.0, 0.0)
     scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
 
     def node(name: str = "shape") -> viser.SceneNodeHandle:
@@ -106,10 +105,9 @@ def test_mesh_is_drawn_again_only_when_necessary(
 
 
 def test_mesh_without_triangles_is_drawn_as_its_convex_body(
-    server: viser.ViserServer, session: Session, mesh: Mesh
+    server: viser.ViserServer, state: State, mesh: Mesh
 ) -> None:
     nodes = SceneObjectNodes(server, load_props(), Environment(None, None), Meshes())
-    state = session.begin(session.ready, 0.0, 0.0)
     scene_object = SceneObject("it", Shape.MESH, (), np.eye(4), solid=mesh.solid)
     nodes.follow(seen(state, scene_object))
     shape = internals.nodes(server)[f"{PATH}/shape"]
@@ -176,9 +174,8 @@ def test_cup_dragged_beyond_the_table_waits_at_its_edge(
 
 
 def test_panel_shows_the_chosen_object(
-    server: viser.ViserServer, session: Session, mesh: Mesh
+    server: viser.ViserServer, session: Session, state: State, mesh: Mesh
 ) -> None:
-    state = session.begin(session.ready, 0.0, 0.0)
     panel = ObjectsPanel(server, RecordedGestures(), lambda: state, lambda: session.environment)
     assert panel._choice.value == NOTHING
     scene_object = SceneObject(
