@@ -80,17 +80,20 @@ def jacobian_batch(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
 
     The Jacobian is in the frame of the tool, as that of `jacobian_body`.
     """
-    J = np.empty((6, chain.n, len(q)))
-    T = forward_columns(chain, q.T, J)
-    return T.transpose(2, 0, 1), J.transpose(2, 0, 1)
+    stages = np.empty((chain.n, 3, 4, len(q)))
+    T = forward_columns(chain, q.T, stages).transpose(2, 0, 1)
+    R, J = stages[:, :, :3], np.empty((len(q), 6, chain.n))
+    np.einsum("njic,jn->cin", R, chain.S[:3], out=J[:, :3])
+    np.einsum("njic,njc->cin", R, stages[:, :, 3], out=J[:, 3:])
+    return T, J
 
 
-def forward_columns(chain: Chain, q: FloatArray, J: FloatArray | None = None) -> FloatArray:
+def forward_columns(chain: Chain, q: FloatArray, stages: FloatArray | None = None) -> FloatArray:
     """Return T_S_tool (4, 4, C) at q (n, C).
 
     Each factor is exp(hat(S_i) q_i) = I + sin X + (1 - cos) X^2. Before the factor of a joint, T is
-    the pose of the tool with this joint at the base, where X gives the velocity of the tool point.
-    `J` (6, n, C) takes the Jacobian from there.
+    the pose of the tool with this joint at the base: ``stages`` (n, 3, 4, C) takes its rotation,
+    and the velocity of the tool point by the joint.
     """
     T: FloatArray = np.empty((4, 4, q.shape[1]))
     T[:] = chain.M[:, :, None]
@@ -98,9 +101,8 @@ def forward_columns(chain: Chain, q: FloatArray, J: FloatArray | None = None) ->
         flat = T.reshape(4, -1)
         turned = (chain.generators[i] @ flat).reshape(T.shape)
         twice = (chain.generators_squared[i] @ flat).reshape(T.shape)
-        if J is not None:
-            J[:3, i] = np.einsum("jin,j->in", T[:3, :3], chain.S[:3, i])
-            J[3:, i] = np.einsum("jin,jn->in", T[:3, :3], turned[:3, 3])
+        if stages is not None:
+            stages[i, :, :3], stages[i, :, 3] = T[:3, :3], turned[:3, 3]
         turned *= q[i] if chain.slides[i] else np.sin(q[i])
         twice *= 2.0 * np.sin(0.5 * q[i]) ** 2
         T += turned
