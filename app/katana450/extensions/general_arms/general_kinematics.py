@@ -87,7 +87,8 @@ def in_order_for_people(branches: tuple[str, ...]) -> tuple[str, ...]:
 
 def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:
     """Return `q` (n,) [rad], each angle in the turn nearest to ``near`` inside its limits."""
-    q = np.where(chain.slides, q, q + math.tau * np.round((near - q) / math.tau))
+    turns = np.round((near - q) / math.tau)
+    q = q + math.tau * (np.where(chain.slides, 0.0, turns) if any(chain.slides) else turns)
     slack = tolerances.LIMIT_SLACK
     for turn in (math.tau, -math.tau):
         outside = (q < chain.lower - slack) | (q > chain.upper + slack)
