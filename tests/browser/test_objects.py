@@ -151,6 +151,7 @@ def test_chosen_file_is_refused_or_placed_changed_and_removed(
     page.page.set_input_files("#object-file", ring)
     page.wait_until(lambda: "2304 triangles, 104 × 104 × 24 mm" in shown(page), "the answer")
     assert "assumed to be mm" in shown(page)
+    page.wait_until(lambda: "ring" in objects(reader), "the object")
     np.testing.assert_allclose(place_of(reader, "ring"), (0.36, 0.0, 0.0), atol=1e-6)
 
     # Its handle in the scene, by a click on it.
