@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
 from katana450.client import connect as connect_program
 from katana450.server.api import answers, requests
@@ -142,7 +142,7 @@ async def pour_in(count: int, mutant: Callable[[], bytes], line: Callable[[], An
     sent = lines = 0
     while sent < count:
         lines += 1
-        with suppress(ConnectionClosed, ConnectionError, InvalidStatus):
+        with suppress(ConnectionClosed, ConnectionError, InvalidHandshake):
             async with line() as send:
                 while sent < count:
                     sent += 1
@@ -158,6 +158,14 @@ class WebLine:
         self._stack = AsyncExitStack()
 
     async def __aenter__(self) -> Send:
+        try:
+            return await self._opened()
+        except BaseException:
+            # Of several connections the last was refused.
+            await self._stack.aclose()
+            raise
+
+    async def _opened(self) -> Send:
         page = page_name()
         cookie = enter(self._url)
         if "{page}" in self._path and "viser" in self._path:
