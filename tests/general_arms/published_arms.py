@@ -50,36 +50,35 @@ def degrees(*ends: float) -> list[float]:
     return [math.radians(end) for end in ends]
 
 
-# Universal Robots, DH parameters for calculations of kinematics and dynamics.
-UR5E = craig(
-    [
-        (0.0, 0.0, 0.1625, 0.0),
-        (QUARTER, 0.0, 0.0, 0.0),
-        (0.0, -0.425, 0.0, 0.0),
-        (0.0, -0.3922, 0.1333, 0.0),
-        (QUARTER, 0.0, 0.0997, 0.0),
-        (-QUARTER, 0.0, 0.0996, 0.0),
-    ],
-    degrees(*[-360.0] * 6),
-    degrees(*[360.0] * 6),
-)
+def ur5e(quarter: float = QUARTER, twist_4: float = 0.0, length_6: float = 0.0) -> Chain:
+    """Return a UR5e by the DH parameters of Universal Robots, or one that is off by a little.
+
+    Args:
+        quarter: twists of links 2 and 5 [rad]; that of link 6 is exact, as in their file.
+        twist_4: twist of link 4, between two parallel axes [rad].
+        length_6: length of link 6, between two axes that meet [m].
+    """
+    return craig(
+        [
+            (0.0, 0.0, 0.1625, 0.0),
+            (quarter, 0.0, 0.0, 0.0),
+            (0.0, -0.425, 0.0, 0.0),
+            (twist_4, -0.3922, 0.1333, 0.0),
+            (quarter, 0.0, 0.0997, 0.0),
+            (-QUARTER, length_6, 0.0996, 0.0),
+        ],
+        degrees(*[-360.0] * 6),
+        degrees(*[360.0] * 6),
+    )
+
+
+UR5E = ur5e()
 
 WRITTEN = 1.570796327
 """A right angle as Universal Robots writes it."""
 
 # The same with the digits of ur_description, default_kinematics of the UR5e.
-UR5E_FILE = craig(
-    [
-        (0.0, 0.0, 0.1625, 0.0),
-        (WRITTEN, 0.0, 0.0, 0.0),
-        (0.0, -0.425, 0.0, 0.0),
-        (0.0, -0.3922, 0.1333, 0.0),
-        (WRITTEN, 0.0, 0.0997, 0.0),
-        (-QUARTER, 0.0, 0.0996, 0.0),
-    ],
-    degrees(*[-360.0] * 6),
-    degrees(*[360.0] * 6),
-)
+UR5E_FILE = ur5e(WRITTEN)
 
 # Armstrong, Khatib & Burdick (1986).
 PUMA_560 = craig(

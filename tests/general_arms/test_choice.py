@@ -34,6 +34,7 @@ from tests.general_arms.published_arms import (
     SKEWED_6,
     UR5E,
     craig,
+    ur5e,
 )
 from tests.kinematics.conftest import katana
 
@@ -152,19 +153,7 @@ def test_missing_condition_is_named(chain: Chain, missing: str) -> None:
 
 
 def test_rounded_file_is_solved_as_the_exact_arm_that_it_means() -> None:
-    quarter = round(QUARTER, 5)
-    rounded = craig(
-        [
-            (0.0, 0.0, 0.1625, 0.0),
-            (quarter, 0.0, 0.0, 0.0),
-            (0.0, -0.425, 0.0, 0.0),
-            (2e-6, -0.3922, 0.1333, 0.0),
-            (quarter, 0.0, 0.0997, 0.0),
-            (-quarter, 3e-6, 0.0996, 0.0),
-        ],
-        UR5E.lower.tolist(),
-        UR5E.upper.tolist(),
-    )
+    rounded = ur5e(round(QUARTER, 5), twist_4=2e-6, length_6=3e-6)
     exact, notes = exact_arm(rounded)
     assert len(notes) == 1
     assert "nearest exact arm" in notes[0]
@@ -176,18 +165,7 @@ def test_rounded_file_is_solved_as_the_exact_arm_that_it_means() -> None:
 
 
 def test_deviation_beyond_rounding_is_no_closed_form() -> None:
-    bent = craig(
-        [
-            (0.0, 0.0, 0.1625, 0.0),
-            (QUARTER, 0.0, 0.0, 0.0),
-            (0.0, -0.425, 0.0, 0.0),
-            (math.radians(0.1), -0.3922, 0.1333, 0.0),
-            (QUARTER, 0.0, 0.0997, 0.0),
-            (-QUARTER, 0.0, 0.0996, 0.0),
-        ],
-        UR5E.lower.tolist(),
-        UR5E.upper.tolist(),
-    )
+    bent = ur5e(twist_4=math.radians(0.1))
     assert kinematics_of(bent).method.startswith("elimination for six axes with an offset wrist")
     q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
     found = kinematics_of(bent).inverse(forward(bent, q))

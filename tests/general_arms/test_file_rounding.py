@@ -35,22 +35,11 @@ from tests.general_arms.published_arms import (
     UR5E,
     UR5E_FILE,
     WRITTEN,
-    craig,
+    ur5e,
 )
 
 # Axes 3 and 4 are as far off parallel as some calibrations are.
-ALMOST = craig(
-    [
-        (0.0, 0.0, 0.1625, 0.0),
-        (QUARTER, 0.0, 0.0, 0.0),
-        (0.0, -0.425, 0.0, 0.0),
-        (3e-8, -0.3922, 0.1333, 0.0),
-        (QUARTER, 0.0, 0.0997, 0.0),
-        (-QUARTER, 4e-8, 0.0996, 0.0),
-    ],
-    UR5E.lower.tolist(),
-    UR5E.upper.tolist(),
-)
+ALMOST = ur5e(twist_4=3e-8, length_6=4e-8)
 ARMS = {
     "almost parallel": ALMOST,
     "UR5e": UR5E,
