@@ -114,7 +114,7 @@ def test_plan_waits_while_its_samples_are_late(
     monkeypatch.setattr(motion_plan, "MAX_WAIT", 0.3)
     samples.clear()
     number = 10_000
-    with pytest.raises(RefusedError, match=r"arrived 0.5 s late") as raised:
+    with pytest.raises(RefusedError, match=r"arrived [\d.]+ s late") as raised:
         plan.run(client)
     assert raised.value.retry == 0.1
 
