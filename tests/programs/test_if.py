@@ -66,6 +66,9 @@ def test_steps_are_repeated_until_a_condition_holds(stage: Stage, empty: State) 
     program = planned(stage, text.replace("TIME", "3"), empty)
     _, states = stage.play(program, empty)
     assert turned(empty, states[-1], 5) == pytest.approx(20.0, abs=1e-6)
+    # The rounds that are not expected take no time on the clock of the program.
+    took = states[-1].t - empty.t
+    assert program.duration == pytest.approx(took, abs=0.03 * len(program.tasks))
     # One that never holds ends after the last repetition.
     program = planned(stage, text.replace("TIME", "90"), empty)
     _, states = stage.play(program, empty)
@@ -118,12 +121,19 @@ def test_step_after_the_same_end_is_planned_once(stage: Stage, empty: State) -> 
     paths = [task for task in program.tasks if isinstance(task.action, FollowPlan)]
     assert [task.number for task in paths] == [1, 2, 3, 4, 5, 6]
     seconds = [task.action.plan.duration for task in paths if isinstance(task.action, FollowPlan)]
-    # The duration and the time left are those of the longest run.
+    # One clock: duration, preview and time left are those of the predicted run, here of `else`.
     assert program.duration == pytest.approx(sum(seconds[2:]))
-    assert program.duration > seconds[0] + seconds[1] + seconds[5]
+    assert Timeline.of(program).span == program.duration
     left = runner.seconds_left(program, Run(0.0), empty)
     assert left == pytest.approx(program.duration)
-    run, states = stage.play(program, with_water(stage, 60.0))
+    full = with_water(stage, 60.0)
+    then = planned(stage, text, full)
+    shorter = seconds[0] + seconds[1] + seconds[5]
+    assert then.duration == pytest.approx(shorter) == Timeline.of(then).span
+    # A run that takes another alternative counts that one as soon as it has chosen.
+    chosen = Run(0.0, number=program.tasks[1].action.then)
+    assert runner.seconds_left(program, chosen, full) == pytest.approx(shorter)
+    run, states = stage.play(program, full)
     assert run.phase is Phase.DONE
     assert turned(empty, states[-1], 1) == pytest.approx(3.0)
 

@@ -136,8 +136,8 @@ def _print_tasks(program: Program) -> None:
                 apart = 1e3 * plan.nearest.contact.distance
                 details += f", {apart:.0f} mm from {one} to {other}"
         print(f"line {task.line:>4}  {task.name:<24} {details}".rstrip())
-    longest = "at most " if program.alternatives else ""
-    print(f"{program.steps} steps, {longest}about {program.duration:.2f} s.")
+    if_so = ", if its conditions hold as planned" if program.alternatives else ""
+    print(f"{program.steps} steps, about {program.duration:.2f} s{if_so}.")
 
 
 def _labels(program: Program) -> dict[int, list[str]]:

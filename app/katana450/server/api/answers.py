@@ -62,7 +62,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         line: Line of the present step in the script.
         task: Present task in words.
         fraction: Fraction of the task that is done, or of all planning.
-        seconds: Expected duration of the longest possible run [s].
+        seconds: Expected duration of the run if its conditions hold as planned [s].
         seconds_left: Expected time until the run ends [s], on the same clock; 0 if none runs.
         why: What is wrong with the program, why it was planned again or not run, or which times of
             the script it does not keep.

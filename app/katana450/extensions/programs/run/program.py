@@ -97,57 +97,52 @@ class Program:
         return self.next(number)[0]
 
     @cached_property
-    def duration(self) -> float:
-        """Expected duration [s] of the longest possible run, at the speeds of the program."""
-        return self.time_from(self.first, 1.0)
+    def schedule(self) -> tuple[ExpectedTask, ...]:
+        """The predicted run from its first task, at the speeds of the program."""
+        return self.expected(self.first, self.speed)
 
-    def time_from(
-        self, number: int, speed: float, left: float | None = None, allowed: float = 1.0
-    ) -> float:
-        """Return the expected time [s] from the task ``number`` to the end, of the longest run.
+    @property
+    def duration(self) -> float:
+        """Expected duration [s] of the predicted run, at the speeds of the program."""
+        return self.schedule[-1].end
+
+    def expected(
+        self,
+        number: int,
+        speed: float,
+        *,
+        begin: float = 0.0,
+        left: float | None = None,
+        allowed: float = 1.0,
+    ) -> tuple[ExpectedTask, ...]:
+        """Return the tasks of the predicted run from the task ``number``, in their order.
 
         This is the one clock of a program: of its preview, its list of steps and its time left.
+        Where the planning cannot predict a condition, ``else`` counts.
 
         Args:
             number: index of the task.
             speed: fraction of full speed, until a task sets another.
+            begin: time since the run began [s].
             left: expected time to the end of the task itself [s], if it has begun.
             allowed: maximum fraction of full speed that a task may set.
         """
-        latest = {number: (0.0, speed)}
-        for index in range(number, len(self.tasks)):
-            if index not in latest:
-                # It belongs to an alternative that is not taken.
-                continue
-            end, speed = latest[index]
-            action = self.tasks[index].action
-            if isinstance(action, SetSpeed):
-                speed = min(action.scale(self.speed), allowed)
-            end += expected_time(action, speed) if left is None or index > number else left
-            for following in self.next(index):
-                if following not in latest or end > latest[following][0]:
-                    latest[following] = end, speed
-        return latest[len(self.tasks)][0]
-
-    @cached_property
-    def schedule(self) -> tuple[ExpectedTask, ...]:
-        """The predicted tasks in their order, with their expected times."""
-        schedule: list[ExpectedTask] = []
-        number, elapsed, speed = self.first, 0.0, self.speed
+        tasks: list[ExpectedTask] = []
         while number < len(self.tasks):
             action = self.tasks[number].action
             if isinstance(action, SetSpeed):
-                speed = action.scale(self.speed)
-            begin, elapsed = elapsed, elapsed + expected_time(action, speed)
-            schedule.append(ExpectedTask(number, begin, elapsed, speed))
+                speed = min(action.scale(self.speed), allowed)
+            end = begin + (expected_time(action, speed) if left is None else left)
+            tasks.append(ExpectedTask(number, begin, end, speed))
+            begin, left = end, None
             if isinstance(action, ConditionalJump):
                 holds = action.predicted
                 if isinstance(action.condition, ProgramTime):
-                    holds = action.condition.has(elapsed)
+                    holds = action.condition.has(end)
                 number = action.then if holds else action.otherwise
             else:
                 number = self.next(number)[0]
-        return tuple(schedule)
+        return tuple(tasks)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -129,23 +129,24 @@ def _tau(program: Program, run: Run, state: State) -> float:
 def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0) -> float:
     """Return the expected time until ``run`` ends [s], without pauses.
 
-    Of alternatives the longer one counts. ``allowed`` is the maximum fraction of full speed for the
-    tasks to come.
+    Alternatives that are still ahead count as they are predicted. ``allowed`` is the maximum
+    fraction of full speed for the tasks to come.
     """
     if run.phase is not Phase.RUNNING:
         return 0.0
-    if not run.started:
-        # A command for the speed may still be on its way to the arm.
-        speed = min(run.speed.scale(program.speed), allowed)
-        return program.time_from(run.number, speed, allowed=allowed)
-    action, speed = program.tasks[run.number].action, state.speed
-    left = expected_time(action, speed)
-    if isinstance(action, FollowPlan):
-        rest = 1.0 - action.fraction(state, run.waited)
-        left = min(left, rest * action.plan.duration_at(speed))
-    else:
-        left = max(left - run.waited, 0.0)
-    return program.time_from(run.number, speed, left, allowed)
+    left = None
+    # A command for the speed may still be on its way to the arm.
+    speed = state.speed if run.started else min(run.speed.scale(program.speed), allowed)
+    if run.started:
+        action = program.tasks[run.number].action
+        left = expected_time(action, speed)
+        if isinstance(action, FollowPlan):
+            rest = 1.0 - action.fraction(state, run.waited)
+            left = min(left, rest * action.plan.duration_at(speed))
+        else:
+            left = max(left - run.waited, 0.0)
+    tasks = program.expected(run.number, speed, begin=run.elapsed, left=left, allowed=allowed)
+    return tasks[-1].end - run.elapsed
 
 
 def skipped(program: Program, run: Run) -> tuple[int, ...]:
