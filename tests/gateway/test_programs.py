@@ -193,11 +193,13 @@ def test_program_begins_at_a_step_and_pauses_before_another(ready: Client) -> No
     ready.ask(Steer(order=ProgramOrder.RUN, at=2))
     paused = wait(ready, lambda each: each.status == "paused")
     assert (paused.step, paused.steps, paused.breakpoints) == (3, 3, (3,))
+    assert paused.skipped == (1,)
     assert posture(ready)[0] == pytest.approx(np.deg2rad(24.0), abs=1e-9)
     # A program that rests may go to another step.
     ready.ask(Breakpoints(steps=()))
     ready.ask(Steer(order=ProgramOrder.RUN, at=3))
-    assert ended(ready).status == "done"
+    done = ended(ready)
+    assert (done.status, done.skipped) == ("done", (1, 2))
     assert posture(ready) == pytest.approx(END, abs=1e-9)
 
 

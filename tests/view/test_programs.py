@@ -23,7 +23,7 @@ from katana450.extensions.programs.run.simulation import Timeline
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import Scripts, library_file, script_text
 from katana450.extensions.programs.server.panel import PanelAccess, ProgramsPanel, _page
-from katana450.extensions.programs.server.step_list import ListedStep, steps_of
+from katana450.extensions.programs.server.step_list import ListedStep, marks, steps_of
 from katana450.extensions.programs.server.step_list import page as step_page
 from katana450.extensions.water import WORTH_SHOWING
 from katana450.maths.kinematics.forward import forward
@@ -56,12 +56,38 @@ def test_texts_are_escaped_in_markup() -> None:
     page = _page(Progress(name="<b>x", by="me", status="refused", why="line 1: <script>\nline 2"))
     assert "&lt;b&gt;x" in page
     assert "<script>" not in page
-    assert "a while" in _page(Progress(name="", by="me", status="planning"))
-    progress = Progress(
-        name="x", by="me", status="paused", step=2, steps=3, line=7, task="line", fraction=0.5
-    )
-    assert "Step 2 of 3, line 7: line, 50%" in _page(progress)
-    assert _page(None) == ""
+    ready = Progress(name="x", by="me", status="ready", steps=3, seconds=2.51)
+    assert "3 steps, about 2.6 s" in _page(ready)
+
+
+@pytest.mark.parametrize("status", ["planning", "running", "paused", "blocked"])
+def test_panel_does_not_repeat_what_the_bar_says(status: str) -> None:
+    progress = Progress(name="x", by="me", status=status, step=2, steps=3, task="line")
+    assert _page(progress) == _page(None) == ""
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        ("ready", ["", "", "shown", "", ""]),
+        ("running", ["done", "skipped", "now", "next", ""]),
+        ("paused", ["done", "skipped", "now", "next", ""]),
+        ("stopped", ["done", "skipped", "ended here", "", ""]),
+        ("failed", ["done", "skipped", "ended here", "", ""]),
+        ("done", ["done", "skipped", "done", "done", "done"]),
+    ],
+)
+def test_list_marks_what_is_done_current_and_next(status: str, words: list[str]) -> None:
+    steps = tuple(ListedStep(name, 1.0) for name in "abcde")
+    progress = Progress(name="x", by="me", status=status, step=3, steps=5, skipped=(2,))
+    assert list(marks(steps, progress, 2.5)) == words
+    assert set(marks(steps, progress, 0.0)) <= {*words, ""}
+
+
+def test_step_that_is_not_expected_is_not_next() -> None:
+    steps = (ListedStep("if", 0.0), ListedStep("a", 1.0, "then", False), ListedStep("b", 1.0))
+    at_if = Progress(name="x", by="me", status="running", step=1, steps=3)
+    assert marks(steps, at_if, 0.0) == ("now", "", "next")
 
 
 class Stage:
@@ -128,16 +154,16 @@ def marked(panel: ProgramsPanel) -> list[str]:
 
 
 def test_names_of_steps_are_escaped_in_markup() -> None:
-    text = step_page((ListedStep("<b>", 1.25), ListedStep("wait", 0.0)), 1, (2,))
+    text = step_page((ListedStep("<b>", 1.25), ListedStep("wait", 0.0)), ("done", "now"), (2,))
     first, second = text.split("<li")[1:]
-    assert "<span>&lt;b&gt;</span><span>1.2 s</span>" in first
+    assert "<span>&lt;b&gt;</span><span>done 1.2 s</span>" in first
     assert "aria-label='Pause before step 1'" in first
     assert "aria-pressed=false" in first
     assert second.startswith(" aria-current=step>")
-    assert "<span>wait</span><span></span>" in second
+    assert "<span>wait</span><span>now</span>" in second
     assert "aria-pressed=true" in second
     assert "aria-label='Run from step 2'" in second
-    assert step_page((), None) == ""
+    assert step_page((), ()) == ""
 
 
 def test_preview_shows_the_arm_along_the_path_until_the_program_runs(

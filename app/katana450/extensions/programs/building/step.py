@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from katana450.extensions.programs.building.conditions import Condition
 from katana450.extensions.programs.building.plan_state import PlanState
@@ -16,15 +16,28 @@ STEPS: dict[str, type[Step]] = {}
 
 
 class Step(Declared):
-    """A program step: declared fields, and how it is planned."""
+    """A program step: declared fields, and how it is planned.
+
+    Attributes:
+        word: its name in a script; "" for a base class.
+    """
+
+    word: ClassVar[str] = ""
 
     def __init_subclass__(cls, word: str = "", **options: Any) -> None:
         """Enter the class as the step ``word``, which is also its noun in messages."""
         super().__init_subclass__(**options)
         if word:
-            STEPS[word] = cls
+            STEPS[word], cls.word = cls, word
             if "noun" not in vars(cls):
                 cls.noun = f"an {word}" if word[0] in "aeiou" else f"a {word}"
+
+    @property
+    def title(self) -> str:
+        """The name of the step for people: its word, and the text that may follow it alone."""
+        text = getattr(self, self.short, "")
+        words = self.word.replace("_", " ")
+        return f"{words} {text}" if isinstance(text, str) and text else words
 
     @abstractmethod
     def build(self, plan: PlanState) -> PlanState:
@@ -67,6 +80,17 @@ def count(steps: Iterable[LocatedStep]) -> int:
         else 1
         for located in steps
     )
+
+
+def titles(steps: Iterable[LocatedStep]) -> Iterator[str]:
+    """Yield the name of each of ``steps`` for people, with those of all alternatives."""
+    for located in steps:
+        step = located.step
+        if isinstance(step, Conditional):
+            yield f"if {step.condition.words}"
+            yield from titles((*step.then, *step.otherwise))
+        else:
+            yield step.title
 
 
 class NumberedStep(NamedTuple):

@@ -97,10 +97,7 @@ def continued(interruption: Interruption, plan_context: PlanContext, state: Stat
             tau = _nearest(action.plan, run.tau, state.setpoint)
         q = action.plan.q(tau)
         action = replace(action, tau=tau)
-    # The list of steps takes the name of a step from its first task.
-    step = [
-        changed_task.name for changed_task in program.tasks if changed_task.number == task.number
-    ][-1].partition(":")[0]
+    step = program.titles[task.number]
     added = [replace(task, name=f"{step}: speed", action=run.speed, after=None)]
     if interruption.situation.tool not in ("", state.tool):
         tool = UseTool(interruption.situation.tool)

@@ -17,6 +17,7 @@ from katana450.extensions.programs.building.step import (
     LocatedStep,
     count,
     numbered,
+    titles,
 )
 from katana450.extensions.programs.language.step_target import ScriptFrame
 from katana450.extensions.programs.run.compiler import Compiler, ConditionalJump, Report
@@ -63,18 +64,31 @@ class Program:
         start: (5,) posture [rad] from which the program must start.
         tasks: the actions in the order of their execution. Those of an ``if`` jump forward. Steps
             after an ``if`` are there once for each situation in which they are planned.
-        steps: number of steps of the script, with those of all alternatives.
+        titles: names of the steps of the script, with those of all alternatives.
         alternatives: the alternatives of each ``if``, in their order.
         first: index of the task with which a run begins.
+        first_step: index of the step that was chosen as the first one.
     """
 
     name: str
     speed: float
     start: FloatArray
     tasks: tuple[Task, ...]
-    steps: int
+    titles: tuple[str, ...]
     alternatives: tuple[Alternatives, ...] = ()
     first: int = 0
+    first_step: int = 0
+
+    @cached_property
+    def left_out(self) -> tuple[int, ...]:
+        """Indices of the steps before the first one, without those that set tool and speed."""
+        planned = {task.number for task in self.tasks[1:]}
+        return tuple(step for step in range(self.first_step) if step not in planned)
+
+    @property
+    def steps(self) -> int:
+        """The number of steps."""
+        return len(self.titles)
 
     def next(self, number: int) -> tuple[int, ...]:
         """Return the tasks that may follow the task ``number``.
@@ -186,8 +200,15 @@ def compiled(
     plan = PlanState(plan_context, state, frame).standing(state.setpoint)
     tasks = Compiler(script, plan, report).tasks(first_step)
     total_speed = script.speed * speed
-    steps, alternatives = count(script.steps), tuple(_alternatives(script.steps, 0))
-    return Program(script.name, total_speed, state.setpoint, tasks, steps, alternatives)
+    return Program(
+        script.name,
+        total_speed,
+        state.setpoint,
+        tasks,
+        tuple(titles(script.steps)),
+        tuple(_alternatives(script.steps, 0)),
+        first_step=first_step,
+    )
 
 
 def _alternatives(steps: Sequence[LocatedStep], first: int) -> Iterator[Alternatives]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import chain
 
 from katana450.arm.control.commands import commands as cmd
 from katana450.arm.control.state.messages import finding_text, part
@@ -150,14 +151,14 @@ def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0)
 
 
 def skipped(program: Program, run: Run) -> tuple[int, ...]:
-    """Return the steps, from 1, of the alternatives that ``run`` has not taken."""
+    """Return the steps, from 1, that ``run`` leaves out: before its first, or not chosen."""
     held = dict(run.choices)
-    return tuple(
-        step + 1
+    others = (
+        range(otherwise, end) if held[number] else range(number + 1, otherwise)
         for number, otherwise, end in program.alternatives
         if number in held
-        for step in (range(otherwise, end) if held[number] else range(number + 1, otherwise))
     )
+    return tuple(step + 1 for step in chain(program.left_out, *others))
 
 
 def _check_slip(state: State) -> None:

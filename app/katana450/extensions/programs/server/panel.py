@@ -18,13 +18,12 @@ from katana450.arm.control.state.state import State
 from katana450.arm.robot.robot import Robot
 from katana450.errors import KatanaError, LeaseError
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.run.runner import Phase
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import Scripts
 from katana450.extensions.programs.server import step_list
 from katana450.extensions.programs.server.preview import TIME_STEP, Preview
 from katana450.extensions.programs.server.program_runner import ProgramRunner
-from katana450.extensions.programs.server.state_line import RUNS
+from katana450.extensions.programs.server.state_line import ENDED, RUNS
 from katana450.extensions.programs.server.step_list import ListedStep
 from katana450.extensions.programs.server.traces import DRIVEN
 from katana450.server.api.answers import Progress
@@ -39,10 +38,6 @@ ORDERS = {
     "Step": ProgramOrder.STEP,
 }
 """The order that each button gives to the program."""
-
-
-ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
-"""Statuses of a program whose run has ended."""
 
 
 class PanelAccess:
@@ -235,10 +230,9 @@ class ProgramsPanel:
 
     def _follow_steps(self, progress: Progress | None) -> None:
         look = 0.0 if self._look.disabled else self._look.value
-        current = step_list.current_step(self._steps, progress, look)
+        marks = step_list.marks(self._steps, progress, look)
         breakpoints = () if progress is None else progress.breakpoints
-        skipped = () if progress is None else progress.skipped
-        page = step_list.page(self._steps, current, breakpoints, skipped)
+        page = step_list.page(self._steps, marks, breakpoints)
         if page != self._list.content:
             self._list.content, self._list.visible = page, bool(page)
 
@@ -326,27 +320,12 @@ def _edit_button(name: str) -> str:
 
 
 def _page(progress: Progress | None) -> str:
-    """Return the progress as HTML; empty without one."""
-    lines = []
-    if progress is not None:
-        head = f"<b>{escape(progress.name)}</b> " if progress.name else ""
-        lines.append(f"{head}{escape(progress.status)}")
-        if progress.status in RUNS:
-            lines.append(
-                f"Step {progress.step} of {progress.steps}, line {progress.line}: "
-                f"{escape(progress.task)}, {progress.fraction:.0%}"
-            )
-        elif progress.status == "planning":
-            lines.append("The whole script is planned before the arm moves. This may take a while.")
-            if progress.steps:
-                step_text = f"Step {progress.step} of {progress.steps}: {escape(progress.task)}"
-                lines.append(
-                    f"{step_text}, {progress.fraction:.0%}"
-                    f"<progress value='{progress.fraction:.2f}'></progress>"
-                )
-        elif progress.status == "ready":
-            seconds = shown_seconds(progress.seconds)
-            lines.append(f"{progress.steps} steps, about {seconds:.1f} s")
-        lines += [escape(line) for line in progress.why.splitlines()]
+    """Return what the bar does not say of a program as HTML; empty for one that is under way."""
+    if progress is None or progress.status in (*RUNS, "planning"):
+        return ""
+    lines = [f"<b>{escape(progress.name)}</b> {escape(progress.status)}"]
+    if progress.status == "ready":
+        lines.append(f"{progress.steps} steps, about {shown_seconds(progress.seconds):.1f} s")
+    lines += [escape(line) for line in progress.why.splitlines()]
     body = "".join(f"<div>{line}</div>" for line in lines)
-    return f"<div class='k450 program'>{body}</div>" if body else ""
+    return f"<div class='k450 program'>{body}</div>"

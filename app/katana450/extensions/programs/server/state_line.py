@@ -17,6 +17,9 @@ from katana450.server.service.runner import StatusLine
 RUNS = ("running", "paused", "blocked")
 """Statuses of a program that holds the arm, as in `answers.Progress.status`."""
 
+ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
+"""Statuses of a program whose run has ended."""
+
 ENDS = {
     Phase.STOPPED.value: "ended",
     Phase.FAILED.value: "failed",
@@ -100,7 +103,7 @@ def _planning(state: State, line: StatusLine, program: Progress, *, waits: bool)
 def _ended(line: StatusLine, program: Progress, news: RunNews) -> StatusLine:
     """Return the line after the end of ``program``, or of its planning."""
     if program.status == Phase.DONE.value and news.run is not None:
-        took = f"in {duration(news.run.elapsed)}"
+        took = f"in {duration(round(news.run.elapsed))}"
         return line._replace(headline=f"{program.name}: done {took}", end=took)
     if program.status not in ENDS:
         return line

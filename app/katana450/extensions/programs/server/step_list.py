@@ -1,4 +1,4 @@
-"""The steps of a program as a list in the panel, with the current one marked."""
+"""The steps of a program as a list in the panel, each marked as done, current or next."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ from typing import NamedTuple
 
 from katana450.extensions.programs.building.actions import expected_time
 from katana450.extensions.programs.run.program import Program
-from katana450.extensions.programs.server.state_line import RUNS
+from katana450.extensions.programs.run.runner import Phase
+from katana450.extensions.programs.server.state_line import ENDED, RUNS
 from katana450.server.api.answers import Progress
 
-NOTHING = "nothing to do"
-"""Name of a step without a task: it is left out, or changes nothing."""
+SHOWN = "shown"
+"""Mark of the step at the time of the preview that is looked at."""
+
+DONE, NOW, NEXT, ENDED_HERE, SKIPPED = "done", "now", "next", "ended here", "skipped"
+"""Marks of steps during a run and after it."""
 
 
 class ListedStep(NamedTuple):
     """A step of a program.
 
     Attributes:
-        name: its name, without the name of an action.
+        name: its name.
         seconds: its expected duration [s].
         alternative: ``then`` or ``else`` for a step of an alternative, otherwise "".
         predicted: whether it is executed if all is as predicted.
@@ -35,7 +39,6 @@ class ListedStep(NamedTuple):
 
 def steps_of(program: Program) -> tuple[ListedStep, ...]:
     """Return the steps of ``program`` in their order, with those of all alternatives."""
-    names: dict[int, str] = {}
     seconds = [0.0] * program.steps
     times = {task.number: task.end - task.begin for task in program.schedule}
     expected = {program.tasks[number].number for number in times}
@@ -48,12 +51,11 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
         if not (number in times if step in expected else is_first):
             continue
         last[step] = number
-        names.setdefault(step, task.name.partition(":")[0])
         seconds[step] += times.get(number, expected_time(task.action, program.speed))
     words = _words(program)
     return tuple(
-        ListedStep(names.get(step, NOTHING), seconds[step], words[step], step in expected)
-        for step in range(program.steps)
+        ListedStep(title, seconds[step], words[step], step in expected)
+        for step, title in enumerate(program.titles)
     )
 
 
@@ -67,56 +69,63 @@ def _words(program: Program) -> list[str]:
     return words
 
 
-def current_step(
-    steps: tuple[ListedStep, ...], progress: Progress | None, look: float
-) -> int | None:
-    """Return the index of the step that runs, else the one at ``look`` [s] of the preview, if any.
+def marks(steps: tuple[ListedStep, ...], progress: Progress | None, look: float) -> tuple[str, ...]:
+    """Return the mark of each step; "" for none.
 
-    ``look`` is 0 if no time of the preview is looked at.
+    ``look`` is the time of the preview that is looked at [s]; 0 for none.
     """
-    if progress is not None and progress.status in RUNS:
-        return progress.step - 1
-    if look <= 0.0 or not steps:
-        return None
-    seconds = (step.seconds if step.predicted else 0.0 for step in steps)
-    begins = list(accumulate(seconds, initial=0.0))
-    return min(bisect_right(begins, look) - 1, len(steps) - 1)
+    words = [""] * len(steps)
+    if progress is None or progress.status not in (*RUNS, *ENDED):
+        if look > 0.0 and steps:
+            seconds = (step.seconds if step.predicted else 0.0 for step in steps)
+            begins = list(accumulate(seconds, initial=0.0))
+            words[min(bisect_right(begins, look) - 1, len(steps) - 1)] = SHOWN
+        return tuple(words)
+    current = progress.step - 1
+    for step in range(len(steps)):
+        if step + 1 in progress.skipped:
+            words[step] = SKIPPED
+        elif step < current or progress.status == Phase.DONE.value:
+            words[step] = DONE
+        elif step == current:
+            words[step] = NOW if progress.status in RUNS else ENDED_HERE
+        elif NOW in words and NEXT not in words:
+            is_expected = steps[step].predicted or not steps[current].predicted
+            words[step] = NEXT if is_expected else ""
+    return tuple(words)
 
 
 def page(
-    steps: tuple[ListedStep, ...],
-    current: int | None,
-    breakpoints: Collection[int] = (),
-    skipped: Collection[int] = (),
+    steps: tuple[ListedStep, ...], words: tuple[str, ...], breakpoints: Collection[int] = ()
 ) -> str:
-    """Return the list as HTML; the empty string without steps.
+    """Return the list with the marks ``words`` as HTML; the empty string without steps.
 
-    Each step has a button to pause before it, pressed if it is one of the ``breakpoints``, and a
-    button to run the program from it. static/scene/steps.js gives the orders. ``skipped``: the
-    steps of alternatives that the run has not taken. All are numbers from 1.
+    Each step has a button to pause before it, pressed if it is one of the ``breakpoints``, which
+    are numbers from 1, and a button to run the program from it. static/scene/steps.js gives the
+    orders.
     """
     rows = "".join(
-        f"<li{_marks(number - 1 == current, number in skipped)}>"
+        f"<li{_attributes(word)}>"
         f"<button name=pause aria-label='Pause before step {number}' title='Pause before this "
         f"step' aria-pressed={'true' if number in breakpoints else 'false'}></button>"
         f"<button name=run aria-label='Run from step {number}' title='Run from this step'>"
         f"</button><span>{escape(_title(step))}</span>"
-        f"<span>{'not taken' if number in skipped else _duration(step)}</span></li>"
-        for number, step in enumerate(steps, 1)
+        f"<span>{' '.join(filter(None, (word, _duration(step, word))))}</span></li>"
+        for number, (step, word) in enumerate(zip(steps, words, strict=True), 1)
     )
     return f"<div class='k450'><ol class='steps' tabindex=0>{rows}</ol></div>" if rows else ""
 
 
-def _marks(current: bool, skipped: bool) -> str:
-    """Return the attributes of a row."""
-    if current:
+def _attributes(word: str) -> str:
+    """Return the attributes of a row with the mark ``word``."""
+    if word in (SHOWN, NOW, ENDED_HERE):
         return " aria-current=step"
-    return " class=skipped" if skipped else ""
+    return f" class={word}" if word else ""
 
 
 def _title(step: ListedStep) -> str:
     return f"{step.alternative}: {step.name}" if step.alternative else step.name
 
 
-def _duration(step: ListedStep) -> str:
-    return f"{step.seconds:.1f} s" if step.seconds > 0.0 else ""
+def _duration(step: ListedStep, word: str) -> str:
+    return f"{step.seconds:.1f} s" if step.seconds > 0.0 and word != SKIPPED else ""
