@@ -109,11 +109,15 @@ def test_texts_of_a_server_are_attached_once_with_their_runs(
         assert 0.1 < program.end - program.start < 20.0
     # The file of an episode has what ran in it.
     assert list(scripts_of(episode).values()) == [nod]
-    # The timeline shows when each began.
+    # The timeline shows when each began and ended.
     shown = PlaybackRun(lambda: [path])
     shown.update()
-    beginnings = [mark.text for mark in shown.marks() if mark.kind == "program"]
-    assert beginnings == [f"Script {program.name} begins" for program in programs]
+    texts = [mark.text for mark in shown.marks() if mark.kind == "program"]
+    assert texts[::2] == [f"Script {program.name} begins" for program in programs]
+    for text, program in zip(texts[1::2], programs, strict=True):
+        assert program.end is not None
+        seconds = program.end - program.start
+        assert text == f"Script {program.name} ends after {seconds:.0f} s"
 
 
 def test_parts_have_the_scripts_that_ran_in_them(ran: tuple[Path, Path], folder: Path) -> None:

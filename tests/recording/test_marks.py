@@ -11,7 +11,7 @@ from katana450.extensions.recording.playback.marks import Mark, add_marks
 
 
 def event(t: int, **form: Any) -> Message:
-    return Message(EVENTS, t, t * 10**9, json_text(form))
+    return Message(EVENTS, t, t * 10**9, json_text({"t": float(t), **form}))
 
 
 def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
@@ -26,3 +26,22 @@ def test_name_that_comes_after_the_press_is_that_of_the_stop() -> None:
     later: list[Mark] = []
     add_marks(later, [event(3, kind="stop", why=named, named=True)])
     assert later == []
+
+
+def test_program_is_marked_at_its_begin_and_its_end() -> None:
+    marks: list[Mark] = []
+    run = {"kind": "program", "name": "Pour", "since": 5.0}
+    add_marks(
+        marks,
+        [
+            event(5, **run, began=True),
+            # The program drives by its own name, which the mark before says.
+            event(6, kind="driver", name="Pour", channel="program"),
+            # The next file says that it runs.
+            event(19, **run, began=True),
+            event(38, **run, began=False),
+        ],
+    )
+    assert [(mark.t, mark.text) for mark in marks] == [
+        (5.0, "Script Pour begins"), (38.0, "Script Pour ends after 33 s")
+    ]  # fmt: skip

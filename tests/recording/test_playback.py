@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import random
+import re
 import signal
 import sys
 from collections.abc import Iterator
@@ -205,7 +206,14 @@ class StopAndPlan:
 
 def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     ring = Ring(tmp_path / "ring", header())
-    run(260, 1, ring.put, StopAndPlan(), odd=False)
+    durations: list[float] = []
+
+    def put(record: TickRecord) -> None:
+        ring.put(record)
+        if (following := record.state.following) is not None:
+            durations.append(following.plan.duration_at(record.state.speed))
+
+    run(260, 1, put, StopAndPlan(), odd=False)
     ring.close()
     played = PlaybackRun(lambda: recordings_in(tmp_path / "ring"))
     played.update()
@@ -216,6 +224,9 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     assert kinds.index("clear_stop") < kinds.index("step")
     words = {mark.kind: mark.text for mark in marks}
     assert words["stop"] == "Ada pressed STOP."
+    # The seconds of a motion are those that it takes at its speed.
+    seconds = float(re.findall(r"Planned motion of ([\d.]+) s", words["step"])[0])
+    assert seconds == pytest.approx(durations[0], abs=0.06)
     assert words["driver"] in ("Ada drives", "the server drives")
     (stop,) = (mark for mark in marks if mark.kind == "stop")
     moment = played.at(stop.t + 1e-6)

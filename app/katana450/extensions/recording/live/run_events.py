@@ -35,7 +35,9 @@ class RunEvents:
         yield from _stops(before, record.state)
         was, now = before.following, record.state.following
         if now is not None and (was is None or was.plan is not now.plan):
-            yield STEP, {"seconds": now.plan.span}
+            # On the clock of the program: at its speed, and without what is done already.
+            seconds = now.plan.duration_at(record.state.speed) * (1.0 - now.fraction)
+            yield STEP, {"seconds": seconds}
 
 
 def _stops(before: State, after: State) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from katana450.arm.control.actor import CommandChannel
 from katana450.arm.control.state.messages import finding_text
 from katana450.arm.control.state.state import Finding, Reason
 from katana450.extensions.recording.files.recording_file import Message
@@ -20,6 +21,9 @@ NAMED = "named"
 
 REPEATED = 1.0
 """[s] Time in which a mark with the same text is left out."""
+
+SAME_BEGIN = 5.0
+"""[s] Time after the begin of a script in which the arm moves first, if the mark is that begin."""
 
 WITHOUT_MARK = frozenset((Reason.STOPPED, Reason.PAUSED, Reason.WAITING))
 """Reasons that another event reports, or that limit nothing."""
@@ -74,10 +78,10 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return NAMED if form.get("named") else kind, str(form.get("why") or "Stopped")
         case run_events.CLEAR_STOP:
             return kind, "Stop cleared"
-        case run_events.DRIVER:
+        case run_events.DRIVER if form.get("channel") != CommandChannel.PROGRAM.value:
             return kind, f"{form.get('name')} drives"
-        case "program" if form.get("began") is True:
-            return kind, f"Script {form.get('name')} begins"
+        case "program":
+            return _program(form)
         case run_events.STEP:
             seconds = form.get("seconds")
             length = f" of {seconds:.1f} s" if isinstance(seconds, int | float) else ""
@@ -86,6 +90,17 @@ def _event(kind: str, form: Mapping[str, Any]) -> tuple[str, str] | None:
             return _finding(form)
         case _:
             return None
+
+
+def _program(form: Mapping[str, Any]) -> tuple[str, str] | None:
+    t, since = form.get("t"), form.get("since")
+    if not (isinstance(t, int | float) and isinstance(since, int | float)):
+        return None
+    if form.get("began") is not True:
+        return "program", f"Script {form.get('name')} ends after {t - since:.0f} s"
+    # Each file names the runs that began before it.
+    is_new = t - since < SAME_BEGIN
+    return ("program", f"Script {form.get('name')} begins") if is_new else None
 
 
 def _finding(form: Mapping[str, Any]) -> tuple[str, str] | None:
