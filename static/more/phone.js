@@ -11,22 +11,25 @@ const expand = () => {
 };
 box.addEventListener("close", expand);
 
-/** @param {{ url: string, code: string, note: string }} address @param {Page.Toast} toast */
-function shown({ url, code, note }, toast) {
+/** @param {{ url: string | null, code: string, note: string, command: string | null }} address @param {Page.Toast} toast */
+function shown({ url, code, note, command }, toast) {
   const head = html("form", { method: "dialog" }, html("h1", {}, "Open on your phone"), html("button", {}, "Close"));
-  if (!url) return [head, html("p", {}, note)];
-  const field = html("input", { readonly: "", value: url, "aria-label": "Address for a phone" });
+  const text = url ?? command;
+  if (!text) return [head, html("p", {}, note)];
+  const name = url ? "Address for a phone" : "Command that opens the server";
+  const field = html("input", { readonly: "", value: text, "aria-label": name });
   const copy = html("button", { type: "button" }, "Copy");
   copy.addEventListener("click", async () => {
     try {
-      await navigator.clipboard.writeText(url);
-      toast("The address is copied.");
+      await navigator.clipboard.writeText(text);
+      toast("It is copied.");
     } catch {
       field.select();
-      toast("Copy the marked address: this browser does not allow the page to do it.");
+      toast("Copy the marked text: this browser does not allow the page to do it.");
     }
   });
-  return [head, html("img", { src: code, alt: `QR code of ${url}` }), html("div", {}, field, copy), html("p", {}, note)];
+  const first = url ? html("img", { src: code, alt: `QR code of ${url}` }) : html("p", {}, note);
+  return [head, first, html("div", {}, field, copy), ...(url ? [html("p", {}, note)] : [])];
 }
 
 /** Show the address, or hide it again. `toast` shows a sentence to the person. @param {Page.Toast} toast */

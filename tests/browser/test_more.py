@@ -66,6 +66,21 @@ def test_person_chooses_a_name_and_saves_picture_and_link(
     assert other.errors == []
 
 
+@pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
+def test_code_of_a_server_of_one_machine_is_the_command_that_opens_it(own_page: ViserPage) -> None:
+    page = own_page.page
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text }")
+    page.click("#phone-bar")
+    command = page.get_by_label("Command that opens the server")
+    command.wait_for()
+    assert "this machine only" in page.inner_text("#phone p")
+    page.locator("#phone").get_by_role("button", name="Copy").click()
+    page.wait_for_function("() => window.copied")
+    assert page.evaluate("copied") == command.input_value()
+    assert "katana450 serve --host 0.0.0.0" in command.input_value()
+    page.click("#phone form button")
+
+
 @pytest.mark.long
 @pytest.mark.skipif(own_address() is None, reason="this machine is in no network")
 def test_code_on_the_screen_holds_the_address(open_page: OpenPage, artefacts: Path) -> None:

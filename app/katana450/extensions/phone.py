@@ -24,9 +24,14 @@ CODES_PER_SECOND, CODES_BURST = 2.0, 10.0
 """QR codes that are drawn per second, and in a burst, for all pages together."""
 
 LOOPBACK_ONLY = (
-    "This server listens on this machine only, so a phone cannot reach it. The person in "
-    "charge of this arm can open it to the network, and give you an access link."
+    "This server listens on this machine only, so a phone cannot reach it. End it, and start it "
+    "with this command and its other options. It prints an access link: open that on the phone."
 )
+OPENING = (
+    "katana450 access give --file access.json --name Phone --role operator --url http://{0}:{1} "
+    "&& katana450 serve --host 0.0.0.0 --port {1} --access access.json"
+)
+"""The command that opens a server to the network, with the address and port of its page."""
 
 NO_ADDRESS = "This machine has no address in a network, so a phone cannot reach it."
 """Reasons for which there is no address for a phone."""
@@ -72,11 +77,13 @@ class PhoneAddress(msgspec.Struct, frozen=True):
         url: The address; None if there is none.
         code: The QR code of ``url`` as a data URL of an SVG file; None without ``url``.
         note: What a phone needs besides, or why it cannot reach this server.
+        command: What makes a server that listens on this machine only reachable; None for others.
     """
 
     url: str | None
     code: str | None
     note: str
+    command: str | None = None
 
 
 def phone_address(address: Address, host: str, port: int, *, requires_link: bool) -> PhoneAddress:
@@ -89,16 +96,17 @@ def phone_address(address: Address, host: str, port: int, *, requires_link: bool
         requires_link: Whether people need an access link.
     """
     scheme = "https" if address.secure else "http"
+    own = own_address()
     if address.public is not None:
         url = address.public
-    elif not address.any_address:
-        return PhoneAddress(None, None, LOOPBACK_ONLY)
-    elif not _is_loopback(urlsplit(f"//{host}").hostname or ""):
+    elif address.any_address and not _is_loopback(urlsplit(f"//{host}").hostname or ""):
         url = f"{scheme}://{host}"
-    elif (own := own_address()) is not None:
-        url = f"{scheme}://{own}:{port}"
-    else:
+    elif own is None:
         return PhoneAddress(None, None, NO_ADDRESS)
+    elif not address.any_address:
+        return PhoneAddress(None, None, LOOPBACK_ONLY, OPENING.format(own, port))
+    else:
+        url = f"{scheme}://{own}:{port}"
     notes = [LINK_REQUIRED if requires_link else NO_LINK]
     if not address.cookies_are_secure:
         notes.append(NOT_SECURE)
