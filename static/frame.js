@@ -29,7 +29,7 @@ Viser.hold(() => {
 const sheet = new CSSStyleSheet();
 sheet.replaceSync(`${Names.STEADY} ${Names.HELD}
     html[data-theme=dark] { color-scheme: dark; background: #14181d }
-    @media ${Names.NARROW}, (max-height: 500px) { ${Names.SOFTWARE_NOTICE} { display: none } }
+    ${Names.SOFTWARE_NOTICE} { display: none }
     html[data-used] ${Names.HINT} { visibility: hidden !important }
     input[aria-invalid=true] { border-color: #c47500 !important; outline: 2px solid #c47500; }`);
 document.adoptedStyleSheets.push(sheet);

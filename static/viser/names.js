@@ -14,7 +14,7 @@ export const TAB = "[role=tab]";
 export const TABS = "[role=tablist]";
 // The hint of a control, which lies over other ones.
 export const HINT = "[role=tooltip]";
-// Its notice that it draws by software, which on a phone would cover the robot, and which nobody can change there.
+// Its notice that it draws by software, which would cover the scene. The banner says so where that makes the picture old.
 export const SOFTWARE_NOTICE = ".mantine-Notification-root[style*=orange]";
 // viser draws faintly until the light of the room is loaded. If drawing takes as long as that, viser
 // miscounts and the picture stays faint. It also starts with the light theme. Without controls from
