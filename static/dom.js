@@ -54,8 +54,8 @@ export function save(content, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), SAVED_AFTER);
 }
 
-// The present second, as a part of the name of a file.
-export const timestamp = () => new Date().toISOString().slice(0, 19).replaceAll(":", "-");
+// The present second of the clock on the wall, as a part of the name of a file.
+export const timestamp = () => new Date().toLocaleString("sv").replace(" ", "T").replaceAll(":", "-");
 
 // Load the style beside a module, whose address is `url`; resolved when it is there or cannot be loaded.
 /** @param {string} name @param {string} url */

@@ -2,6 +2,7 @@
 import { button, element, write } from "../dom.js";
 import * as Pace from "../pace.js";
 import { leaseControls, replaceKeepingFocus } from "./lease.js";
+import { clock } from "./words.js";
 
 const SIMULATION =
   "pauses after a quarter of a second, because it is simulated. A new command moves it. After five seconds it stops";
@@ -15,7 +16,7 @@ const text = (id, words) => write(element(id, HTMLElement), words);
 /** @param {string} id @param {boolean} hidden */
 const hide = (id, hidden) => (element(id, HTMLElement).hidden = hidden);
 /** @param {number} seconds @param {Intl.DateTimeFormatOptions} [style] */
-const time = (seconds, style) => new Date(1000 * seconds).toLocaleTimeString([], style);
+const time = (seconds, style) => clock(new Date(1000 * seconds), style);
 
 /** Whether this window may take the detour that the arm offers. @param {Page.Store} store */
 export function mayGo({ live }) {
@@ -88,7 +89,8 @@ export class Bar {
     else head(status.headline, status.end);
     const moment = status.stopped_at ? `${time(status.stopped_at)}:` : "";
     const cause = status.stopped ? [moment, status.stopped] : [proven];
-    text("why", this.#named([status.taken, status.why, ...cause, status.until, status.cautions].filter(Boolean).join(" ")));
+    const words = [status.taken, status.why, ...cause, status.until, status.cautions].filter(Boolean).join(" ");
+    text("why", this.#named(words).replace(`started by ${status.name} `, "started by you "));
   }
 
   /** @param {Page.Status} status */

@@ -1,6 +1,7 @@
 // Who is connected, for admins: a list with buttons that disconnect.
 import { element, first, styled } from "../dom.js";
 import { html } from "../instruments/shape.js";
+import { clock } from "../page/words.js";
 
 const EVERY = 1000; // ms between two queries while the list is open
 const CONTENT = `
@@ -13,9 +14,6 @@ const CONTENT = `
   <p id="people-note">A disconnected person can still stop the arm from a page that is open, until the link is revoked.</p>
 `;
 
-/** @param {string} since */
-const time = (since) => new Date(since).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
-
 /** @param {Api.ConnectedPerson} person */
 function about(person) {
   const { role, drives, asks, program, connections, kept_out: out, link } = person;
@@ -24,7 +22,7 @@ function about(person) {
     role,
     drives && (program ? `runs ${program}` : "drives"),
     asks && "asks for the arm",
-    connections.length > 0 && `connected from ${addresses} since ${time(connections[0].since)}`,
+    connections.length > 0 && `connected from ${addresses} since ${clock(new Date(connections[0].since), { timeStyle: "short" })}`,
     link && `link ${link.slice(0, 6)}`,
     out !== null && `disconnected for ${Math.ceil(out / 60)} min`,
   ].filter(Boolean).join(" · ");

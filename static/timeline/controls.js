@@ -1,5 +1,6 @@
 // The elements of the timeline: its track, its buttons and its lists.
 import { html, svg } from "../instruments/shape.js";
+import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
@@ -79,5 +80,5 @@ export function timeInWords(t) {
   const style = { hour: "2-digit", minute: "2-digit", second: "2-digit" };
   const time = new Date(1000 * t);
   const today = time.toDateString() === new Date().toDateString();
-  return today ? time.toLocaleTimeString([], style) : time.toLocaleString([], { day: "numeric", month: "short", ...style });
+  return today ? clock(time, style) : time.toLocaleString([], { day: "numeric", month: "short", ...style });
 }

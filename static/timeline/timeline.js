@@ -1,6 +1,7 @@
 // The timeline: what the server has recorded, or a file, shown in this window alone at any moment.
 import { sceneOf, styled, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
+import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
 import * as api from "./api.js";
 import { atPlace, lengthOf, placeOf } from "./axis.js";
@@ -174,7 +175,9 @@ export class Timeline {
       const of = this.#of;
       const { spans, marks } = await api.timeline(of);
       if (of !== this.#of) return;
-      [this.#spans, this.#marks] = [spans, marks];
+      this.#spans = spans;
+      const { name = "" } = this.#page.store.status ?? {};
+      this.#marks = marks.map(([t, kind, words]) => [t, kind, addressed(words, name)]);
       this.#failed = false;
     } catch (error) {
       // Once, not each time.

@@ -22,9 +22,14 @@ FRAME = re.compile("<iframe.*?</iframe>")
 
 
 @contextmanager
-def bare_page(browser: Browser, *, arm: dict[str, Any] | None = None) -> Iterator[Page]:
-    """Open the document. ``arm``: the answer ``arm`` of the API for scripts that ask for it."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800})
+def bare_page(
+    browser: Browser, *, arm: dict[str, Any] | None = None, **options: Any
+) -> Iterator[Page]:
+    """Open the document. ``arm``: the answer ``arm`` of the API for scripts that ask for it.
+
+    ``options``: of the browser's context, for instance its locale.
+    """
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, **options)
     html = (STATIC / "index.html").read_text(encoding="utf-8")
     document = FRAME.sub("", SCRIPT.sub("", html))
 

@@ -21,6 +21,24 @@ def page(browser: Browser) -> Iterator[Page]:
         yield page
 
 
+# Words
+
+
+def test_times_are_those_of_the_browser_and_oneself_is_you(browser: Browser) -> None:
+    with bare_page(browser, locale="de-DE", timezone_id="America/New_York") as page:
+        named = "({ named }, words) => named(words, [])"
+        words = "Started by Anna at 2026-11-29T14:43:27+00:00. Axis 2 is at its limit."
+        said = module(page, "page/words.js", named, words)
+        assert said == "Started by Anna at 09:43. Axis 2 is at its limit."
+        addressed = "({ addressed }, words) => addressed(words, 'Anna')"
+        for words, expected in (
+            ("Anna drives", "You drive"),
+            ("Anna pressed STOP.", "You pressed STOP."),
+            ("Annabel drives", "Annabel drives"),
+        ):
+            assert module(page, "page/words.js", addressed, words) == expected
+
+
 # Pause and Speed
 
 

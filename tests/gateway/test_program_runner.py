@@ -278,7 +278,7 @@ def test_unattended_program_is_shown_with_its_owner_and_begin(table: Staged) -> 
     assert (progress.unattended, progress.by) == (True, "Window 1")
     assert progress.began is not None
     why = status.common(table.hub)["why"]
-    assert why.startswith(f"Unattended: started by Window 1 at {progress.began[11:16]} UTC.")
+    assert why.startswith(f"Unattended: started by Window 1 at {progress.began}.")
     table.arm.rest = replace(table.arm.rest, paused=True)
     assert "Unattended: started by Window 1" in status.common(table.hub)["why"]
     table.programs.steer(owner, ProgramOrder.END)

@@ -125,7 +125,7 @@ def duration(seconds: float) -> str:
 
 def _unattended(program: Progress) -> str:
     """Return a sentence on who started an unattended program, and when."""
-    start_time = "" if program.began is None else f" at {program.began[11:16]} UTC"
+    start_time = "" if program.began is None else f" at {program.began}"
     return f"Unattended: started by {program.by}{start_time}."
 
 
