@@ -58,7 +58,7 @@ export class ScriptRun {
         if (program?.status === "refused") return program;
         throw error;
       }
-      return await this.#follow(shows);
+      return await this.follow(shows);
     } finally {
       [this.busy, this.#waiting] = [false, []];
     }
@@ -80,15 +80,19 @@ export class ScriptRun {
     for (const answer of await Promise.race([Promise.all(answers), late])) if (answer.is === "refused") throw new Error(answer.why);
   }
 
-  // A program that a stop or another command has kept from running stays planned, with a reason.
+  // Return the last progress of the program that runs. One that a stop or another command has kept from running stays
+  // planned, with a reason.
   /** @param {(program: Api.Progress) => void} shows */
-  async #follow(shows) {
+  async follow(shows) {
+    this.busy = true;
     for (; ; await pause(EVERY)) {
       const program = (await readState())?.program;
       if (!program) continue;
       shows(program);
       const kept = program.why.startsWith("Not run");
-      if (ENDS.includes(program.status) || (kept && program.status === "ready")) return program;
+      if (!ENDS.includes(program.status) && !(kept && program.status === "ready")) continue;
+      this.busy = false;
+      return program;
     }
   }
 }

@@ -2,24 +2,18 @@
 import { element, sceneOf, styled, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
 import { messageOf, readArm, readState, request } from "../server.js";
-import { parts } from "../teach/run.js";
+import { ScriptRun } from "../teach/run.js";
 
 const KEPT = "katana450.welcome"; // in the browser's storage, once the card was dismissed
 const DONE = "katana450.welcome.done"; // the names of the steps that were done
 const SCRIPT = "api/v1/scripts/Pour";
-const LOOK_EVERY = 400; // ms
 const PULSE_EVERY = 50; // ms
-const BEGINS = 5000; // ms within which the server takes up a program
-const READY_LOOKS = 5; // until a planned program counts as not run
 const ID = "pour"; // id of the requests of the program
 const POUR = { name: "Pour", title: "Watch it pour", about: "The arm grasps the cup and empties it", did: "Poured. The cup is back in its place.", not: "It did not pour." };
 const WAVE = { name: "Wave", title: "Watch it move", about: "A program turns one joint to and fro", did: "Done. That was a program of three steps.", not: "It did not move." };
 const SWING = 20; // degrees to either side, at most
 const RADIANS = Math.PI / 180;
-const ENDS = ["done", "stopped", "failed", "cancelled", "refused", "blocked"];
 const HANDLE = "/target/move";
-/** @param {number} ms */
-const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class Welcome {
   #page;
@@ -32,9 +26,7 @@ export class Welcome {
   #dragging = null; // timer, while the handle pulses
   /** @type {typeof POUR | null} */
   #program = null; // what the program of the card is, of an arm that can do it
-  #isRunning = false;
-  #accepted = false; // whether the server has taken the script
-  #refusal = ""; // why it has refused the script or the run
+  #run; // of the program
   /** @type {Record<string, { button: HTMLButtonElement, mark: HTMLElement }>} */
   #steps = {};
 
@@ -50,6 +42,7 @@ export class Welcome {
   constructor(page, arm) {
     this.#page = page;
     this.#arm = arm;
+    this.#run = new ScriptRun(page.say, ID);
     const { status } = page.store;
     if (status?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
     const close = html("button", { type: "button", "aria-label": "Close for good" }, "×");
@@ -57,7 +50,7 @@ export class Welcome {
     const list = html("ol", {});
     if (arm.default_tool) list.append(this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()));
     else list.append(this.#step("drag", "Turn a joint", "Drag a link of the arm, or a slider of the panel", () => this.#turn()));
-    if (this.#program) list.append(this.#step(this.#program.name, this.#program.title, this.#program.about, () => this.#run()));
+    if (this.#program) list.append(this.#step(this.#program.name, this.#program.title, this.#program.about, () => this.#play()));
     list.append(this.#step("part", "Bring your own part", "Choose a file, or drop it on the scene", () => this.#part()));
     this.#card.append(html("h2", {}, "First steps"), close, list, this.#says, this.#bar);
     element("toast", HTMLElement).before(this.#card, this.#pulse);
@@ -65,11 +58,6 @@ export class Welcome {
     window.addEventListener("placed", () => this.#done("part"));
     for (const name of (page.kept?.getItem(DONE) ?? "").split(",")) if (name in this.#steps) this.#done(name);
     if (status) this.#note(status);
-  }
-
-  /** @param {Api.Progress | null | undefined} program @returns {program is Api.Progress} */
-  #isOwn(program) {
-    return program?.name === this.#program?.name && program?.by === this.#page.store.status?.name;
   }
 
   show() {
@@ -141,31 +129,37 @@ export class Welcome {
   #note(status) {
     // The program runs, also after a reload or a stop, for its owner, who alone may end it.
     const runs = status.orders.includes("end") && !status.planning;
-    if (runs && status.continues[0] === this.#program?.name) this.#run(true);
+    if (runs && status.continues[0] === this.#program?.name) this.#play(true);
     const wanted = this.#arm.default_tool ? "arm (drag)" : "arm (";
     const isDrag = status.mine && (status.undo?.[0] ?? "").startsWith(wanted);
     const moves = this.#dragging !== null && status.mine && status.mood === "moving";
     if (this.#steps.drag.button.classList.contains("done") || !(isDrag || moves)) return;
     this.#still();
     this.#done("drag");
-    if (!this.#isRunning) write(this.#says, "The arm follows. STOP is at the top left, and Space presses it.");
+    if (!this.#run.busy) write(this.#says, "The arm follows. STOP is at the top left, and Space presses it.");
   }
 
-  // began: whether it runs already.
-  async #run(began = false) {
-    if (this.#isRunning) return;
+  // Run the program to its end, which the bar follows step by step. `began`: whether it runs already.
+  async #play(began = false) {
+    if (this.#run.busy || !this.#program) return;
     this.#still();
-    this.#isRunning = true;
-    [this.#accepted, this.#refusal] = [began, ""];
+    write(this.#says, "");
+    /** @param {Api.Progress} program */
+    const show = ({ status, fraction, step, steps }) => {
+      this.#bar.hidden = false;
+      this.#bar.value = status === "planning" ? fraction : step / Math.max(steps, 1);
+    };
+    const { name, did, not } = this.#program;
     try {
-      const text = began ? "" : await this.#script();
-      for (const part of began ? [] : parts(text)) this.#page.say(part.more ? part : { ...part, id: ID });
-      await this.#watch(began);
+      const { revocations } = this.#page.store.status ?? {};
+      const program = began ? await this.#run.follow(show) : await this.#run.play(await this.#script(), "run", revocations, show);
+      const worked = program.status === "done";
+      if (worked) this.#done(name);
+      write(this.#says, worked ? did : `${not} ${program.why || program.status}`);
     } catch (error) {
-      write(this.#says, `The program cannot be run: ${messageOf(error)}`);
+      write(this.#says, `${not} ${messageOf(error)}`);
     }
     this.#bar.hidden = true;
-    this.#isRunning = false;
   }
 
   // Return the text of the program.
@@ -188,52 +182,7 @@ export class Welcome {
 
   /** Take an answer; return whether it was for the card. @param {Page.Answer} answer */
   hear(answer) {
-    if (answer.id !== ID) return false;
-    if (answer.is === "refused") this.#refusal = answer.why;
-    else this.#accepted = true;
-    return true;
-  }
-
-  // Run the program, which alone is our own, once it is planned, and follow it to its end.
-  /** @param {boolean} resumed whether it runs already */
-  async #watch(resumed) {
-    write(this.#says, "Planning …");
-    const began = performance.now();
-    let waits = 0; // looks in a row at which the program was planned and did not run
-    let ran = resumed;
-    for (; ; await pause(LOOK_EVERY)) {
-      const accepted = this.#accepted;
-      const state = await readState();
-      if (!state && !this.#refusal) continue;
-      const { program, stopped } = state ?? { program: null, stopped: null };
-      const own = accepted && this.#isOwn(program) ? program : null;
-      waits = own?.status === "ready" ? waits + 1 : 0;
-      const over = !own || stopped || waits > READY_LOOKS || ENDS.includes(own.status);
-      if (over && !ran && !stopped && !this.#refusal && performance.now() - began < BEGINS) continue;
-      if (over || this.#refusal) return this.#end(ran ? own : null, stopped, own);
-      const planning = own.status === "planning";
-      if (!ran && (planning || own.status === "ready")) {
-        ran = true;
-        this.#page.say({ do: "steer", order: "run", id: ID });
-      }
-      const words = planning
-        ? `Planning ${Math.round(100 * own.fraction)} %`
-        : `Step ${own.step} of ${own.steps}: ${own.task || own.status}`;
-      write(this.#says, words);
-      this.#bar.hidden = false;
-      this.#bar.value = planning ? own.fraction : own.step / Math.max(own.steps, 1);
-    }
-  }
-
-  // Say how the program has ended. `ran`: its progress, if it was run; `stopped`: why the arm is stopped.
-  /** @param {Api.Progress | null} ran @param {string | null} stopped @param {Api.Progress | null} own */
-  #end(ran, stopped, own) {
-    if (!this.#program) return;
-    const worked = ran?.status === "done";
-    if (worked) this.#done(this.#program.name);
-    // In the words of the page a person who pressed STOP is "You".
-    const reason = this.#refusal || (stopped && (this.#page.store.status?.stopped || stopped)) || own?.why || own?.status || "";
-    write(this.#says, worked ? this.#program.did : `${this.#program.not} ${reason}`);
+    return this.#run.hear(answer);
   }
 
   #part() {
