@@ -1,7 +1,7 @@
 // A program in the panel: its steps, with buttons to run from a step and to pause before a step, and the button
 // that edits the chosen script as text.
 const AGAIN = 50; // ms between two attempts to restore the focus
-const TRIES = 20;
+const TRIES = 100; // a busy server draws the list after seconds
 
 export class Steps {
   #say;
