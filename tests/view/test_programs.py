@@ -85,7 +85,7 @@ def test_list_marks_what_is_done_current_and_next(status: str, words: list[str])
 
 
 def test_step_that_is_not_expected_is_not_next() -> None:
-    steps = (ListedStep("if", 0.0), ListedStep("a", 1.0, "then", False), ListedStep("b", 1.0))
+    steps = (ListedStep("if", 0.0), ListedStep("then: a", 1.0, False), ListedStep("b", 1.0))
     at_if = Progress(name="x", by="me", status="running", step=1, steps=3)
     assert marks(steps, at_if, 0.0) == ("now", "", "next")
 

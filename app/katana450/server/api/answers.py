@@ -66,7 +66,7 @@ class Progress(msgspec.Struct, frozen=True, kw_only=True):
         seconds_left: Expected time until the run ends [s], on the same clock; 0 if none runs.
         why: What is wrong with the program, why it was planned again or not run, or which times of
             the script it does not keep.
-        skipped: Numbers of the steps before its first, and of alternatives that it did not take.
+        skipped: Numbers of the steps with nothing to do, and of alternatives not taken.
         unattended: Whether it runs without heartbeats of its owner.
         began: Time at which the run began, in UTC, in ISO 8601; null before that.
         breakpoints: Numbers of the steps before which it pauses.

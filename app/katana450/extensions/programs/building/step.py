@@ -82,15 +82,19 @@ def count(steps: Iterable[LocatedStep]) -> int:
     )
 
 
-def titles(steps: Iterable[LocatedStep]) -> Iterator[str]:
-    """Yield the name of each of ``steps`` for people, with those of all alternatives."""
+def titles(steps: Iterable[LocatedStep], before: str = "") -> Iterator[str]:
+    """Yield the name of each of ``steps`` for people, with those of all alternatives.
+
+    ``before``: what is before each name.
+    """
     for located in steps:
         step = located.step
         if isinstance(step, Conditional):
-            yield f"if {step.condition.words}"
-            yield from titles((*step.then, *step.otherwise))
+            yield f"{before}if {step.condition.words}"
+            yield from titles(step.then, "then: ")
+            yield from titles(step.otherwise, "else: ")
         else:
-            yield step.title
+            yield f"{before}{step.title}"
 
 
 class NumberedStep(NamedTuple):

@@ -67,7 +67,6 @@ class Program:
         titles: names of the steps of the script, with those of all alternatives.
         alternatives: the alternatives of each ``if``, in their order.
         first: index of the task with which a run begins.
-        first_step: index of the step that was chosen as the first one.
     """
 
     name: str
@@ -77,13 +76,11 @@ class Program:
     titles: tuple[str, ...]
     alternatives: tuple[Alternatives, ...] = ()
     first: int = 0
-    first_step: int = 0
 
     @cached_property
-    def left_out(self) -> tuple[int, ...]:
-        """Indices of the steps before the first one, without those that set tool and speed."""
-        planned = {task.number for task in self.tasks[1:]}
-        return tuple(step for step in range(self.first_step) if step not in planned)
+    def idle(self) -> tuple[int, ...]:
+        """Indices of the steps without a task: before the first one, or with nothing to do."""
+        return tuple(sorted(set(range(self.steps)) - {task.number for task in self.tasks[1:]}))
 
     @property
     def steps(self) -> int:
@@ -200,15 +197,8 @@ def compiled(
     plan = PlanState(plan_context, state, frame).standing(state.setpoint)
     tasks = Compiler(script, plan, report).tasks(first_step)
     total_speed = script.speed * speed
-    return Program(
-        script.name,
-        total_speed,
-        state.setpoint,
-        tasks,
-        tuple(titles(script.steps)),
-        tuple(_alternatives(script.steps, 0)),
-        first_step=first_step,
-    )
+    names, alternatives = tuple(titles(script.steps)), tuple(_alternatives(script.steps, 0))
+    return Program(script.name, total_speed, state.setpoint, tasks, names, alternatives)
 
 
 def _alternatives(steps: Sequence[LocatedStep], first: int) -> Iterator[Alternatives]:

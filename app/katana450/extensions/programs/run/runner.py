@@ -151,14 +151,14 @@ def seconds_left(program: Program, run: Run, state: State, allowed: float = 1.0)
 
 
 def skipped(program: Program, run: Run) -> tuple[int, ...]:
-    """Return the steps, from 1, that ``run`` leaves out: before its first, or not chosen."""
+    """Return the steps, from 1, that ``run`` leaves out: without a task, or not chosen."""
     held = dict(run.choices)
     others = (
         range(otherwise, end) if held[number] else range(number + 1, otherwise)
         for number, otherwise, end in program.alternatives
         if number in held
     )
-    return tuple(step + 1 for step in chain(program.left_out, *others))
+    return tuple(step + 1 for step in chain(program.idle, *others))
 
 
 def _check_slip(state: State) -> None:

@@ -180,10 +180,13 @@ class ProgramsPanel:
         """Update the display of the program's progress, and the list of scripts."""
         progress = self._access.progress
         self._follow_choice(progress)
-        edit = _edit_button(self._choice.value) if self._choice.value in self._names else ""
+        name = self._choice.value
+        # It opens the script as text, see `static/scene/steps.js`.
+        button = f"<button type=button data-script='{escape(name)}'>Edit as text</button>"
+        edit = f"<div class='k450'>{button}</div>" if name in self._names else ""
         if edit != self._edit.content:
             self._edit.content = edit
-        if self._sent_name not in ("", self._choice.value):
+        if self._sent_name not in ("", name):
             progress = None
         status = _page(progress)
         if status != self._status.content:
@@ -311,12 +314,6 @@ def _is_text(scripts: Scripts, name: str, text: str) -> bool:
         return scripts.text(name) == text
     except KatanaError:
         return False
-
-
-def _edit_button(name: str) -> str:
-    """Return the button that opens the script ``name`` as text, see `static/scene/steps.js`."""
-    button = f"<button type=button data-script='{escape(name)}'>Edit as text</button>"
-    return f"<div class='k450'>{button}</div>"
 
 
 def _page(progress: Progress | None) -> str:

@@ -27,13 +27,11 @@ class ListedStep(NamedTuple):
     Attributes:
         name: its name.
         seconds: its expected duration [s].
-        alternative: ``then`` or ``else`` for a step of an alternative, otherwise "".
         predicted: whether it is executed if all is as predicted.
     """
 
     name: str
     seconds: float
-    alternative: str = ""
     predicted: bool = True
 
 
@@ -52,21 +50,10 @@ def steps_of(program: Program) -> tuple[ListedStep, ...]:
             continue
         last[step] = number
         seconds[step] += times.get(number, expected_time(task.action, program.speed))
-    words = _words(program)
     return tuple(
-        ListedStep(title, seconds[step], words[step], step in expected)
+        ListedStep(title, seconds[step], step in expected)
         for step, title in enumerate(program.titles)
     )
-
-
-def _words(program: Program) -> list[str]:
-    """Return ``then`` or ``else`` for each step of an alternative, and "" for all others."""
-    words = [""] * program.steps
-    # Inner alternatives come after the outer ones.
-    for number, otherwise, end in program.alternatives:
-        words[number + 1 : otherwise] = ["then"] * (otherwise - number - 1)
-        words[otherwise:end] = ["else"] * (end - otherwise)
-    return words
 
 
 def marks(steps: tuple[ListedStep, ...], progress: Progress | None, look: float) -> tuple[str, ...]:
@@ -109,7 +96,7 @@ def page(
         f"<button name=pause aria-label='Pause before step {number}' title='Pause before this "
         f"step' aria-pressed={'true' if number in breakpoints else 'false'}></button>"
         f"<button name=run aria-label='Run from step {number}' title='Run from this step'>"
-        f"</button><span>{escape(_title(step))}</span>"
+        f"</button><span>{escape(step.name)}</span>"
         f"<span>{' '.join(filter(None, (word, _duration(step, word))))}</span></li>"
         for number, (step, word) in enumerate(zip(steps, words, strict=True), 1)
     )
@@ -121,10 +108,6 @@ def _attributes(word: str) -> str:
     if word in (SHOWN, NOW, ENDED_HERE):
         return " aria-current=step"
     return f" class={word}" if word else ""
-
-
-def _title(step: ListedStep) -> str:
-    return f"{step.alternative}: {step.name}" if step.alternative else step.name
 
 
 def _duration(step: ListedStep, word: str) -> str:
