@@ -13,7 +13,7 @@ from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.general_arms.links import reversed_chain
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -252,7 +252,7 @@ def test_solution_of_each_branch_looks_as_its_name_says(name: str) -> None:
     solver = kinematics_of(chain)
     assert isinstance(solver, ClosedForm | SevenAxes)
     assert len(set(solver.branches)) == len(solver.branches) == (4 if chain.n == 4 else 8)
-    joints = tuple(k for k in range(chain.n) if k != solver.swivel)
+    joints = tuple(k for k in range(chain.n) if k != solver.arm_angle_joint)
     words = BranchWords(chain, joints, solver.is_reversed)
     for q in postures(chain, 10)[:10]:
         for each in solver.inverse(forward(chain, q), q):

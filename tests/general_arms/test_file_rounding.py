@@ -16,7 +16,7 @@ from katana450.extensions.general_arms.choice import kinematics_of
 from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.links import exact_chain, links_of
 from katana450.extensions.general_arms.numerical import search_of
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.extensions.reachability.reachability import PoseSolver
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain

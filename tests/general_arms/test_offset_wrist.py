@@ -19,7 +19,7 @@ from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.offset_wrist import OffsetWrist
 from katana450.extensions.general_arms.pose_equations import PoseEquations
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of, forward_batch
@@ -292,8 +292,8 @@ def test_other_arms_of_these_makers() -> None:
 
 
 @pytest.mark.parametrize("name", NEAR_MISS)
-def test_axes_that_almost_meet_have_a_swivel(name: str) -> None:
-    """At the swivel of a posture, the postures are those of a search; all are exact."""
+def test_axes_that_almost_meet_have_an_arm_angle(name: str) -> None:
+    """At the arm angle of a posture, the postures are those of a search; all are exact."""
     chain = NEAR_MISS[name]
     solver = kinematics_of(chain)
     assert isinstance(solver, SevenAxes)
@@ -301,10 +301,10 @@ def test_axes_that_almost_meet_have_a_swivel(name: str) -> None:
     lost = 0
     for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
         T = forward(chain, q)
-        postures = solver.at_its_swivel(T[None], q)[0]
+        postures = solver.at_arm_angle_of(T[None], q)[0]
         distance, turn = (error[0] for error in errors_of(chain, postures[None], T[None]))
         exact = postures[np.maximum(distance, turn) <= EXACT]
-        assert (np.abs(exact[:, solver.swivel] - q[solver.swivel]) <= 1e-12).all()
+        assert (np.abs(exact[:, solver.arm_angle_joint] - q[solver.arm_angle_joint]) <= 1e-12).all()
         others = np.concatenate((searched(chain, T, rng, {2: q[2]}), q[None]))
         lost += any((apart(other, exact) > SAME).all() for other in others)
         for hint in (None, q):

@@ -183,8 +183,8 @@ def test_lines_and_arc_are_planned(chain: Chain) -> None:
     np.testing.assert_allclose(1e3 * end, p + turn + (5.0, 0.0, 0.0), atol=1e-5)
 
 
-def test_swivel_of_seven_axes_turns_where_it_must() -> None:
-    # With the swivel at a limit of the way, the line is possible only if it turns.
+def test_arm_angle_turns_where_it_must() -> None:
+    # With the arm angle at a limit of the way, the line is possible only if it turns.
     path = plans(program(PANDA, "line: {by: {x: 280}}"))[0].segments[0].path
     end = forward_batch(PANDA, path.end[None])[0, :3, 3]
     np.testing.assert_allclose(1e3 * end, middle(PANDA) + np.array((280.0, 0, 0)), atol=1e-5)

@@ -13,7 +13,7 @@ from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.descent import NEAR
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
 from katana450.extensions.general_arms.general_kinematics import near_turns
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
@@ -50,8 +50,8 @@ def side(chain: Chain, q: FloatArray) -> float:
 class Dragged(NamedTuple):
     """The results of some drags.
 
-    Those with a ``clear`` way have arrived, but for a few ``beside`` of seven axes: they turned
-    their swivel until the edge of the branch was in the way, and reported that a leap is missing.
+    Those with a ``clear`` way have arrived, but for a few ``beside`` of seven axes. They turned
+    their arm angle until the edge of the branch was in the way, and reported a missing leap.
     """
 
     arrived: int
@@ -65,11 +65,11 @@ class Dragged(NamedTuple):
 def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -> FloatArray | None:
     """Return the posture of ``branch`` at ``place`` next to ``q``; None if there is none.
 
-    Four axes turn the pose with axis 1, and seven keep their swivel.
+    Four axes turn the pose with axis 1, and seven keep their arm angle.
     """
     solver, chain = tool.solver, tool.chain
     if isinstance(solver, SevenAxes):
-        found = solver.at_its_swivel(place.T[None], q)[0, solver.branches.index(branch)]
+        found = solver.at_arm_angle_of(place.T[None], q)[0, solver.branches.index(branch)]
         return near_turns(chain, found, q) if np.isfinite(found).all() else None
     for _ in range(SETTLINGS if chain.n < 6 else 1):
         pose = np.array(place.T)

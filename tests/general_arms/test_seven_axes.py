@@ -1,4 +1,4 @@
-"""Seven axes: reachable poses are reached inside the limits, by a swivel that suits them."""
+"""Seven axes: reachable poses are reached inside the limits, by an arm angle that suits them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
@@ -34,17 +34,17 @@ def fraction(chain: Chain, q: FloatArray) -> float:
 
 
 def test_locked_joint_is_the_one_whose_rest_has_a_closed_form() -> None:
-    assert seven_axes(IIWA_7).swivel == 2
-    assert seven_axes(PANDA).swivel == 6
+    assert seven_axes(IIWA_7).arm_angle_joint == 2
+    assert seven_axes(PANDA).arm_angle_joint == 6
 
 
 @pytest.mark.parametrize("name", SEVEN)
-def test_posture_is_found_again_at_its_swivel(name: str) -> None:
+def test_posture_is_found_again_at_arm_angle_of(name: str) -> None:
     chain = SEVEN[name]
     solver = seven_axes(chain)
     rng = np.random.default_rng(1)
     for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
-        found = solver.at_swivels(forward(chain, q), np.array([q[solver.swivel]]))[0]
+        found = solver.at_arm_angles(forward(chain, q), np.array([q[solver.arm_angle_joint]]))[0]
         assert np.abs(found - q).max(axis=1).min() < 1e-6
 
 
@@ -69,7 +69,7 @@ def test_reachable_poses_are_reached_inside_the_limits(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SEVEN)
-def test_swivel_without_hint_keeps_room_to_the_limits(name: str) -> None:
+def test_arm_angle_without_hint_keeps_room_to_the_limits(name: str) -> None:
     chain = SEVEN[name]
     solver = seven_axes(chain)
     rng = np.random.default_rng(3)

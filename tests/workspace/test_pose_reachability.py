@@ -48,7 +48,7 @@ def inside(chain: Chain, count: int, seed: int) -> FloatArray:
 
 
 def test_seven_axes_count_the_poses_that_a_posture_takes() -> None:
-    """The swivel is tried at some angles only."""
+    """Some arm angles are tried only."""
     every = reachability(PANDA)
     solver = PoseSolver(kinematics_of(PANDA), every.clear)
     T = np.array([forward(PANDA, q) for q in inside(PANDA, 12, 1)])

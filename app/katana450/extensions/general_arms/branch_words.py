@@ -11,8 +11,8 @@ If axis 4 or 6 moves the wrist's centre, the wrist's product is that of the rate
 while the first three hold the centre. It is zero where the arm is singular.
 
 An arm that is solved as seen from the tool has the first and the last with the ends exchanged. The
-joint that is the swivel of seven axes is left out. Which sign has which word follows from the arm
-at zero and from up (z) and front (x) of the base, not from the directions that a file gives its
+joint that sets the arm angle of seven axes is left out. Which sign has which word follows from the
+arm at zero and from up (z) and front (x) of the base, not from the directions that a file gives its
 axes:
 
     left, right   if the arm's plane passes beside axis 1: the arm is left or right of axis 1, seen
@@ -172,7 +172,7 @@ class BranchWords:
         return _sign(float(self._zero.z[0, 2]))
 
     def _is_parallel(self, i: int) -> bool:
-        """Return whether axis i and the next one are parallel, without a swivel between them."""
+        """Return whether axis i and the next one are parallel, none locked between them."""
         return self.joints[i + 1] == self.joints[i] + 1 and self._zero.are_parallel(i, i + 1)
 
     def _along_axis_2(self, i: int) -> float:

@@ -13,7 +13,7 @@ from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.links import FINE, exact_chain, links_of
 from katana450.extensions.general_arms.numerical import Numerical
 from katana450.extensions.general_arms.offset_wrist import OffsetWrist
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics

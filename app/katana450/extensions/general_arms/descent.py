@@ -23,7 +23,6 @@ from katana450.maths.kinematics.tracker import HOP
 WALL: Final = 0.02
 """[1] Smallest singular value below which a motion without a closed form leads no farther."""
 
-
 SINGULAR: Final = 1e-9
 """[1] Smallest singular value that is only rounding."""
 
@@ -37,8 +36,8 @@ class Regularity:
 
     The matrix that decides has as many rows as the tool has freedoms that the arm can choose: all
     six from six axes on, and with n < 6 axes the tool point and the turns about the last n - 3
-    axes. A branch ends where it loses rank. With the swivel of seven axes locked, the other six
-    decide, because they define the branches.
+    axes. A branch ends where it loses rank. With the joint locked that sets the arm angle of
+    seven axes, the other six decide, because they define the branches.
 
     Weyl's inequality keeps a step on its branch: the smallest singular value changes by at most the
     norm of the change of the matrix. A step that changes it by less never passes a singular
@@ -46,19 +45,19 @@ class Regularity:
 
     Attributes:
         n: number of axes of the chain.
-        swivel: index of a locked joint, or None.
+        arm_angle_joint: index of a locked joint, or None.
     """
 
     n: int
-    swivel: int | None = None
+    arm_angle_joint: int | None = None
 
     @cached_property
     def _others(self) -> list[int]:
-        return [k for k in range(self.n) if k != self.swivel]
+        return [k for k in range(self.n) if k != self.arm_angle_joint]
 
     def matrix(self, J: FloatArray) -> FloatArray:
         """Return the matrix for the Jacobian `J` (6, n), whose translations are over a length."""
-        if self.swivel is not None:
+        if self.arm_angle_joint is not None:
             return J.take(self._others, axis=-1)
         if self.n >= 6:
             return J

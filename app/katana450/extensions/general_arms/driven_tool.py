@@ -91,7 +91,7 @@ def _candidates(chain: Chain) -> FloatArray:
     # A rail or a lift before the arm stands still too.
     first = sum(chain.slides)
     still = {*range(first + 1)} if chain.n < 6 + first else {*range(first + 1), chain.n - 1}
-    # The third of seven axes is the swivel: the arm stands in one plane without it.
+    # The third of seven axes moves the elbow aside: the arm stands in one plane without it.
     still |= set(range(first + 2, chain.n - 4))
     choices = []
     for k, (low, high) in enumerate(zip(lower, upper, strict=True)):
@@ -166,7 +166,7 @@ class DrivenTool(ToolKinematics):
 
     @cached_property
     def _tracker(self) -> PoseTracker:
-        regularity = Regularity(self.chain.n, self.solver.swivel)
+        regularity = Regularity(self.chain.n, self.solver.arm_angle_joint)
         return PoseTracker(Descent(search_of(self.chain), regularity), self.solver)
 
     @property
@@ -327,11 +327,11 @@ class DrivenTool(ToolKinematics):
     def equations(self, q: FloatArray, joint: int | None = None) -> PoseEquations:
         """Return the equations of a path of the tool that begins at `q` (n,) [rad].
 
-        Of more than six axes ``joint`` is locked, or the swivel, or the joints without
-        which the others move the tool best.
+        Of more than six axes ``joint`` is locked, or the one that sets the arm angle, or the
+        joints without which the others move the tool best.
         """
-        swivel = self.solver.swivel if joint is None else joint
-        equations = PoseEquations(self._tracker.descent, () if swivel is None else (swivel,))
+        locked = self.solver.arm_angle_joint if joint is None else joint
+        equations = PoseEquations(self._tracker.descent, () if locked is None else (locked,))
         while len(equations.free) > 6:
             rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]
             equations = max(rest, key=lambda candidate: candidate.least(q))

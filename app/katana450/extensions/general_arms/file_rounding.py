@@ -24,7 +24,6 @@ from katana450.maths.kinematics.turns import in_limits_turns
 
 CORRECTIONS: Final = 2
 
-
 BESIDE: Final = 10.0
 """[1] Ratio of a miss to the bound `FileRounding.offset`, above which the pose is out of reach."""
 

@@ -26,7 +26,7 @@ class GeneralKinematics(Kinematics):
         """The names of the branches, in the order of the solutions."""
 
     @property
-    def swivel(self) -> int | None:
+    def arm_angle_joint(self) -> int | None:
         """Index of the joint that is the parameter of seven axes; None without one."""
         return None
 
@@ -48,14 +48,14 @@ class GeneralKinematics(Kinematics):
         """
         return None
 
-    def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray | None:
-        """Return `postures` (N, k, n) for poses (N, 4, 4), with the swivel of ``near`` (n,)."""
+    def at_arm_angle_of(self, T: FloatArray, near: FloatArray) -> FloatArray | None:
+        """Return `postures` (N, k, n) for poses (N, 4, 4), with the arm angle of ``near`` (n,)."""
         postures = [posture for pose in T if (posture := self.postures(pose, near)) is not None]
         return np.array(postures) if postures else None
 
     def branch_of(self, q: FloatArray) -> str:
         """Return the name of the branch of the joint angles `q` (n,) [rad]."""
-        postures = self.at_its_swivel(forward(self.chain, q)[None], q)
+        postures = self.at_arm_angle_of(forward(self.chain, q)[None], q)
         if postures is None:
             return self.branches[0]
         turns = postures[0] - q

@@ -3,7 +3,7 @@
 There are as many as joints that are not locked: three for the tool point, and those of the
 rotation. From six axes on these are all three components of the rotation from the tool to the pose.
 With n < 6 axes they are its components about the last n - 3 axes, and the pose turns with axis 1.
-Of more than six axes the joints ``locked`` are given, such as the swivel of seven.
+Of more than six axes the joints ``locked`` are given, such as the one that sets the arm angle.
 
 Derivatives come from the same equations on jets. With the exact angles and the matrix of the
 equations at one place, each step of Newton's method makes one more derivative exact (Griewank and

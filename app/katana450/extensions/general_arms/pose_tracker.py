@@ -2,8 +2,8 @@
 
 Six axes with a closed form take the posture of their branch at each place of the path, if it is a
 hop away. At limits, out of reach, and for all other arms, `Descent` leads the goal on. Its steps
-can turn the swivel of seven axes to the edge of the branch; a way that leads on with the swivel as
-it was is then taken.
+can turn the arm angle of seven axes to the edge of the branch; a way that leads on with the arm
+angle as it was is then taken.
 The goal stays on its branch and never leaps; a pose that only a leap would reach is reported.
 """
 
@@ -40,8 +40,8 @@ EFFORT_OF_FORM: Final = 2
 LEAST_PART: Final = 1.0 / 32.0
 """[1] Smallest part of a stride that the closed form is asked for."""
 
-SWIVEL_SAMPLES: Final = 24
-"""Number of places of a stride to which a branch of seven axes is followed with its swivel."""
+ARM_ANGLE_SAMPLES: Final = 24
+"""Number of places of a stride to which a branch of seven axes is followed with its arm angle."""
 
 EXACT: Final = 1e-8
 """[rad], [arm lengths] Error of the pose up to which a closed form's posture takes it."""
@@ -77,8 +77,8 @@ class PoseTracker:
             before = angles
             angles, effort, ended = self._advanced(angles, place, stop, branch, priority, effort)
             if place is since and not ended and self._is_led_along_edge(angles, stop, priority):
-                at_swivel = self._with_its_swivel(before, stop, branch)
-                angles, ended = (angles, False) if at_swivel is None else (at_swivel, True)
+                at_arm_angle = self._at_its_arm_angle(before, stop, branch)
+                angles, ended = (angles, False) if at_arm_angle is None else (at_arm_angle, True)
             if not ended or (effort <= 0 and stop is not target):
                 return Tracked(projected(np.array(angles)), since=stop if ended else place)
             place = stop
@@ -119,22 +119,23 @@ class PoseTracker:
 
     def _is_led_along_edge(self, q: Angles, stop: ToolTarget, priority: Priority) -> bool:
         """Return whether steps of seven axes towards ``stop`` ended at the edge of the branch."""
-        if self.branches.swivel is None or priority is not Priority.POSE:
+        if self.branches.arm_angle_joint is None or priority is not Priority.POSE:
             return False
         now = self.descent.look(self.descent.goal(stop), q)
         return now.least < NEAR and float(np.abs(now.error).max()) > EXACT
 
-    def _with_its_swivel(self, q: Angles, stop: ToolTarget, branch: str) -> Angles | None:
-        """Return the posture of ``branch`` at ``stop`` with the swivel of `q`; None without a way.
+    def _at_its_arm_angle(self, q: Angles, stop: ToolTarget, branch: str) -> Angles | None:
+        """Return the posture of ``branch`` at ``stop`` with the arm angle of `q`.
 
-        On the way every posture is inside the limits, clear of the edge, and a hop from the last.
+        None without a way there. On it every posture is inside the limits, clear of the edge, and a
+        hop from the last.
         """
         near = np.array(q)
         number = self.branches.branches.index(branch)
 
         def on_branch(places: Sequence[ToolTarget]) -> FloatArray:
             T = np.array([place.T for place in places])
-            postures = self.branches.at_its_swivel(T, near)
+            postures = self.branches.at_arm_angle_of(T, near)
             assert postures is not None
             return postures[:, number]
 
@@ -142,7 +143,7 @@ class PoseTracker:
             return None
         start = ToolTarget.of(forward(self.chain, near))
         places = [
-            *(start.towards(stop, k / SWIVEL_SAMPLES) for k in range(1, SWIVEL_SAMPLES)),
+            *(start.towards(stop, k / ARM_ANGLE_SAMPLES) for k in range(1, ARM_ANGLE_SAMPLES)),
             stop,
         ]
         steps = np.diff(on_branch(places), axis=0, prepend=near[None])

@@ -1,16 +1,17 @@
 """The closed form of seven axes: one joint is locked at chosen angles, the other six are solved.
 
-Seven axes take a pose in a curve of postures for each branch. The locked joint is its parameter,
-the swivel. The formulas are those of spherical_wrist.py, on arrays of swivels:
+Seven axes take a pose in a curve of postures for each branch. The locked joint is its parameter: it
+sets the arm angle, and its angle is called so here. The formulas are those of spherical_wrist.py,
+on arrays of arm angles:
 
     axis 3 locked    axes 1 and 2 meet, and 5, 6 and 7 (iiwa): the lock is part of the link between
                      axes 2 and 4.
     axis 1 locked    axes 2 to 7 have a spherical wrist: the lock moves the base of the others.
     axis 7 or 5      the same seen from the tool (Panda: axes 1, 2 and 3 meet, and 5 and 6).
 
-Of all swivels, the posture of each branch is taken that keeps farthest from the joint limits, or
-nearest to a given posture, inside the limits if there is one. A grid of swivels covers the whole
-range. Each branch is computed when it is read.
+Of all arm angles, the posture of each branch is taken that keeps farthest from the joint limits, or
+nearest to a given posture, inside the limits if there is one. A grid covers the whole range.
+Each branch is computed when it is read.
 """
 
 from __future__ import annotations
@@ -36,11 +37,11 @@ from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.spherical_wrist import (
     Solve,
+    arm_angle_link,
     crossing_shoulder,
     is_crossing_shoulder,
     is_parallel_shoulder,
     parallel_shoulder,
-    swivel_link,
     wrist_centre,
 )
 from katana450.maths.geometry import se3
@@ -52,8 +53,8 @@ from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
 _TURNS: Final = 1.0 / math.tau  # [1/rad]
 
-SWIVELS: Final = 128
-"""Number of swivels on the grid."""
+ARM_ANGLES: Final = 128
+"""Number of arm angles on the grid."""
 
 REACHED: Final = ARRAYS._replace(
     root=np.sqrt, bounded=lambda x: x, where_free=lambda _condition, _a, b: b
@@ -95,7 +96,7 @@ def _locks_third(links: DHLinks) -> bool:
         return False
     six = _six_of(links)
     cx, cy, _ = wrist_centre(six)
-    between = np.array(swivel_link(links, np.linspace(-3.0, 3.0, 13)))
+    between = np.array(arm_angle_link(links, np.linspace(-3.0, 3.0, 13)))
     x = between[0] * between[3] + between[4] * between[7] + between[8] * between[11]
     y = between[1] * between[3] + between[5] * between[7] + between[9] * between[11]
     return bool(math.hypot(cx, cy) * np.hypot(x, y).min() > tolerances.FAMILY_LENGTH**2)
@@ -114,7 +115,7 @@ class SevenAxes(GeneralKinematics):
     Attributes:
         chain: the chain.
         links: of the chain, or of the chain seen from the tool.
-        locked: index of the swivel in `links`, 0 or 2.
+        locked: index of the parameter in `links`, 0 or 2.
         is_reversed: whether `links` are seen from the tool.
     """
 
@@ -142,34 +143,35 @@ class SevenAxes(GeneralKinematics):
 
     @cached_property
     def rounding(self) -> FileRounding:
-        """The rounding of the file that describes the chain; `at_swivels` does not correct it."""
+        """The rounding of the file of the chain; `at_arm_angles` does not correct it."""
         return FileRounding(self.chain, self.links)
 
     @property
-    def swivel(self) -> int:
+    def arm_angle_joint(self) -> int:
         """Index, from 0, of the joint of the chain that is the parameter."""
         return 6 - self.locked if self.is_reversed else self.locked
 
     @property
     def method(self) -> str:
         """The method in words."""
-        return f"closed form for seven axes whose arm angle is set by axis {self.swivel + 1}"
+        axis = self.arm_angle_joint + 1
+        return f"closed form for seven axes whose arm angle is set by axis {axis}"
 
     @cached_property
     def branches(self) -> tuple[str, ...]:
         """Names of the branches, in the order of the solutions; see branch_words.py."""
-        joints = tuple(k for k in range(7) if k != self.swivel)
+        joints = tuple(k for k in range(7) if k != self.arm_angle_joint)
         words = BranchWords(self.chain, joints, self.is_reversed)
-        return words.in_order(lambda T, q: self.at_swivels(T, q[[self.swivel]])[0])
+        return words.in_order(lambda T, q: self.at_arm_angles(T, q[[self.arm_angle_joint]])[0])
 
-    def at_swivels(self, T: FloatArray, swivels: FloatArray) -> FloatArray:
-        """Return the joint angles (N, 8, 7) [rad] at `swivels` (N,).
+    def at_arm_angles(self, T: FloatArray, arm_angles: FloatArray) -> FloatArray:
+        """Return the joint angles (N, 8, 7) [rad] at `arm_angles` (N,).
 
-        They are for the pose `T` (4, 4), or for one pose at each swivel (N, 4, 4).
+        They are for the pose `T` (4, 4), or for one pose at each arm angle (N, 4, 4).
         """
-        q = np.empty((len(swivels), 8, 7))
+        q = np.empty((len(arm_angles), 8, 7))
         with np.errstate(all="ignore"):
-            for k, angles in enumerate(self._at(swivels, ARRAYS)(self._rows(T))):
+            for k, angles in enumerate(self._at(arm_angles, ARRAYS)(self._rows(T))):
                 q[:, k] = angles.T
         return in_limits_turns(self.chain, q)
 
@@ -186,14 +188,14 @@ class SevenAxes(GeneralKinematics):
         return se3.inverse(self.links.link(0))
 
     def _at(
-        self, swivels: FloatArray, f: Operations
+        self, arm_angles: FloatArray, f: Operations
     ) -> Callable[[FloatArray], Iterator[FloatArray]]:
         """Return a function of `_rows` for the joint angles (7, N) [rad] of each branch in turn.
 
         The angles may be whole turns beyond the limits.
         """
         links, locked, order = self.links, self.locked, -1 if self.is_reversed else 1
-        alpha = swivels + links.shift[locked]
+        alpha = arm_angles + links.shift[locked]
         before, columns_before = None, np.empty(0)
         if locked == 2:
             solve, places = _around_third(links, f, alpha), (0, 1, 3, 4, 5, 6)
@@ -205,13 +207,13 @@ class SevenAxes(GeneralKinematics):
 
         def branches(rows: FloatArray) -> Iterator[FloatArray]:
             if rows.ndim == 2:
-                # The same pose at all swivels: one product without a copy.
+                # The same pose at all arm angles: one product without a copy.
                 columns = rows[..., None] if before is None else rows.T @ columns_before
             else:
                 columns = np.moveaxis(rows if before is None else before @ rows, 0, -1).copy()
             for angles in solve(columns, shifts):
-                q = np.empty((7, len(swivels)))
-                q[locked] = swivels
+                q = np.empty((7, len(arm_angles)))
+                q[locked] = arm_angles
                 for place, angle, shift in zip(places, angles, shifts, strict=True):
                     q[place] = angle - shift
                 yield q[::order]
@@ -222,14 +224,14 @@ class SevenAxes(GeneralKinematics):
         """Return `best` of all branches with ``near`` as the hint."""
         return np.array([*self.best(T, near)])
 
-    def at_its_swivel(self, T: FloatArray, near: FloatArray) -> FloatArray:
-        """Return `at_swivels` with the swivel of ``near`` for each of the poses, refined."""
-        q = self.at_swivels(T, np.full(len(T), near[self.swivel]))
+    def at_arm_angle_of(self, T: FloatArray, near: FloatArray) -> FloatArray:
+        """Return `at_arm_angles` with the arm angle of ``near`` for each of the poses, refined."""
+        q = self.at_arm_angles(T, np.full(len(T), near[self.arm_angle_joint]))
         return self._refined(q.reshape(-1, 7), np.repeat(T, 8, axis=0)).reshape(q.shape)
 
     def _refined(self, q: FloatArray, T: FloatArray) -> FloatArray:
-        """Return postures `q` (N, 7) [rad] as those of the arm in the file, at their swivels."""
-        return self.rounding.corrected(q, T, locked=(self.swivel,))
+        """Return postures `q` (N, 7) [rad] as those of the arm in the file, at their arm angles."""
+        return self.rounding.corrected(q, T, locked=(self.arm_angle_joint,))
 
     def inverse(self, T: npt.ArrayLike, q_hint: npt.ArrayLike | None = None) -> Solutions:
         """Return a posture for each of `branches`; see `Kinematics.inverse`.
@@ -242,11 +244,11 @@ class SevenAxes(GeneralKinematics):
         return Solutions(self.chain, pose, self.best(pose, hint), self.branches)
 
     def best(self, T: FloatArray, hint: FloatArray | None = None) -> Iterator[Angles]:
-        """Yield the joint angles (7,) [rad] of the best swivel of each branch."""
+        """Yield the joint angles (7,) [rad] of the best arm angle of each branch."""
         postures = self._best(T, hint)
         if self.rounding.is_corrected:
             poses = np.broadcast_to(T, (8, 4, 4))
-            # With the elbow almost straight, another swivel may take the pose.
+            # With the elbow almost straight, another arm angle may take the pose.
             q = self.rounding.corrected(self._refined(np.array([*postures]), poses), poses)
             postures = map(tuple, self._turned(q.T, hint).T.tolist())
         yield from postures
@@ -255,9 +257,10 @@ class SevenAxes(GeneralKinematics):
         """Yield `best` of the exact arm."""
         rows, solved = self._rows(T), self._on_grid
         if hint is not None:
-            # The posture next to the hint may lie where the swivel hardly changes along the curve.
+            # The posture next to the hint may lie where the arm angle hardly changes on the curve.
             neighbour = search_of(self.chain).solve(T, hint, seeds=0)
-            ends = self._bounded(np.array([hint[self.swivel], neighbour[self.swivel]]))
+            joint = self.arm_angle_joint
+            ends = self._bounded(np.array([hint[joint], neighbour[joint]]))
             solved = self._at(np.append(self._grid, ends), BOUNDED)
         postures = solved(rows)
         for branch in range(8):
@@ -267,10 +270,10 @@ class SevenAxes(GeneralKinematics):
             best = int(cost.argmin())
             q = q[:, best]
             if cost[best] == math.inf:
-                # No swivel takes the pose: the one that comes nearest.
+                # No arm angle takes the pose: the one that comes nearest.
                 with np.errstate(all="ignore"):
                     q = next(islice(self._near_grid(rows), branch, None))
-                targets = np.broadcast_to(T, (SWIVELS, 4, 4))
+                targets = np.broadcast_to(T, (ARM_ANGLES, 4, 4))
                 position, rotation = errors_of(self.chain, q.T[:, None], targets)
                 q = self._turned(q, hint)[:, int((position + rotation).argmin())]
             yield tuple(q.tolist())
@@ -278,7 +281,7 @@ class SevenAxes(GeneralKinematics):
     @cached_property
     def _grid(self) -> FloatArray:
         low, high = self._range
-        return np.linspace(low, high, SWIVELS, endpoint=False) + 0.5 * (high - low) / SWIVELS
+        return np.linspace(low, high, ARM_ANGLES, endpoint=False) + 0.5 * (high - low) / ARM_ANGLES
 
     @cached_property
     def _on_grid(self) -> Callable[[FloatArray], Iterator[FloatArray]]:
@@ -290,14 +293,15 @@ class SevenAxes(GeneralKinematics):
 
     @cached_property
     def _range(self) -> tuple[float, float]:
-        low, high = float(self.chain.lower[self.swivel]), float(self.chain.upper[self.swivel])
+        joint = self.arm_angle_joint
+        low, high = float(self.chain.lower[joint]), float(self.chain.upper[joint])
         return (low, high) if high - low < math.tau else (-math.pi, math.pi)
 
-    def _bounded(self, swivels: FloatArray) -> FloatArray:
-        """Return `swivels` [rad] inside the range of the grid."""
+    def _bounded(self, arm_angles: FloatArray) -> FloatArray:
+        """Return `arm_angles` [rad] inside the range of the grid."""
         low, high = self._range
-        turns = np.round((swivels - 0.5 * (low + high)) / math.tau)
-        return np.clip(swivels - math.tau * turns, low, high)
+        turns = np.round((arm_angles - 0.5 * (low + high)) / math.tau)
+        return np.clip(arm_angles - math.tau * turns, low, high)
 
     @cached_property
     def _limits(self) -> tuple[FloatArray, FloatArray]:
@@ -329,7 +333,7 @@ class SevenAxes(GeneralKinematics):
 
 def _around_third(links: DHLinks, f: Operations, alpha: FloatArray) -> Solve:
     """Return the solver of the axes beside the third, which is turned by `alpha` (N,) [rad]."""
-    return crossing_shoulder(_six_of(links), f, swivel_link(links, alpha))
+    return crossing_shoulder(_six_of(links), f, arm_angle_link(links, alpha))
 
 
 @lru_cache(maxsize=64)

@@ -243,7 +243,7 @@ def _apart(links: DHLinks, i: int) -> str:
     return f"they meet in two points {1e3 * abs(links.d[i]):.3g} mm apart"
 
 
-def swivel_link(links: DHLinks, theta: FloatArray) -> tuple[Number, ...]:
+def arm_angle_link(links: DHLinks, theta: FloatArray) -> tuple[Number, ...]:
     """Return L_2 Rz(theta) L_3 for angles ``theta`` (N,) [rad] of the third joint, 12 rows."""
     before, after = links.link(1), links.link(2)
     c, s, zero = np.cos(theta), np.sin(theta), np.zeros_like(theta)

@@ -12,7 +12,7 @@ The orientations that are tried depend on what the arm can choose:
 
 An orientation counts if a posture takes it with every joint inside its limits, and no axis from the
 third on is below the table where its link begins. Contacts of bodies are not checked. Of seven axes
-the swivel is tried at some angles, and the search of a point begins at few postures; so both can
+some arm angles are tried, and the search of a point begins at few postures; so both can
 miss an orientation, but count none too many.
 """
 
@@ -34,7 +34,7 @@ from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import search_of
-from katana450.extensions.general_arms.swivel import SevenAxes
+from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
@@ -53,8 +53,8 @@ IntArray = npt.NDArray[np.int64]
 FREE_AXES: Final = 6
 """Minimum number of axes with which a tool has every orientation."""
 
-SWIVELS: Final = 16
-"""Number of angles of the swivel of seven axes that are tried for a pose."""
+ARM_ANGLES: Final = 16
+"""Number of arm angles of seven axes that are tried for a pose."""
 
 
 class Orientations(Protocol):
@@ -94,18 +94,20 @@ class PoseSolver:
     def taken(self, T: FloatArray) -> BoolArray:
         """Return (N,) whether a posture inside the limits takes the pose, for `T` (N, 4, 4)."""
         if isinstance(self.solver, SevenAxes):
-            return self._with_swivel(self.solver, T)
+            return self._at_arm_angles(self.solver, T)
         return self._exact(self.solver.inverse_batch(T), T)
 
-    def _with_swivel(self, solver: SevenAxes, T: FloatArray) -> BoolArray:
-        low, high = self.chain.lower[solver.swivel], self.chain.upper[solver.swivel]
-        step = (high - low) / SWIVELS
-        swivels = np.linspace(low + 0.5 * step, high - 0.5 * step, SWIVELS)
+    def _at_arm_angles(self, solver: SevenAxes, T: FloatArray) -> BoolArray:
+        joint = solver.arm_angle_joint
+        low, high = self.chain.lower[joint], self.chain.upper[joint]
+        step = (high - low) / ARM_ANGLES
+        arm_angles = np.linspace(low + 0.5 * step, high - 0.5 * step, ARM_ANGLES)
         is_taken = np.zeros(len(T), dtype=np.bool)
         # Those in the middle take the most poses, which the others need not try.
-        for swivel in swivels[np.argsort(np.abs(swivels - 0.5 * (low + high)), kind="stable")]:
+        order = np.argsort(np.abs(arm_angles - 0.5 * (low + high)), kind="stable")
+        for arm_angle in arm_angles[order]:
             left = np.flatnonzero(~is_taken)
-            q = solver.at_swivels(T[left], np.full(len(left), swivel))
+            q = solver.at_arm_angles(T[left], np.full(len(left), arm_angle))
             is_taken[left] = self._exact(q, T[left])
         return is_taken
 
@@ -128,7 +130,7 @@ class PoseSolver:
         pose, branch = np.nonzero(inside)
         # Postures for a pose out of reach are only near it.
         distance, turn = errors_of(chain, q[pose, branch][:, None], T[pose])
-        # The swivels are solved for the exact arm, beside which the file describes this one.
+        # The arm angles are solved for the exact arm, beside which the file describes this one.
         off = 0.0
         if isinstance(self.solver, ClosedForm | SevenAxes):
             off = self.solver.rounding.offset
@@ -422,7 +424,6 @@ def rotations(directions: int, rolls: int) -> FloatArray:
 POSES: Final = 65536
 """Number of poses that are solved at once; they take 50 MB."""
 
-
 MIN_VOXEL = 1e-3
 """[m] Minimum edge of a voxel: the accuracy of the arm's joints at the tool."""
 
@@ -496,7 +497,7 @@ class Fineness(NamedTuple):
 
 FAMILY: Final = Fineness(32, 36, 24, 2_000_000_000)
 CLOSED: Final = Fineness(16, 24, 6, 100_000_000)
-SWIVEL: Final = Fineness(10, 12, 4, 10_000_000)
+SEVEN_AXES: Final = Fineness(10, 12, 4, 10_000_000)
 POINTS: Final = Fineness(10, 1, 1, 200_000)
 
 
@@ -537,6 +538,6 @@ def _fineness(kinematics: Kinematics) -> Fineness:
     if isinstance(kinematics, FiveAxisKinematics):
         return FAMILY
     if isinstance(kinematics, SevenAxes):
-        return SWIVEL
+        return SEVEN_AXES
     is_closed = isinstance(kinematics, ClosedForm) and kinematics.chain.n >= FREE_AXES
     return CLOSED if is_closed else POINTS

@@ -71,7 +71,7 @@ as the fingers close.
 """
 
 SWINGS: Final = tuple(np.radians((-30.0, 30.0, -60.0, 60.0)).tolist())
-"""[rad] Turns of the swivel of seven axes with which a pose is tried."""
+"""[rad] Turns of the arm angle with which a pose is tried."""
 
 MAX_BRANCHES: Final = 4
 """Maximum number of branches on which a grasp is tried."""
@@ -236,7 +236,7 @@ class HandPlanning:
         T = se3.from_rotation_translation(R, target.position)
         present, hints = kinematics.branch_of(q), [q]
         for axis in kinematics.equations(q).locked[:1]:
-            # The swivel of the posture there may be another one.
+            # The posture there may have another arm angle.
             hints += [chain.clamp(q + swing * np.eye(chain.n)[axis]) for swing in SWINGS]
         for hint in hints:
             postures = [

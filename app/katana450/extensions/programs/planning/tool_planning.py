@@ -46,7 +46,7 @@ VERTICAL: Final = 1e-6
 """[1] Cosine of the pitch below which roll and yaw are not distinct."""
 
 SWINGS: Final = tuple(np.radians((15, -15, 30, -30, 60, -60, 90, -90)).tolist())
-"""[rad] Turns of the swivel along a path, in the order in which they are tried."""
+"""[rad] Turns of the arm angle along a path, in the order in which they are tried."""
 
 LEAST_STEADY: Final = 0.25
 """[1] Least part of the joint that leads a path of the elbow in the motion of all joints."""
@@ -55,7 +55,7 @@ ELBOW_SLACK: Final = 1e-6
 """[deg] Turn of the elbow that counts as none."""
 
 PROBES: Final = (1.0, 0.75, 0.5, 0.25)
-"""Places of a curve at which the reach is tried before the swivel is turned."""
+"""Places of a curve at which the reach is tried before the arm angle is turned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +265,7 @@ class ToolPlanning:
     def path(self, q: FloatArray, curve: Curve, branch: AnyBranch) -> Path:
         """Return the joint path along ``curve`` on ``branch``, which begins as near `q` as it can.
 
-        The swivel of seven axes keeps its angle, or turns evenly where that does not do. Raises
+        The arm angle keeps its value, or turns evenly where that does not do. Raises
         PathError for a curve that the arm cannot follow.
         """
         if isinstance(branch, Branch):
@@ -288,9 +288,9 @@ class ToolPlanning:
             refusal = error
         if not equations.locked or not self._may_swing(q, curve, branch):
             raise refusal
-        chain, swivel = self.chain, equations.locked[0]
+        chain, joint = self.chain, equations.locked[0]
         for swing in SWINGS:
-            if chain.lower[swivel] <= q[swivel] + swing <= chain.upper[swivel]:
+            if chain.lower[joint] <= q[joint] + swing <= chain.upper[joint]:
                 turns = np.zeros(len(equations.locked))
                 turns[0] = swing
                 with suppress(PathError):
@@ -298,9 +298,9 @@ class ToolPlanning:
         raise refusal
 
     def _may_swing(self, q: FloatArray, curve: Curve, branch: AnyBranch) -> bool:
-        """Return whether a turn of the swivel may help on a curve that is refused without.
+        """Return whether a turn of the arm angle may help on a curve that is refused without.
 
-        It does not where a place is out of reach with every swivel. A closed curve must close in
+        It does not where a place is out of reach with every arm angle. A closed curve must close in
         the joints too.
         """
         start, *places = (curve.at(Jet.variable(sigma)).target for sigma in (0.0, *PROBES))
