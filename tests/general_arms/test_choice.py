@@ -33,6 +33,7 @@ from tests.general_arms.published_arms import (
     SKEWED,
     SKEWED_6,
     UR5E,
+    XARM_6,
     craig,
     ur5e,
 )
@@ -84,6 +85,22 @@ def test_five_axes_keep_their_own_solver() -> None:
     assert found[0].exact
     np.testing.assert_allclose(found[0].q, q, atol=1e-12)
     assert exact_arm(chain).chain is chain
+
+
+@pytest.mark.parametrize("chain", [PINCHERX_100, katana(), UR5E, XARM_6, PANDA])
+def test_every_arm_tells_its_branches_apart_in_the_same_way(chain: Chain) -> None:
+    kinematics = kinematics_of(chain)
+    for q in np.random.default_rng(9).uniform(chain.lower, chain.upper, (5, chain.n)):
+        T, branch = forward(chain, q), kinematics.branch_of(q)
+        posture = kinematics.on_branch(T, branch, q)
+        assert posture is not None
+        np.testing.assert_allclose(forward(chain, posture), T, atol=1e-9)
+        assert kinematics.branch_of(posture) == branch
+        joint = kinematics.arm_angle_joint
+        arm_angle = 0.0 if joint is None else float(q[joint])
+        (postures,) = kinematics.at_arm_angles(T[None], np.array([arm_angle]))
+        turns = np.abs(np.exp(1j * postures) - np.exp(1j * q)).max(axis=1)
+        assert np.nanmin(turns) < 1e-6
 
 
 LIMITS = ([-2.0] * 6, [2.0] * 6)

@@ -12,7 +12,6 @@ import pytest
 from katana450.arm.control.state.state import State
 from katana450.extensions.general_arms.descent import NEAR
 from katana450.extensions.general_arms.driven_tool import SETTLINGS, DrivenTool
-from katana450.extensions.general_arms.general_kinematics import near_turns
 from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray
@@ -20,6 +19,7 @@ from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import jacobian_space
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
+from katana450.maths.kinematics.turns import near_turns
 from tests.conftest import MANY_DRAGS
 from tests.general_arms.published_arms import FOUR, NEAR_MISS, OFFSET, SEVEN, SIX, SKEWED
 
@@ -73,7 +73,7 @@ def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -
         return near_turns(chain, found, q) if np.isfinite(found).all() else None
     for _ in range(SETTLINGS if chain.n < 6 else 1):
         pose = np.array(place.T)
-        pose[:3, :3] = tool._pan(q) @ pose[:3, :3]
+        pose[:3, :3] = tool.pan(q) @ pose[:3, :3]
         found = solver.on_branch(pose, branch, q)
         if found is None:
             return None

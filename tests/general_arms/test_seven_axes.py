@@ -39,7 +39,7 @@ def test_locked_joint_is_the_one_whose_rest_has_a_closed_form() -> None:
 
 
 @pytest.mark.parametrize("name", SEVEN)
-def test_posture_is_found_again_at_arm_angle_of(name: str) -> None:
+def test_posture_is_found_again_at_its_arm_angle(name: str) -> None:
     chain = SEVEN[name]
     solver = seven_axes(chain)
     rng = np.random.default_rng(1)

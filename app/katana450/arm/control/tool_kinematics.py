@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar, cast
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from katana450.arm.control.state import findings
 from katana450.arm.control.state.messages import PRIORITIES, PRIORITY_HINTS
 from katana450.arm.control.state.state import Finding, State
 from katana450.caching import cached_property
+from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics import projection, tracker, velocity
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch, branch_of
+from katana450.maths.kinematics.branch import BRANCHES, AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
@@ -57,21 +58,26 @@ class ToolKinematics(ABC):
         """The inverse kinematics of the chain."""
 
     @property
+    def is_pitched(self) -> bool:
+        """True if the targets of the tool have a pitch and a roll, see `ToolTarget.is_pitched`."""
+        return self.solver.is_pitched
+
+    @property
     def branches(self) -> tuple[AnyBranch, ...]:
         """Every branch, in the order in which they are shown."""
         return self.solver.branches
 
-    @abstractmethod
     def branch_of(self, q: FloatArray) -> AnyBranch:
         """Return the branch of the joint angles `q` (n,) [rad]."""
+        return self.solver.branch_of(q)
 
     @abstractmethod
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the target at which the tool is with the joints at `q` (n,) [rad]."""
 
-    @abstractmethod
-    def turned(self, state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
-        """Return ``target`` with the orientation of ``command``, which is a `turn`."""
+    def pan(self, q: FloatArray) -> FloatArray:
+        """Return the rotation (3, 3) that axis 1 gives to targets of fewer than six axes."""
+        return so3.exp(self.chain.S[:3, 0] * float(q[0])) if self.chain.n < 6 else np.eye(3)
 
     @abstractmethod
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
@@ -170,18 +176,9 @@ class FiveAxisTool(ToolKinematics):
         """The closed form of the family."""
         return FiveAxisKinematics(self.chain)
 
-    def branch_of(self, q: FloatArray) -> AnyBranch:
-        """Return `branch.branch_of`."""
-        return branch_of(self.chain, q)
-
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the five freedoms of the tool at `q` (5,) [rad]."""
         return ToolTarget.at(self.chain, q)
-
-    def turned(self, _state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
-        """Return ``target`` with the pitch and roll of ``command``."""
-        turn = cast(Turn, command)
-        return ToolTarget(target.position, turn.pitch, turn.roll)
 
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then pitch and roll [rad]."""
@@ -262,4 +259,4 @@ class FiveAxisTool(ToolKinematics):
 
 
 def _five(branch: AnyBranch) -> Branch:
-    return cast(Branch, branch)
+    return Branch.parse(str(branch))

@@ -39,6 +39,7 @@ import numpy as np
 from katana450.caching import cached_property
 from katana450.errors import RobotDescriptionError
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
 
@@ -253,3 +254,13 @@ def _elbow(bends_down: float) -> str:
 
 def _wrist(bends_down: float) -> str:
     return "noflip" if bends_down >= 0.0 else "flip"
+
+
+def in_order_for_people(branches: tuple[AnyBranch, ...]) -> tuple[str, ...]:
+    """Return the names of branches with those of usual postures first, without ordinals."""
+    second = {
+        name: [word in SECOND for word in name.split("-")]
+        for name in map(str, branches)
+        if not name.endswith(ORDINALS)
+    }
+    return tuple(sorted(second, key=second.__getitem__))

@@ -65,7 +65,7 @@ def exact_arm(described: Chain) -> ExactArm:
     postures are refined. So does one whose file rounds by at most FINE, if that moves the tool by
     more than FAMILY_EXACT.
     """
-    if isinstance(kinematics_of(described), Numerical | OffsetWrist | FiveAxisKinematics):
+    if kinematics_of(described).file_offset is None:
         return ExactArm(described, ())
     links = links_of(described)
     angle, length = links.rounding

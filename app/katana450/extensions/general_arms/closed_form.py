@@ -15,7 +15,6 @@ from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS, FLOATS, Operations
-from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.parallel_axes import (
     LOOSE,
@@ -36,6 +35,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse_batch import validated_poses
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.solution import Angles, Solutions
 from katana450.maths.kinematics.turns import (
     another_turn_helps,
@@ -102,7 +102,7 @@ def form_of(links: DHLinks) -> Form | str:
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedForm(GeneralKinematics):
+class ClosedForm(Kinematics):
     """Inverse kinematics of one chain in closed form: all branches of every pose.
 
     Attributes:
@@ -156,6 +156,11 @@ class ClosedForm(GeneralKinematics):
     def rounding(self) -> FileRounding:
         """The rounding of the file that describes the chain."""
         return FileRounding(self.chain, self.form.links)
+
+    @property
+    def file_offset(self) -> float:
+        """`FileRounding.offset`."""
+        return self.rounding.offset
 
     @cached_property
     def _canonical(self) -> Callable[[FloatArray, Sequence[float]], Iterable[Angles]]:

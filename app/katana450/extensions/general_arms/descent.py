@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.numerical import Numerical
+from katana450.extensions.general_arms.numerical import Numerical, search_of
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.tracker import HOP
@@ -315,6 +317,13 @@ class Descent:
             matrices.append(self.regularity.matrix(J))
         least = np.linalg.svd(np.array(matrices), compute_uv=False)[:, -1]
         return np.asarray((least - now.least) / PROBE)
+
+
+@lru_cache(maxsize=64)
+def descent_of(solver: Kinematics) -> Descent:
+    """Return the search of the arm of ``solver`` on its branches; the result is cached."""
+    chain = solver.chain
+    return Descent(search_of(chain), Regularity(chain.n, solver.arm_angle_joint))
 
 
 def _turned_with_axis_1(goal: tuple[float, ...], angle: float) -> tuple[float, ...]:

@@ -22,15 +22,11 @@ from katana450.arm.robot.structure import Structure, structure_of
 from katana450.arm.robot.urdf import Urdf
 from katana450.caching import cached_property
 from katana450.errors import RobotDescriptionError
+from katana450.extensions.general_arms.branch_words import in_order_for_people
 from katana450.extensions.general_arms.choice import exact_arm, kinematics_of
-from katana450.extensions.general_arms.descent import WALL, Descent, Regularity
-from katana450.extensions.general_arms.general_kinematics import (
-    GeneralKinematics,
-    in_order_for_people,
-)
+from katana450.extensions.general_arms.descent import WALL, Descent, descent_of
 from katana450.extensions.general_arms.nearest import losses_of, nearest_posture, projected
-from katana450.extensions.general_arms.numerical import search_of
-from katana450.extensions.general_arms.pose_equations import PoseEquations
+from katana450.extensions.general_arms.pose_equations import equations_from
 from katana450.extensions.general_arms.pose_tracker import PoseTracker
 from katana450.maths.geometry import so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
@@ -38,6 +34,7 @@ from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import POSITION_WORTH_TELLING, Projection
 from katana450.maths.kinematics.tool import ToolTarget
@@ -158,52 +155,36 @@ class DrivenTool(ToolKinematics):
     priorities: ClassVar[Mapping[Priority, tuple[str, str]]] = SIX_PRIORITIES
 
     @cached_property
-    def solver(self) -> GeneralKinematics:
+    def solver(self) -> Kinematics:
         """The closed form of the chain, or the search."""
-        solver = kinematics_of(self.chain)
-        assert isinstance(solver, GeneralKinematics)
-        return solver
+        return kinematics_of(self.chain)
 
     @cached_property
     def _tracker(self) -> PoseTracker:
-        regularity = Regularity(self.chain.n, self.solver.arm_angle_joint)
-        return PoseTracker(Descent(search_of(self.chain), regularity), self.solver)
+        return PoseTracker(descent_of(self.solver), self.solver)
 
     @property
     def branches(self) -> tuple[AnyBranch, ...]:
         """The names of the branches, those of usual postures first."""
         return in_order_for_people(self.solver.branches)
 
-    def branch_of(self, q: FloatArray) -> AnyBranch:
-        """Return the name of the branch of `q` (n,) [rad]."""
-        return self.solver.branch_of(q)
-
     def target_at(self, q: FloatArray) -> ToolTarget:
         """Return the pose of the tool at `q` (n,) [rad]."""
         return self._seen(forward(self.chain, q), q)
 
-    def turned(self, state: State, target: ToolTarget, command: TurnCommand) -> ToolTarget:
-        """Return ``target`` with the rotation of ``command``."""
-        assert isinstance(command, Orient)
-        return ToolTarget(target.position, rotation=frozen(self._pan(state.goal).T @ command.R))
-
     def stepped(self, state: State, target: ToolTarget, step: StepTool) -> ToolTarget:
         """Return ``target`` moved by ``step``: x, y, z [m], then a rotation vector [rad]."""
-        pan, by = self._pan(state.goal), step.by
+        pan, by = self.pan(state.goal), step.by
         R = self.axes(state.goal, step.frame)
         turned = so3.exp(R @ by[3:]) @ pan @ target.R
         return ToolTarget(frozen(target.position + R @ by[:3]), rotation=frozen(pan.T @ turned))
-
-    def _pan(self, q: FloatArray) -> FloatArray:
-        """Return the rotation (3, 3) that axis 1 gives to targets of fewer than six axes."""
-        return so3.exp(self.chain.S[:3, 0] * float(q[0])) if self.chain.n < 6 else np.eye(3)
 
     def track(self, state: State, target: ToolTarget, since: ToolTarget) -> Tracked:
         """Return the goal moved on towards ``target``, see `PoseTracker`."""
         branch = str(state.branch)
 
         def projected(q: FloatArray) -> Projection:
-            name = branch if self.solver.are_separate else self.solver.branch_of(q)
+            name = branch if self.solver.are_separate else str(self.solver.branch_of(q))
             return self._projected(q, target, name, state.priority)
 
         return self._tracker.track(state.goal, target, since, branch, state.priority, projected)
@@ -212,7 +193,7 @@ class DrivenTool(ToolKinematics):
         self, q: FloatArray, target: ToolTarget, branch: str, priority: Priority
     ) -> Projection:
         T = np.array(target.T)
-        T[:3, :3] = self._pan(q) @ T[:3, :3]
+        T[:3, :3] = self.pan(q) @ T[:3, :3]
         return projected(self.chain, q, T, branch, priority)
 
     def project(self, state: State, T: FloatArray, branch: AnyBranch) -> Projection:
@@ -226,7 +207,7 @@ class DrivenTool(ToolKinematics):
     def leap(self, state: State, target: ToolTarget, branch: AnyBranch) -> Projection:
         """Return the posture on ``branch`` nearest to ``target``."""
         T = np.array(target.T)
-        T[:3, :3] = self._pan(state.goal) @ T[:3, :3]
+        T[:3, :3] = self.pan(state.goal) @ T[:3, :3]
         return self._nearest(state, T, branch, lambda _q: target)
 
     def _nearest(
@@ -263,7 +244,7 @@ class DrivenTool(ToolKinematics):
             projections,
             key=lambda candidate: (candidate.branch != branch, *_misses(candidate, state.priority)),
         )
-        closed = self.solver.on_branch(T, str(branch), state.goal)
+        closed = self.solver.on_branch(T, branch, state.goal)
         if best.branch == branch or closed is None:
             return best
         slack = tolerances.LIMIT_SLACK
@@ -274,7 +255,7 @@ class DrivenTool(ToolKinematics):
 
     def _starts(self, state: State, T: FloatArray, branch: AnyBranch) -> list[FloatArray]:
         """Return postures (n,) [rad] from which the one nearest to `T` (4, 4) is searched."""
-        closed = self.solver.on_branch(T, str(branch), state.goal)
+        closed = self.solver.on_branch(T, branch, state.goal)
         if closed is None:
             closed = nearest_posture(kinematics_of(self.chain), T, q_hint=state.goal).q
         starts = [self.chain.clamp(closed)]
@@ -289,7 +270,7 @@ class DrivenTool(ToolKinematics):
 
     def _seen(self, T: FloatArray, q: FloatArray) -> ToolTarget:
         """Return the pose `T` (4, 4) as a target with axis 1 as at `q` (n,) [rad]."""
-        return ToolTarget(frozen(T[:3, 3]), rotation=frozen(self._pan(q).T @ T[:3, :3]))
+        return ToolTarget(frozen(T[:3, 3]), rotation=frozen(self.pan(q).T @ T[:3, :3]))
 
     def losses(
         self,
@@ -323,19 +304,6 @@ class DrivenTool(ToolKinematics):
         """
         R = self.axes(q, frame)
         return np.concatenate((R @ rates[3:6], R @ rates[:3]))
-
-    def equations(self, q: FloatArray, joint: int | None = None) -> PoseEquations:
-        """Return the equations of a path of the tool that begins at `q` (n,) [rad].
-
-        Of more than six axes ``joint`` is locked, or the one that sets the arm angle, or the
-        joints without which the others move the tool best.
-        """
-        locked = self.solver.arm_angle_joint if joint is None else joint
-        equations = PoseEquations(self._tracker.descent, () if locked is None else (locked,))
-        while len(equations.free) > 6:
-            rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]
-            equations = max(rest, key=lambda candidate: candidate.least(q))
-        return equations
 
     def tool_speed(self, q: FloatArray, qd: FloatArray) -> float:
         """Return the speed of the tool point [m/s] for the rates `qd` (n,)."""
@@ -410,7 +378,7 @@ def _arm(urdf: Urdf, path: Path, structure: Structure) -> OtherArm:
     if any(chain.slides):
         tool = DrivenTool(chain)
         q = tool.ready((), T_base_shoulder)
-        if tool.equations(q).least(q) < WALL:
+        if equations_from(tool.solver, q).least(q) < WALL:
             raise RobotDescriptionError(
                 f"The tool in {path.name} is not driven: joint {chain.names[0]!r} slides in a "
                 "direction in which the turning axes move the tool already, and a freedom is "

@@ -21,7 +21,7 @@ from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.branch import AnyBranch, Branch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward, jacobian_space
-from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.pose_units import check_metres
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
@@ -98,7 +98,7 @@ def nearest_pose(
     """
     chain, target = kinematics.chain, se3.validated(T)
     check_metres(chain, target[:3, 3].tolist())
-    if isinstance(kinematics, FiveAxisKinematics):
+    if kinematics.is_pitched:
         best = project(
             chain,
             target,

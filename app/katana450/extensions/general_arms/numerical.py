@@ -24,12 +24,12 @@ import numpy.typing as npt
 
 from katana450 import tolerances
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, sine_and_cosine
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import forward_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.solution import Solutions
 from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
@@ -153,7 +153,7 @@ class SearchState(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Numerical(GeneralKinematics):
+class Numerical(Kinematics):
     """Numerical inverse kinematics of one chain; the module's text describes the method.
 
     Attributes:
@@ -173,6 +173,10 @@ class Numerical(GeneralKinematics):
     def method(self) -> str:
         """The method in words."""
         return f"numerical{self.why and f', because {self.why}'}"
+
+    def postures(self, T: FloatArray, near: FloatArray) -> None:  # noqa: ARG002
+        """Return None: a search tells no branches apart."""
+        return
 
     @cached_property
     def length(self) -> float:

@@ -39,7 +39,6 @@ from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.extensions.general_arms.branch_words import ORDINALS, BranchWords
 from katana450.extensions.general_arms.functions import Number
-from katana450.extensions.general_arms.general_kinematics import GeneralKinematics, near_turns
 from katana450.extensions.general_arms.links import DHLinks, exact_chain, sine_and_cosine
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.refinement import refined
@@ -47,10 +46,12 @@ from katana450.extensions.general_arms.spherical_wrist import wrist_centre
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray, IntArray
 from katana450.maths.kinematics.batch import chunks, forward_batch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.inverse_batch import validated_poses
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.solution import Solutions
-from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
+from katana450.maths.kinematics.turns import in_limits_turns, near_turns, nearest_turn
 
 DEGREE: Final = 8
 """Degree of the trigonometric polynomial: half the maximum number of postures."""
@@ -129,7 +130,7 @@ def why_no_offset_wrist(links: DHLinks) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class OffsetWrist(GeneralKinematics):
+class OffsetWrist(Kinematics):
     """Inverse kinematics of six axes with an offset wrist: all postures of every pose.
 
     A posture is on one of 8 branches: the side of W from axis 1, the bend of axis 3, and the side
@@ -184,13 +185,13 @@ class OffsetWrist(GeneralKinematics):
         table: FloatArray = self._table(T[None], near)[0]
         return table
 
-    def on_branch(self, T: FloatArray, branch: str, near: FloatArray) -> FloatArray | None:
+    def on_branch(self, T: FloatArray, branch: AnyBranch, near: FloatArray) -> FloatArray | None:
         """Return the posture (n,) [rad] of ``branch`` for the pose `T` (4, 4), nearest to ``near``.
 
         Those inside the limits come first. Each angle is in the turn nearest to ``near`` inside its
         limits. None without a posture.
         """
-        number = self.branches.index(branch)
+        number = self.branches.index(str(branch))
         rows = self.postures(T, near)[number :: len(self.branches) if number >= 8 else 8]
         candidates = [near_turns(self.chain, q, near) for q in rows if np.isfinite(q[0])]
         return min(

@@ -13,16 +13,17 @@ Walther, Evaluating Derivatives, 2008, ch. 13).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from katana450.caching import cached_property
-from katana450.extensions.general_arms.descent import Descent, Look, Regularity
+from katana450.extensions.general_arms.descent import Descent, Look, Regularity, descent_of
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import jacobian_batch
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.planning.jet import Jet, sin_cos
 from katana450.maths.planning.posture import JointJets, ThreeJets, ToolJets
@@ -216,6 +217,20 @@ class PoseEquations:
             if chain.n < 6 and k in self._turning:
                 moved.append(w)
         return (x, y, z), moved[:3], moved[3:][::-1]  # type: ignore[return-value]
+
+
+def equations_from(solver: Kinematics, q: FloatArray, joint: int | None = None) -> PoseEquations:
+    """Return the equations of a path of the tool that begins at `q` (n,) [rad].
+
+    Of more than six axes ``joint`` is locked, or the one that sets the arm angle, or the joints
+    without which the others move the tool best.
+    """
+    locked = solver.arm_angle_joint if joint is None else joint
+    equations = PoseEquations(descent_of(solver), () if locked is None else (locked,))
+    while len(equations.free) > 6:
+        rest = [replace(equations, locked=(*equations.locked, k)) for k in equations.free]
+        equations = max(rest, key=lambda candidate: candidate.least(q))
+    return equations
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

@@ -19,10 +19,10 @@ import numpy as np
 
 from katana450 import tolerances
 from katana450.extensions.general_arms.descent import NEAR, WALL, Angles, Descent
-from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import Projection
 from katana450.maths.kinematics.tool import ToolTarget
@@ -52,7 +52,7 @@ class PoseTracker:
     """The tracker of one arm. Its methods are pure."""
 
     descent: Descent
-    branches: GeneralKinematics
+    branches: Kinematics
 
     @property
     def chain(self) -> Chain:

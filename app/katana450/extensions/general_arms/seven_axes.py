@@ -32,7 +32,6 @@ from katana450.extensions.general_arms.branch_words import BranchWords
 from katana450.extensions.general_arms.closed_form import inverses
 from katana450.extensions.general_arms.file_rounding import FileRounding
 from katana450.extensions.general_arms.functions import ARRAYS, Operations
-from katana450.extensions.general_arms.general_kinematics import GeneralKinematics
 from katana450.extensions.general_arms.links import DHLinks, links_of, reversed_chain
 from katana450.extensions.general_arms.numerical import search_of
 from katana450.extensions.general_arms.spherical_wrist import (
@@ -48,6 +47,7 @@ from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.batch import errors_of
 from katana450.maths.kinematics.chain import Chain
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.solution import Angles, Solutions
 from katana450.maths.kinematics.turns import in_limits_turns, nearest_turn
 
@@ -109,7 +109,7 @@ def _locks_first(links: DHLinks) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class SevenAxes(GeneralKinematics):
+class SevenAxes(Kinematics):
     """Inverse kinematics of seven axes with the joint ``locked`` as parameter.
 
     Attributes:
@@ -145,6 +145,11 @@ class SevenAxes(GeneralKinematics):
     def rounding(self) -> FileRounding:
         """The rounding of the file of the chain; `at_arm_angles` does not correct it."""
         return FileRounding(self.chain, self.links)
+
+    @property
+    def file_offset(self) -> float:
+        """`FileRounding.offset`."""
+        return self.rounding.offset
 
     @property
     def arm_angle_joint(self) -> int:

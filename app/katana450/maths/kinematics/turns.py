@@ -60,6 +60,19 @@ def nearest_turn(chain: Chain, q: FloatArray, hint: FloatArray | None) -> FloatA
     return np.where(wide & (first <= last), q + math.tau * turns, q)
 
 
+def near_turns(chain: Chain, q: FloatArray, near: FloatArray) -> FloatArray:
+    """Return `q` (n,) [rad], each angle in the turn nearest to ``near`` inside its limits."""
+    turns = np.round((near - q) / math.tau)
+    q = q + math.tau * (np.where(chain.slides, 0.0, turns) if any(chain.slides) else turns)
+    slack = tolerances.LIMIT_SLACK
+    for turn in (math.tau, -math.tau):
+        outside = (q < chain.lower - slack) | (q > chain.upper + slack)
+        other = q + turn
+        fits = outside & (other >= chain.lower - slack) & (other <= chain.upper + slack)
+        q = np.where(fits, other, q)
+    return q
+
+
 def another_turn_helps(lower: float, upper: float) -> bool:
     """Return whether an angle in [-pi, pi] may be inside the limits [rad] after a whole turn.
 

@@ -23,6 +23,7 @@ from katana450.errors import InputError
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.priority import Priority
+from katana450.maths.kinematics.tool import ToolTarget
 from katana450.maths.kinematics.velocity import JogFrame
 
 MAX_LINEAR_RATE = 0.5
@@ -124,6 +125,10 @@ class Turn(Command, MotionRequest, frozen=True):
         check_finite("The pitch", self.pitch)
         check_finite("The roll", self.roll)
 
+    def turned(self, target: ToolTarget, pan: FloatArray) -> ToolTarget:  # noqa: ARG002
+        """Return ``target`` with this pitch and roll, which count from the pan (3, 3) of axis 1."""
+        return ToolTarget(target.position, self.pitch, self.roll)
+
 
 class Orient(Command, MotionRequest, frozen=True, eq=False):
     """Turn the tool of an arm outside the five-axis family; its target position is kept.
@@ -146,6 +151,10 @@ class Orient(Command, MotionRequest, frozen=True, eq=False):
         if self.frame is Frame.SHOULDER:
             return self
         return Orient(T_base_shoulder[:3, :3].T @ self.R)
+
+    def turned(self, target: ToolTarget, pan: FloatArray) -> ToolTarget:
+        """Return ``target`` with this rotation, less the pan (3, 3) of axis 1."""
+        return ToolTarget(target.position, rotation=frozen(pan.T @ self.R))
 
 
 TurnCommand = Turn | Orient

@@ -200,8 +200,8 @@ def dragged(arm: ArmModel, state: State, target: ToolTarget, *, let_go: bool = F
 def turned(arm: ArmModel, state: State, command: TurnCommand) -> State:
     """Return ``state`` that tracks its tool target with the orientation of ``command``."""
     kinematics = arm.kinematics_to(state.tool)
-    target = kinematics.turned(state, current_target(arm, state), command)
-    return dragged(arm, state, target)
+    pan = kinematics.pan(state.goal)
+    return dragged(arm, state, command.turned(current_target(arm, state), pan))
 
 
 def stepped(arm: ArmModel, state: State, step: StepTool) -> State:

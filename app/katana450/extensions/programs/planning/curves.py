@@ -434,7 +434,7 @@ def roomiest(chain: Chain, branch: AnyBranch, arc: Curve) -> ToolArc:
     steps. Raises InputError when no such pitch keeps the joints inside on `branch`, and for an arm
     whose orientations are no pitches.
     """
-    if not isinstance(arc, ToolArc) or not isinstance(branch, Branch):
+    if not isinstance(arc, ToolArc):
         raise InputError(
             "`roomiest` chooses the pitch of a five-axis arm, and this one has "
             f"{chain.n} axes. Give the orientation, or leave it out to keep it."
@@ -442,7 +442,8 @@ def roomiest(chain: Chain, branch: AnyBranch, arc: Curve) -> ToolArc:
     grid = np.array(
         list(product(np.linspace(-math.pi, math.pi, MEANS, endpoint=False), SWINGS, SWINGS))
     )
-    rooms = _rooms(chain, branch, arc, grid)
+    five = Branch.parse(str(branch))
+    rooms = _rooms(chain, five, arc, grid)
     best, room = grid[rooms.argmax()], float(rooms.max())
     if not room > 0.0:
         raise InputError(
@@ -455,7 +456,7 @@ def roomiest(chain: Chain, branch: AnyBranch, arc: Curve) -> ToolArc:
         step *= 0.5
         for _ in range(4):
             candidates = best + around * step
-            rooms = _rooms(chain, branch, arc, candidates)
+            rooms = _rooms(chain, five, arc, candidates)
             if rooms.max() <= room:
                 break
             best, room = candidates[rooms.argmax()], float(rooms.max())

@@ -226,8 +226,8 @@ class HandPlanning:
 
         None is the nearest one. The result is empty if ``target`` is out of reach.
         """
-        chain, kinematics = self._chain, self.planning.by_equations
-        if kinematics is None:
+        chain, kinematics = self._chain, self.planning.kinematics
+        if self.planning.is_pitched:
             return () if self.planning.joints(q, target, None) is None else (None,)
         R = target.R
         if self.plane is not None:
@@ -235,7 +235,7 @@ class HandPlanning:
             R = so3.rotation_z(turn) @ R
         T = se3.from_rotation_translation(R, target.position)
         present, hints = kinematics.branch_of(q), [q]
-        for axis in kinematics.equations(q).locked[:1]:
+        for axis in self.planning.equations(q).locked[:1]:
             # The posture there may have another arm angle.
             hints += [chain.clamp(q + swing * np.eye(chain.n)[axis]) for swing in SWINGS]
         for hint in hints:
@@ -397,7 +397,7 @@ def hand_of(session: Session, T_base_shoulder: FloatArray, state: State) -> Hand
     """
     arm, environment = session.require_arm(), session.environment
     planning, axes = ToolPlanning(arm.kinematics_to(state.tool), state), arm.chain.n
-    in_family, chain = planning.by_equations is None, planning.chain
+    in_family, chain = planning.is_pitched, planning.chain
     if in_family and GRASP in arm.tools:
         in_front = ArmPlane.of(chain, np.eye(4), session.ready)
         return HandPlanning(

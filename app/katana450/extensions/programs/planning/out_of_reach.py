@@ -18,7 +18,7 @@ from katana450.extensions.programs.planning.curves import Curve
 from katana450.extensions.programs.planning.tool_planning import EXACT, ToolPlanning
 from katana450.maths.geometry.arrays import FloatArray, frozen
 from katana450.maths.kinematics.arm import arm_of
-from katana450.maths.kinematics.branch import AnyBranch, Branch
+from katana450.maths.kinematics.branch import AnyBranch
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.projection import (
     ANGLE_WORTH_TELLING,
@@ -271,7 +271,7 @@ def _missed(nearest: NearestPlace) -> str:
 
 def _links(planning: ToolPlanning, q: FloatArray) -> str:
     """Return how the links keep the tool from coming nearer."""
-    if isinstance(planning.kinematics.branch_of(q), Branch):
+    if planning.is_pitched:
         # The canonical arm is stretched where its third angle is 0.
         elbow = math.remainder(arm_of(planning.chain).angles(q)[2], math.tau)
         if abs(elbow) <= LIMIT_SLACK:

@@ -20,7 +20,7 @@ from katana450.arm.control.session.checks import NO_ARM_ANGLE
 from katana450.arm.control.state.state import State
 from katana450.arm.control.tool_kinematics import ToolKinematics
 from katana450.errors import InputError, PathError
-from katana450.extensions.general_arms.driven_tool import DrivenTool
+from katana450.extensions.general_arms.pose_equations import PoseEquations, equations_from
 from katana450.extensions.programs.language.step_target import Angles
 from katana450.extensions.programs.planning.curve_path import CurveSearch, ToolPath
 from katana450.extensions.programs.planning.curves import Curve, line_between
@@ -71,21 +71,25 @@ class ToolPlanning:
     state: State
 
     @property
-    def by_equations(self) -> DrivenTool | None:
-        """The kinematics, if their equations are solved along a curve; None with a closed form."""
-        return self.kinematics if isinstance(self.kinematics, DrivenTool) else None
+    def is_pitched(self) -> bool:
+        """True for the closed form of five axes; other arms solve equations along a curve."""
+        return self.kinematics.is_pitched
+
+    def equations(self, q: FloatArray, joint: int | None = None) -> PoseEquations:
+        """Return `equations_from` the joint angles `q`, with ``joint`` locked."""
+        return equations_from(self.kinematics.solver, q, joint)
 
     @property
     def priorities(self) -> tuple[Priority, Priority]:
         """The priority that keeps the position, and the one that keeps the orientation."""
-        if self.by_equations is None:
+        if self.is_pitched:
             return Priority.POSITION, Priority.PITCH
         return Priority.POSE, Priority.ORIENTATION
 
     @property
     def orientation(self) -> str:
         """The kept orientation in words."""
-        return "this pitch" if self.by_equations is None else "this orientation"
+        return "this pitch" if self.is_pitched else "this orientation"
 
     @property
     def chain(self) -> Chain:
@@ -161,24 +165,24 @@ class ToolPlanning:
 
         Equations lead from the nearest posture to the exact one.
         """
-        nearest, tool = self.nearest(q, target, branch, Priority.POSE), self.by_equations
-        if tool is None:
+        nearest = self.nearest(q, target, branch, Priority.POSE)
+        if self.is_pitched:
             error = max(nearest.position_error, nearest.rotation_error)
             return nearest.q if error <= EXACT else None
-        exact = tool.equations(nearest.q).posture(nearest.q, target.T)
+        exact = self.equations(nearest.q).posture(nearest.q, target.T)
         if exact is None or not self.chain.within_limits(exact.q):
             return None
         posture = self.chain.clamp(exact.q)
         distance, turn = self.at(posture).apart(target)
         reached = distance <= EXACT and (turn <= EXACT or self.chain.n in (3, 5))
-        return posture if reached and tool.branch_of(posture) == branch else None
+        return posture if reached and self.kinematics.branch_of(posture) == branch else None
 
     def target(self, position: FloatArray, R: FloatArray) -> ToolTarget:
         """Return the target of the tool point at ``position`` (3,) [m].
 
         `R` (3, 3) is the rotation of the tool; of fewer than six axes that with axis 1 at zero.
         """
-        if self.by_equations is not None:
+        if not self.is_pitched:
             return ToolTarget(frozen(position), rotation=frozen(R))
         arm = arm_of(self.chain)
         K = arm.T_C_S[:3, :3] @ R @ arm.T_K_tool[:3, :3].T
@@ -268,11 +272,10 @@ class ToolPlanning:
         The arm angle keeps its value, or turns evenly where that does not do. Raises
         PathError for a curve that the arm cannot follow.
         """
-        if isinstance(branch, Branch):
-            return ToolPath(self.chain, curve, branch, q)
-        start, tool = curve.at(Jet.variable(0.0)).target, self.by_equations
-        assert tool is not None
-        if tool.branch_of(q) != str(branch) or max(self.at(q).apart(start)) > EXACT:
+        if self.is_pitched:
+            return ToolPath(self.chain, curve, Branch.parse(str(branch)), q)
+        start = curve.at(Jet.variable(0.0)).target
+        if self.kinematics.branch_of(q) != str(branch) or max(self.at(q).apart(start)) > EXACT:
             first = self.on_branch(q, start, branch)
             if first is None:
                 raise PathError(
@@ -281,7 +284,7 @@ class ToolPlanning:
                     start.position.tolist(),
                 )
             q = first
-        equations = tool.equations(q)
+        equations = self.equations(q)
         try:
             return CurveSearch(equations, curve, q, np.zeros(len(equations.locked))).path()
         except PathError as error:
@@ -320,8 +323,7 @@ class ToolPlanning:
         Raises:
             InputError: the arm has no arm angle, or the elbow cannot turn so far.
         """
-        tool = self.by_equations
-        if tool is None or not tool.turns_elbow:
+        if not self.kinematics.turns_elbow:
             raise InputError(NO_ARM_ANGLE)
         postures = np.array(list(elbow_postures(self.chain, q, by)))
         self._refuse_elbow(postures, by)
@@ -330,7 +332,7 @@ class ToolPlanning:
         for last, joint in _steady_joints(np.diff(postures, axis=0)):
             slope = np.array((postures[last, joint] - q[joint],))
             try:
-                paths.append(CurveSearch(tool.equations(q, joint), curve, q, slope).path())
+                paths.append(CurveSearch(self.equations(q, joint), curve, q, slope).path())
             except PathError as error:
                 raise InputError(
                     "The elbow comes to a singularity on its path, where more joints can turn "
