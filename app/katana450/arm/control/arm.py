@@ -43,6 +43,11 @@ class ArmModel:
     to_tool: Callable[[Chain], ToolKinematics] = FiveAxisTool
 
     @property
+    def arm(self) -> ArmModel:
+        """The arm itself: joints without a tool have none."""
+        return self
+
+    @property
     def slides(self) -> tuple[bool, ...]:
         """Flags (n,) of the prismatic joints."""
         return self.chain.slides

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ class JointSet:
     upper: FloatArray
     speed: FloatArray
     why: str
+
+    arm: ClassVar[None] = None
 
     @property
     def n(self) -> int:

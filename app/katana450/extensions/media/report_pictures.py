@@ -15,7 +15,6 @@ from trimesh.util import append_faces
 
 from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.state import State
-from katana450.arm.control.tool_kinematics import FiveAxisTool
 from katana450.arm.robot.props import Props
 from katana450.arm.robot.robot import Robot
 from katana450.arm.robot.surfaces import Material, VisualMesh
@@ -141,7 +140,7 @@ Look = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 def _look(robot: Robot, state: State) -> Look:
     """Return the look at an object that the arm grasps in ``state``."""
-    if isinstance(robot.require_arm().kinematics, FiveAxisTool):
+    if robot.require_arm().kinematics.is_pitched:
         return ON_TABLE
     view = camera_pose(Preset.FREE, robot, state)
     return view.position, view.target

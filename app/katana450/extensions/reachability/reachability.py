@@ -30,17 +30,15 @@ from katana450 import tolerances
 from katana450.caching import cached_property
 from katana450.errors import InputError
 from katana450.extensions.general_arms.choice import kinematics_of
-from katana450.extensions.general_arms.closed_form import ClosedForm
 from katana450.extensions.general_arms.descent import Descent, Regularity
 from katana450.extensions.general_arms.links import DHLinks, links_of
 from katana450.extensions.general_arms.numerical import search_of
-from katana450.extensions.general_arms.seven_axes import SevenAxes
 from katana450.maths.geometry import se3, so3
 from katana450.maths.geometry.arrays import FloatArray, finite_array
 from katana450.maths.kinematics.arm import arm_of
 from katana450.maths.kinematics.batch import errors_of, forward_batch
 from katana450.maths.kinematics.chain import Chain
-from katana450.maths.kinematics.kinematics import FiveAxisKinematics, Kinematics
+from katana450.maths.kinematics.kinematics import Kinematics
 from katana450.maths.kinematics.priority import Priority
 from katana450.maths.kinematics.tool import ToolTarget
 
@@ -49,9 +47,6 @@ BoolArray = npt.NDArray[np.bool]
 
 IntArray = npt.NDArray[np.int64]
 """An array of 64-bit integers."""
-
-FREE_AXES: Final = 6
-"""Minimum number of axes with which a tool has every orientation."""
 
 ARM_ANGLES: Final = 16
 """Number of arm angles of seven axes that are tried for a pose."""
@@ -93,29 +88,26 @@ class PoseSolver:
 
     def taken(self, T: FloatArray) -> BoolArray:
         """Return (N,) whether a posture inside the limits takes the pose, for `T` (N, 4, 4)."""
-        if isinstance(self.solver, SevenAxes):
-            return self._at_arm_angles(self.solver, T)
-        return self._exact(self.solver.inverse_batch(T), T)
+        is_taken = np.zeros(len(T), dtype=np.bool)
+        for arm_angle in self._arm_angles:
+            left = np.flatnonzero(~is_taken)
+            q = self.solver.at_arm_angles(T[left], np.full(len(left), arm_angle))
+            is_taken[left[self.exact(q, T[left])[0]]] = True
+        return is_taken
 
-    def _at_arm_angles(self, solver: SevenAxes, T: FloatArray) -> BoolArray:
-        joint = solver.arm_angle_joint
+    @property
+    def _arm_angles(self) -> FloatArray:
+        """The arm angles [rad] that are tried, or one number for an arm without.
+
+        Those in the middle come first: they take the most poses, which the others need not try.
+        """
+        joint = self.solver.arm_angle_joint
+        if joint is None:
+            return np.zeros(1)
         low, high = self.chain.lower[joint], self.chain.upper[joint]
         step = (high - low) / ARM_ANGLES
         arm_angles = np.linspace(low + 0.5 * step, high - 0.5 * step, ARM_ANGLES)
-        is_taken = np.zeros(len(T), dtype=np.bool)
-        # Those in the middle take the most poses, which the others need not try.
-        order = np.argsort(np.abs(arm_angles - 0.5 * (low + high)), kind="stable")
-        for arm_angle in arm_angles[order]:
-            left = np.flatnonzero(~is_taken)
-            q = solver.at_arm_angles(T[left], np.full(len(left), arm_angle))
-            is_taken[left] = self._exact(q, T[left])
-        return is_taken
-
-    def _exact(self, q: FloatArray, T: FloatArray) -> BoolArray:
-        """Return (N,) whether one of `q` (N, k, n) is inside the limits and takes `T` (N, 4, 4)."""
-        is_taken = np.zeros(len(T), dtype=np.bool)
-        is_taken[self.exact(q, T)[0]] = True
-        return is_taken
+        return arm_angles[np.argsort(np.abs(arm_angles - 0.5 * (low + high)), kind="stable")]
 
     def exact(
         self, q: FloatArray, T: FloatArray, axes: int | None = None
@@ -131,9 +123,7 @@ class PoseSolver:
         # Postures for a pose out of reach are only near it.
         distance, turn = errors_of(chain, q[pose, branch][:, None], T[pose])
         # The arm angles are solved for the exact arm, beside which the file describes this one.
-        off = 0.0
-        if isinstance(self.solver, ClosedForm | SevenAxes):
-            off = self.solver.rounding.offset
+        off = self.solver.file_offset or 0.0
         exact = (distance <= tolerances.SAME_POSITION + off) & (
             turn <= tolerances.SAME_ROTATION + off
         )
@@ -359,9 +349,9 @@ class Reachability:
         """The orientations that are tried at a point."""
         kinematics = kinematics_of(self.chain)
         solver = PoseSolver(kinematics, self.clear)
-        if isinstance(kinematics, FiveAxisKinematics):
+        if kinematics.is_pitched:
             return PitchesAndRolls(solver, self.pitches, self.rolls)
-        if not isinstance(kinematics, ClosedForm | SevenAxes) or self.chain.n < FREE_AXES:
+        if not kinematics.is_exact and kinematics.arm_angle_joint is None:
             return PointSearch(self.chain, self.clear)
         R = self.T_base_shoulder[:3, :3].T @ rotations(self.pitches, self.rolls)
         return Rotations(solver, R)
@@ -535,9 +525,8 @@ def reachability_map(
 
 
 def _fineness(kinematics: Kinematics) -> Fineness:
-    if isinstance(kinematics, FiveAxisKinematics):
+    if kinematics.is_pitched:
         return FAMILY
-    if isinstance(kinematics, SevenAxes):
+    if kinematics.arm_angle_joint is not None:
         return SEVEN_AXES
-    is_closed = isinstance(kinematics, ClosedForm) and kinematics.chain.n >= FREE_AXES
-    return CLOSED if is_closed else POINTS
+    return CLOSED if kinematics.is_exact else POINTS

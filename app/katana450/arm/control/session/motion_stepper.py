@@ -159,7 +159,7 @@ class MotionStepper:
             touch: (p,) minimum distance of each pair of bodies while the fingers move [m].
             travel: of the links of joints without a tool.
         """
-        self._arm = robot if isinstance(robot, ArmModel) else None
+        self._arm = robot.arm
         self._travel = travel
         self._gripper = robot.gripper
         self._world = world

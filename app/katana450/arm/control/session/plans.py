@@ -79,7 +79,7 @@ def detour_from(arm: ArmModel, world: CollisionWorld | None, state: State) -> Pl
     assert state.beyond_gap is not None
     q_goal = state.beyond_gap.q
     # The end is on the branch, wherever the path leads.
-    branch = state.branch if isinstance(state.branch, Branch) else None
+    branch = Branch.parse(str(state.branch)) if arm.kinematics.is_pitched else None
     *seeds, last = range(DETOUR_SEARCHES)
     for seed in seeds:
         with suppress(BlockedError):

@@ -111,7 +111,7 @@ class Session:
             water_environment: cup, basin and table of the water; None for no water.
             travel: for joints, the distance [m] that the links travel between two joint vectors.
         """
-        self.arm = robot if isinstance(robot, ArmModel) else None
+        self.arm = robot.arm
         self.world = world
         self.environment = Environment(
             world, hand, None if water_environment is None else water_environment.table

@@ -1,0 +1,80 @@
+"""The code asks an arm for what it can do, and hardly ever which kind of arm it is."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import katana450
+
+PACKAGE = Path(katana450.__file__).parent
+
+INTERFACES = frozenset(["ArmModel", "Branch", "JointSet", "Kinematics", "ToolKinematics"])
+"""The classes of an arm: they and all classes derived from them are kinds."""
+
+MAX_DISTINCTIONS = 2
+"""Number of places that tell kinds apart. Both are about joints without an arm."""
+
+
+def kinds(trees: Mapping[Path, ast.Module]) -> set[str]:
+    """Return the names of `INTERFACES` and of all classes derived from them."""
+    bases = {
+        node.name: {base.id for base in node.bases if isinstance(base, ast.Name)}
+        for tree in trees.values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+    }
+    names: set[str] = set(INTERFACES)
+    while derived := {name for name, parents in bases.items() if parents & names} - names:
+        names |= derived
+    return names
+
+
+def distinctions(tree: ast.AST, names: set[str]) -> Iterator[int]:
+    """Yield the line of each place that tells kinds apart.
+
+    It is a call of `isinstance`, `issubclass` or `cast`, or a class pattern of a `match`, that
+    mentions one of ``names``, or several.
+    """
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id="isinstance" | "issubclass"), args=[_, kind]):
+                mentioned: ast.AST = kind
+            case ast.Call(func=ast.Name(id="cast"), args=[kind, _]):
+                mentioned = kind
+            case ast.MatchClass(cls=kind):
+                mentioned = kind
+            case _:
+                continue
+        if any(isinstance(part, ast.Name) and part.id in names for part in ast.walk(mentioned)):
+            yield node.lineno
+
+
+def test_arms_are_asked_what_they_can_do() -> None:
+    trees = {path: ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+    names = kinds(trees)
+    assert names >= {"FiveAxisKinematics", "FiveAxisTool", "DrivenTool", "ClosedForm", "SevenAxes"}
+    places = [
+        f"{path.relative_to(PACKAGE)}:{line}"
+        for path, tree in trees.items()
+        for line in distinctions(tree, names)
+    ]
+    message = "Add a property to `Kinematics` or `ToolKinematics` instead:\n" + "\n".join(places)
+    assert len(places) <= MAX_DISTINCTIONS, message
+
+
+def test_every_way_to_tell_kinds_apart_is_counted() -> None:
+    source = """
+if isinstance(arm, Panda):
+    solver = cast(Solver, arm.solver)
+if isinstance(arm, Panda | Robot) or issubclass(type(arm), Kinematics):
+    isinstance(arm, Robot)
+match arm:
+    case Panda():
+        Panda()
+"""
+    lines = sorted(distinctions(ast.parse(source), {"Panda", "Kinematics", "Solver"}))
+    assert lines == [2, 3, 4, 4, 7]
+    tree = ast.parse("class Panda(Kinematics): pass\nclass Other(Panda): pass\nclass Robot: pass")
+    assert kinds({Path(): tree}) - INTERFACES == {"Panda", "Other"}
