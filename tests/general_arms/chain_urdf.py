@@ -40,12 +40,12 @@ def chain_urdf(name: str, chain: Chain) -> str:
 
 def _frames(chain: Chain) -> list[FloatArray]:
     """Return a frame (4, 4) on each axis, whose z axis it is, in the base frame."""
-    found, at = [], np.zeros(3)
+    frames, origin = [], np.zeros(3)
     for w, v in zip(chain.S[:3].T, chain.S[3:].T, strict=True):
         foot = np.cross(w, v)
-        at = foot + (w @ (at - foot)) * w
-        found.append(se3.from_rotation_translation(_with_z(w), at))
-    return found
+        origin = foot + (w @ (origin - foot)) * w
+        frames.append(se3.from_rotation_translation(_with_z(w), origin))
+    return frames
 
 
 def _with_z(w: FloatArray) -> FloatArray:

@@ -111,9 +111,9 @@ def _hand(gripper: Gripper, mimic: bool, upside_down: bool) -> str:
     return "".join([*parts, '<link name="tcp"/>', _fixed("tcp", "hand", tip), "</robot>"])
 
 
-def _box(name: str, size: tuple[float, ...], at: tuple[float, ...]) -> str:
+def _box(name: str, size: tuple[float, ...], origin: tuple[float, ...]) -> str:
     shape = (
-        f'<origin xyz="{" ".join(map(str, at))}"/>'
+        f'<origin xyz="{" ".join(map(str, origin))}"/>'
         f'<geometry><box size="{" ".join(map(str, size))}"/></geometry>'
     )
     return f'<link name="{name}"><visual>{shape}</visual><collision>{shape}</collision></link>'

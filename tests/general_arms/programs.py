@@ -56,22 +56,22 @@ def begin_plan(chain: Chain) -> PlanState:
 
 def program(chain: Chain, *steps: str) -> Program:
     """Return the steps as a program from the ready posture."""
-    made = begin_plan(chain)
-    text = "frame: base\nsteps:\n" + "".join(f"  - {each}\n" for each in steps)
-    return compiled(parse(text), made.plan_context, made.state)
+    plan_state = begin_plan(chain)
+    text = "frame: base\nsteps:\n" + "".join(f"  - {line}\n" for line in steps)
+    return compiled(parse(text), plan_state.plan_context, plan_state.state)
 
 
-def plans(made: Program) -> list[Plan]:
-    return [each.action.plan for each in made.tasks if isinstance(each.action, FollowPlan)]
+def plans(program: Program) -> list[Plan]:
+    return [task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan)]
 
 
-def played(chain: Chain, made: Program) -> list[State]:
+def played(chain: Chain, program: Program) -> list[State]:
     """Return the states of a run to its end."""
     session = session_of(chain)
     state, run = begun(session), Run(0.0)
     states = [state]
     while run.phase is Phase.RUNNING and len(states) < 4000:
-        run, commands = step(made, run, state, state.t)
+        run, commands = step(program, run, state, state.t)
         state = session.step(state, commands, state.t + TICK)
         state = session.observe(state, state.setpoint, 0.0)
         states.append(state)
@@ -81,19 +81,19 @@ def played(chain: Chain, made: Program) -> list[State]:
 
 def on_paths(states: list[State]) -> list[tuple[PosePath, float, FloatArray]]:
     """Return path, place and joints of each tick on a path of the tool."""
-    found = []
+    places = []
     for state in states:
         following = state.following
         if following is not None and isinstance(following.segment.path, PosePath):
             sigma = following.segment.scaling.pace(following.local).sigma
-            found.append((following.segment.path, sigma, state.setpoint))
-    return found
+            places.append((following.segment.path, sigma, state.setpoint))
+    return places
 
 
 def middle(chain: Chain) -> FloatArray:
     """Return the tool point (3,) [mm] of the ready posture."""
-    made = begin_plan(chain)
-    return 1e3 * made.target.position
+    plan_state = begin_plan(chain)
+    return 1e3 * plan_state.target.position
 
 
 def length(chain: Chain) -> float:

@@ -272,7 +272,7 @@ CRX_10IA = craig(
 )
 
 
-def kinova(upper: float, fore: float, beside: float, bend: float) -> Chain:
+def kinova(upper: float, fore: float, offset: float, bend: float) -> Chain:
     """Return a Jaco or Mico of Kinova's user guides (DH parameters of the curved wrist).
 
     Lengths [m] of upper arm and forearm, their offset, and the angle [rad] of the wrist's bends.
@@ -282,7 +282,7 @@ def kinova(upper: float, fore: float, beside: float, bend: float) -> Chain:
         [
             (0.0, 0.0, 0.2755, 0.0),
             (QUARTER, 0.0, 0.0, 0.0),
-            (math.pi, upper, -beside, 0.0),
+            (math.pi, upper, -offset, 0.0),
             (QUARTER, 0.0, -fore - part, 0.0),
             (bend, 0.0, -2.0 * part, 0.0),
             (bend, 0.0, -part - 0.16, 0.0),

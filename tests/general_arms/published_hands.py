@@ -126,9 +126,9 @@ RADIAL: list[J | Box] = [
     J("mount", "fixed", "tool0", "palm"),
     Box("palm", (0.08, 0.08, 0.04), (0.0, 0.0, 0.02)),
     *(
-        each
+        hand
         for number, angle in enumerate((0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0), 1)
-        for each in (
+        for hand in (
             J(
                 *(f"slide_{number}", "prismatic", "palm", f"digit_{number}", (0.0, 0.0, 0.04)),
                 *((0.0, 0.0, angle), X, (0.0, 0.04)),
@@ -173,11 +173,11 @@ def hand_urdf(arm: str, hand: list[J | Box]) -> str:
         '<link name="stand"/><joint name="stand_joint" type="fixed"><parent link="stand"/>'
         f'<child link="base_link"/><origin xyz="0 0 {STAND}"/></joint>'
     )
-    joints = [each for each in hand if isinstance(each, J)]
+    joints = [part for part in hand if isinstance(part, J)]
     links = {joint.child: "" for joint in joints}
-    for each in hand:
-        if isinstance(each, Box):
-            links[each.link] += _shape(each)
+    for part in hand:
+        if isinstance(part, Box):
+            links[part.link] += _shape(part)
     parts = [f'<link name="{name}">{shapes}</link>' for name, shapes in links.items()]
     text = "".join([stand, *parts, *(joint.xml for joint in joints), "</robot>"])
     return chain_urdf("arm", HANDS[arm][0]).replace("</robot>", text)
@@ -225,14 +225,14 @@ def closing_upwards(text: str) -> str:
 
 def _with_boxes(text: str, boxes: list[Box]) -> str:
     """Return the description with ``boxes`` for links without shapes."""
-    for link in {each.link for each in boxes}:
-        shapes = "".join(_shape(each) for each in boxes if each.link == link)
+    for link in {box.link for box in boxes}:
+        shapes = "".join(_shape(box) for box in boxes if box.link == link)
         assert f'<link name="{link}"/>' in text
         text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{shapes}</link>')
     return text
 
 
 def _shape(box: Box) -> str:
-    size, at, rpy = (" ".join(map(repr, each)) for each in (box.size, box.at, box.rpy))
-    shape = f'<origin xyz="{at}" rpy="{rpy}"/><geometry><box size="{size}"/></geometry>'
+    size, origin, rpy = (" ".join(map(repr, numbers)) for numbers in (box.size, box.at, box.rpy))
+    shape = f'<origin xyz="{origin}" rpy="{rpy}"/><geometry><box size="{size}"/></geometry>'
     return f"<visual>{shape}</visual><collision>{shape}</collision>"

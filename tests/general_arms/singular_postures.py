@@ -60,24 +60,24 @@ def on_surface(chain: Chain, function: Function, rng: np.random.Generator) -> Fl
             b = middle
         else:
             a = middle
-    found: FloatArray = a
-    return found
+    posture: FloatArray = a
+    return posture
 
 
 def near_surface(
     chain: Chain, function: Function, rng: np.random.Generator, count: int
 ) -> FloatArray:
     """Return postures (count, n) on the surface or 1e-16 to 0.1 rad beside it."""
-    found = []
+    postures = []
     for number in range(count):
         if number % BESIDE == 0:
             q = on_surface(chain, function, rng)
-            found.append(q)
+            postures.append(q)
         else:
             step = rng.normal(size=chain.n)
             off = 10.0 ** rng.uniform(-16.0, -1.0)
-            found.append(chain.clamp(q + off * step / np.linalg.norm(step)))
-    return np.array(found)
+            postures.append(chain.clamp(q + off * step / np.linalg.norm(step)))
+    return np.array(postures)
 
 
 def aligned_wrist(

@@ -83,7 +83,7 @@ def test_lengths_are_those_of_the_links(chain: Chain, angle: float) -> None:
             T = forward(skew, q)
             place = links.T_S_1 @ [*tool_and_jacobian(links)(q.tolist())[0][9:], 1.0]
             np.testing.assert_allclose(place[:3], T[:3, 3], atol=1e-13)
-            assert any(each.exact for each in kinematics_of(skew).inverse(T))
+            assert any(solution.exact for solution in kinematics_of(skew).inverse(T))
 
 
 def test_only_what_is_out_of_reach_is_called_so() -> None:

@@ -49,8 +49,8 @@ class Seen(NamedTuple):
         """Return where two axes meet, by least squares."""
         A = np.column_stack((self.z[i], -self.z[j]))
         along = np.linalg.lstsq(A, self.p[j] - self.p[i], rcond=None)[0]
-        found: FloatArray = self.p[i] + along[0] * self.z[i]
-        return found
+        point: FloatArray = self.p[i] + along[0] * self.z[i]
+        return point
 
 
 def seen(chain: Chain, q: FloatArray) -> Seen:
@@ -67,18 +67,18 @@ def postures(chain: Chain, seed: int) -> FloatArray:
     return np.random.default_rng(seed).uniform(chain.lower, chain.upper, (POSTURES, chain.n))
 
 
-def heading(here: Seen, wrist: FloatArray) -> tuple[FloatArray, FloatArray]:
+def heading(axes: Seen, wrist: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the horizontal direction from axis 1 to the wrist, and the one to its left."""
-    out = wrist - here.p[0]
-    out = out - out @ here.z[0] * here.z[0]
+    out = wrist - axes.p[0]
+    out = out - out @ axes.z[0] * axes.z[0]
     out /= np.linalg.norm(out)
     return out, np.cross((0.0, 0.0, 1.0), out)
 
 
-def above(shoulder: FloatArray, elbow: FloatArray, wrist: FloatArray, ahead: FloatArray) -> float:
+def above(shoulder: FloatArray, elbow: FloatArray, wrist: FloatArray, front: FloatArray) -> float:
     """Return the height of the elbow over the line from shoulder to wrist [m], from the side."""
     elbow, wrist = elbow - shoulder, wrist - shoulder
-    return float(elbow[2] - wrist[2] * (elbow @ ahead) / (wrist @ ahead))
+    return float(elbow[2] - wrist[2] * (elbow @ front) / (wrist @ front))
 
 
 FLANGE = se3.from_rotation_translation(np.eye(3), np.array([0.0, 0.0, 0.1]))
@@ -142,17 +142,17 @@ def test_known_posture_has_the_name_of_what_is_seen(
 @pytest.mark.parametrize("chain", [UR5E, PUMA_560], ids=["UR5e", "Puma 560"])
 def test_arm_is_left_or_right_of_axis_1_as_seen_from_there(chain: Chain) -> None:
     for q in postures(chain, 1):
-        here = seen(chain, q)
-        wrist = here.meeting(4, 5)
-        _, left = heading(here, wrist)
-        beside = here.z[1] * float(here.z[1] @ (wrist - here.p[0]))
-        assert name_of(chain, q)[0] == ("left" if beside @ left > 0.0 else "right")
+        axes = seen(chain, q)
+        wrist = axes.meeting(4, 5)
+        _, left = heading(axes, wrist)
+        sideways = axes.z[1] * float(axes.z[1] @ (wrist - axes.p[0]))
+        assert name_of(chain, q)[0] == ("left" if sideways @ left > 0.0 else "right")
 
 
 def test_wrist_is_on_the_side_of_the_shoulder_or_behind_axis_1() -> None:
     for q in postures(KR_6, 2):
-        here = seen(KR_6, q)
-        shoulder, wrist = here.meeting(1, 0), here.meeting(4, 5)
+        axes = seen(KR_6, q)
+        shoulder, wrist = axes.meeting(1, 0), axes.meeting(4, 5)
         side = float(shoulder[:2] @ wrist[:2])
         assert name_of(KR_6, q)[0] == ("front" if side > 0.0 else "back")
 
@@ -161,17 +161,17 @@ def test_wrist_is_on_the_side_of_the_shoulder_or_behind_axis_1() -> None:
 @pytest.mark.parametrize("chain", FOUR.values(), ids=FOUR)
 def test_tool_is_on_the_side_to_which_four_axes_face(chain: Chain) -> None:
     for q in postures(chain, 3):
-        ahead = np.array((np.cos(q[0]), np.sin(q[0])))
+        facing = np.array((np.cos(q[0]), np.sin(q[0])))
         place = seen(chain, q).T[:2, 3] - seen(chain, q).p[0][:2]
-        assert name_of(chain, q)[0] == ("front" if place @ ahead > 0.0 else "back")
+        assert name_of(chain, q)[0] == ("front" if place @ facing > 0.0 else "back")
 
 
 def test_upper_arm_of_a_panda_leans_to_the_front_or_back() -> None:
     for q in postures(PANDA, 4):
-        here = seen(PANDA, q)
-        elbow = here.meeting(3, 4) - here.meeting(1, 0)
+        axes = seen(PANDA, q)
+        elbow = axes.meeting(3, 4) - axes.meeting(1, 0)
         # Beside the elbow, axis 3 is the axis of the upper arm.
-        up = here.z[2] * float(here.z[2] @ elbow)
+        up = axes.z[2] * float(axes.z[2] @ elbow)
         leans = up[:2] @ (np.cos(q[0]), np.sin(q[0]))
         assert name_of(PANDA, q)[0] == ("front" if leans > 0.0 else "back")
 
@@ -180,18 +180,18 @@ def test_upper_arm_of_a_panda_leans_to_the_front_or_back() -> None:
 def test_elbow_is_above_or_below_the_line_from_shoulder_to_wrist(name: str) -> None:
     chain, checked = ARMS[name], 0
     for q in postures(chain, 5):
-        here = seen(chain, q)
-        wrist = here.meeting(4, 5) if chain.n == 6 and name != "UR5e" else here.p[3]
-        centre = here.T[:3, 3] if chain.n == 4 else here.meeting(4, 5)
-        out, _ = heading(here, centre)
+        axes = seen(chain, q)
+        wrist = axes.meeting(4, 5) if chain.n == 6 and name != "UR5e" else axes.p[3]
+        centre = axes.T[:3, 3] if chain.n == 4 else axes.meeting(4, 5)
+        out, _ = heading(axes, centre)
         if name not in ("UR5e", "Puma 560"):
             out = out if name_of(chain, q)[0] == "front" else -out
         # Points in the arm's plane, which axis 2 crosses.
-        ahead = np.cross(here.z[1], (0.0, 0.0, 1.0))
-        ahead *= np.sign(ahead @ out)
-        if (wrist - here.p[1]) @ ahead < CLEAR:
+        front = np.cross(axes.z[1], (0.0, 0.0, 1.0))
+        front *= np.sign(front @ out)
+        if (wrist - axes.p[1]) @ front < CLEAR:
             continue
-        higher = above(here.p[1], here.p[2], wrist, ahead)
+        higher = above(axes.p[1], axes.p[2], wrist, front)
         if abs(higher) > CLEAR:
             assert name_of(chain, q)[1] == ("up" if higher > 0.0 else "down")
             checked += 1
@@ -206,11 +206,11 @@ def test_hand_bends_down_or_up_while_the_forearm_is_not_rolled(name: str) -> Non
         seen_as = name_of(chain, q)
         still = q.copy()
         still[rolls] = 0.0
-        here = seen(chain, still)
-        centre = here.meeting(-3, -2)
-        elbow = here.p[3] if name == "iiwa" else here.p[2]
-        forearm = here.z[-3] * np.sign(here.z[-3] @ (centre - elbow))
-        hand = here.T[:3, 3] - centre
+        axes = seen(chain, still)
+        centre = axes.meeting(-3, -2)
+        elbow = axes.p[3] if name == "iiwa" else axes.p[2]
+        forearm = axes.z[-3] * np.sign(axes.z[-3] @ (centre - elbow))
+        hand = axes.T[:3, 3] - centre
         if name == "Puma 560":
             _, left = heading(seen(chain, q), seen(chain, q).meeting(4, 5))
         else:
@@ -222,12 +222,12 @@ def test_hand_bends_down_or_up_while_the_forearm_is_not_rolled(name: str) -> Non
 
 def test_wrist_of_a_ur_leads_to_the_front_or_back_when_the_tool_points_down() -> None:
     for q in postures(UR5E, 7):
-        here = seen(straight(UR5E), q)
-        wrist = here.meeting(4, 5)
-        left = here.z[1] * np.sign(here.z[1] @ heading(here, wrist)[1])
+        axes = seen(straight(UR5E), q)
+        wrist = axes.meeting(4, 5)
+        left = axes.z[1] * np.sign(axes.z[1] @ heading(axes, wrist)[1])
         # Whatever its direction, the tool is seen from the side as if it pointed down.
-        hand = here.z[5] * np.sign(here.z[5] @ (here.T[:3, 3] - wrist))
-        outward = wrist - here.meeting(3, 4)
+        hand = axes.z[5] * np.sign(axes.z[5] @ (axes.T[:3, 3] - wrist))
+        outward = wrist - axes.meeting(3, 4)
         front = float(outward @ np.cross(hand, left))
         if abs(front) > 0.1 * CLEAR:
             assert name_of(UR5E, q)[2] == ("noflip" if front > 0.0 else "flip")
@@ -255,6 +255,6 @@ def test_solution_of_each_branch_looks_as_its_name_says(name: str) -> None:
     joints = tuple(k for k in range(chain.n) if k != solver.arm_angle_joint)
     words = BranchWords(chain, joints, solver.is_reversed)
     for q in postures(chain, 10)[:10]:
-        for each in solver.inverse(forward(chain, q), q):
-            if each.exact and not (chain.n < 7 and each.singular):
-                assert words.of(each.q) == each.branch
+        for solution in solver.inverse(forward(chain, q), q):
+            if solution.exact and not (chain.n < 7 and solution.singular):
+                assert words.of(solution.q) == solution.branch

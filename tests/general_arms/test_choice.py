@@ -80,10 +80,12 @@ def test_five_axes_keep_their_own_solver() -> None:
     assert isinstance(kinematics, FiveAxisKinematics)
     q = np.array([0.3, -1.0, 1.4, 0.3, 0.2])
     T = forward(chain, q)
-    found = kinematics.inverse(T, q)
-    assert [each.branch for each in found] == [each.branch for each in inverse(chain, T)]
-    assert found[0].exact
-    np.testing.assert_allclose(found[0].q, q, atol=1e-12)
+    solutions = kinematics.inverse(T, q)
+    assert [solution.branch for solution in solutions] == [
+        solution.branch for solution in inverse(chain, T)
+    ]
+    assert solutions[0].exact
+    np.testing.assert_allclose(solutions[0].q, q, atol=1e-12)
     assert exact_arm(chain).chain is chain
 
 
@@ -176,8 +178,10 @@ def test_rounded_file_is_solved_as_the_exact_arm_that_it_means() -> None:
     assert "nearest exact arm" in notes[0]
     q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
     assert np.abs(forward(exact, q) - forward(rounded, q)).max() < 5e-5
-    found = kinematics_of(exact).inverse(forward(exact, q), q)
-    assert min(float(np.abs(each.q - q).max()) for each in found if each.exact) < 1e-9
+    solutions = kinematics_of(exact).inverse(forward(exact, q), q)
+    assert (
+        min(float(np.abs(solution.q - q).max()) for solution in solutions if solution.exact) < 1e-9
+    )
     assert exact_arm(UR5E).notes == ()
 
 
@@ -185,10 +189,10 @@ def test_deviation_beyond_rounding_is_no_closed_form() -> None:
     bent = ur5e(twist_4=math.radians(0.1))
     assert kinematics_of(bent).method.startswith("elimination for six axes with an offset wrist")
     q = np.array([0.3, -1.0, 1.2, 0.4, 0.9, 0.6])
-    found = kinematics_of(bent).inverse(forward(bent, q))
-    assert len(found) == 8
-    assert max(each.position_error for each in found) < 1e-12
-    assert min(float(np.abs(each.q - q).max()) for each in found) < 1e-9
+    solutions = kinematics_of(bent).inverse(forward(bent, q))
+    assert len(solutions) == 8
+    assert max(solution.position_error for solution in solutions) < 1e-12
+    assert min(float(np.abs(solution.q - q).max()) for solution in solutions) < 1e-9
 
 
 def test_arm_solves_poses_of_its_own() -> None:

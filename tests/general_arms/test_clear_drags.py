@@ -71,17 +71,17 @@ def test_drag_with_a_clear_way_arrives(name: str) -> None:
     )
     assert is_clear(tool, q, str(state.branch), (since, target))
     for _ in range(MAX_TICKS):
-        found = tool.track(state, target, since)
-        assert tool.branch_of(found.best.q) == state.branch
-        assert chain.within_limits(found.best.q, slack=0.0)
-        state = replace(state, goal=found.best.q)
-        if found.since is None:
+        tracked = tool.track(state, target, since)
+        assert tool.branch_of(tracked.best.q) == state.branch
+        assert chain.within_limits(tracked.best.q, slack=0.0)
+        state = replace(state, goal=tracked.best.q)
+        if tracked.since is None:
             break
-        assert found.since is not None
-        since = found.since
-    assert found.since is None
-    assert found.beyond_gap is None
-    assert max(found.best.position_error, found.best.rotation_error) < 1e-9
+        assert tracked.since is not None
+        since = tracked.since
+    assert tracked.since is None
+    assert tracked.beyond_gap is None
+    assert max(tracked.best.position_error, tracked.best.rotation_error) < 1e-9
 
 
 SETTLING_TICKS = 8

@@ -58,9 +58,9 @@ DOUBLE = {
 
 
 def closed_form(chain: Chain) -> ClosedForm:
-    found = kinematics_of(chain)
-    assert isinstance(found, ClosedForm), found.method
-    return found
+    kinematics = kinematics_of(chain)
+    assert isinstance(kinematics, ClosedForm), kinematics.method
+    return kinematics
 
 
 def turned(angles: FloatArray) -> FloatArray:
@@ -87,10 +87,10 @@ def check(chain: Chain, postures: FloatArray) -> None:
     """Check that each posture is among the solutions of its pose, and that these are exact."""
     solver = closed_form(chain)
     T = forward_batch(chain, postures)
-    found = np.array([solver.solve(pose, q.tolist()) for pose, q in zip(T, postures, strict=True)])
-    assert np.isfinite(found).all()
-    distance, angle = errors_of(chain, found, T)
-    for q, solutions, far, off in zip(postures, found, distance, angle, strict=True):
+    table = np.array([solver.solve(pose, q.tolist()) for pose, q in zip(T, postures, strict=True)])
+    assert np.isfinite(table).all()
+    distance, angle = errors_of(chain, table, T)
+    for q, solutions, far, off in zip(postures, table, distance, angle, strict=True):
         exact = (far <= POSITION) & (off <= ROTATION)
         assert exact.any()
         assert lost(chain, q, solutions[exact]) <= 1e-6
@@ -127,9 +127,9 @@ def test_branches_differ_and_are_named(name: str) -> None:
     rng = np.random.default_rng(4)
     most = 0
     for q in rng.uniform(chain.lower, chain.upper, (40, chain.n)):
-        found = solver.inverse(forward(chain, q))
-        assert [each.branch for each in found] == list(solver.branches)
-        exact = np.array([each.q for each in found if each.exact])
+        solutions = solver.inverse(forward(chain, q))
+        assert [solution.branch for solution in solutions] == list(solver.branches)
+        exact = np.array([solution.q for solution in solutions if solution.exact])
         gaps = np.abs(turned(exact[:, None] - exact)).max(axis=2) + np.eye(len(exact))
         assert gaps.min() > 1e-6
         most = max(most, len(exact))
@@ -169,8 +169,8 @@ def test_many_poses_with_a_wrist_in_line_are_solved_as_one() -> None:
     q = singular.aligned_wrist(UR5E, np.random.default_rng(9), 60, 4, (0.0, math.pi))
     T = forward_batch(UR5E, q)
     solver = closed_form(UR5E)
-    for found in (solver.inverse_batch(T), np.array([solver.solve(pose) for pose in T])):
-        distance, angle = errors_of(UR5E, found, T)
+    for table in (solver.inverse_batch(T), np.array([solver.solve(pose) for pose in T])):
+        distance, angle = errors_of(UR5E, table, T)
         assert ((distance <= POSITION) & (angle <= ROTATION)).any(axis=1).all()
 
 
@@ -194,20 +194,20 @@ def test_pose_out_of_reach_gets_finite_angles_that_say_so(name: str) -> None:
     rng = np.random.default_rng(7)
     for scale in (0.0, 1e-9, 3.0, 1e3, 1e12):
         T = se3.from_rotation_translation(so3.exp(rng.normal(size=3)), scale * rng.normal(size=3))
-        for each in solver.inverse(T):
-            assert np.isfinite(each.q).all()
-            reached = forward(chain, each.q)
-            assert each.position_error == pytest.approx(math.dist(reached[:3, 3], T[:3, 3]))
-            assert each.exact == (
-                each.position_error <= 1e-9 and so3.angle(reached[:3, :3], T[:3, :3]) <= 1e-9
+        for solution in solver.inverse(T):
+            assert np.isfinite(solution.q).all()
+            reached = forward(chain, solution.q)
+            assert solution.position_error == pytest.approx(math.dist(reached[:3, 3], T[:3, 3]))
+            assert solution.exact == (
+                solution.position_error <= 1e-9 and so3.angle(reached[:3, :3], T[:3, :3]) <= 1e-9
             )
     far = se3.from_rotation_translation(np.eye(3), np.array([3.0, 0.2, 0.1]))
-    assert not any(each.exact for each in solver.inverse(far))
+    assert not any(solution.exact for solution in solver.inverse(far))
 
 
 def test_arm_that_cannot_reach_stretches_towards_the_target() -> None:
     far = se3.from_rotation_translation(np.eye(3), np.array([5.0, 1.0, 0.5]))
-    best = min(closed_form(UR5E).inverse(far), key=lambda each: each.position_error)
+    best = min(closed_form(UR5E).inverse(far), key=lambda solution: solution.position_error)
     reached = forward(UR5E, best.q)[:3, 3]
     # The arm is about 0.9 m long; what is left points at the target.
     left = far[:3, 3] - reached
@@ -220,20 +220,20 @@ def test_four_axes_hold_the_tool_point_of_a_pose_they_cannot_take() -> None:
     q = np.array([0.4, 0.2, -0.3, 0.5])
     T = forward(chain, q)
     T[:3, :3] = T[:3, :3] @ so3.rotation_x(0.3)
-    found = closed_form(chain).inverse(T)
-    assert all(each.position_error <= POSITION and not each.exact for each in found)
-    assert min(each.rotation_error for each in found) <= 0.3 + 1e-12
+    solutions = closed_form(chain).inverse(T)
+    assert all(solution.position_error <= POSITION and not solution.exact for solution in solutions)
+    assert min(solution.rotation_error for solution in solutions) <= 0.3 + 1e-12
 
 
 def test_singular_postures_name_the_axes_that_move_together() -> None:
     wrist = np.array([0.3, -0.9, 1.2, 0.4, 0.0, 0.6])
-    found = closed_form(KR_6).inverse(forward(KR_6, wrist), wrist)
-    here = min(found, key=lambda each: float(np.abs(each.q - wrist).max()))
-    np.testing.assert_allclose(here.q, wrist, atol=1e-9)
-    assert here.singular == (3, 5)
+    solutions = closed_form(KR_6).inverse(forward(KR_6, wrist), wrist)
+    nearest = min(solutions, key=lambda solution: float(np.abs(solution.q - wrist).max()))
+    np.testing.assert_allclose(nearest.q, wrist, atol=1e-9)
+    assert nearest.singular == (3, 5)
     regular = np.array([0.3, -0.9, 1.2, 0.4, 0.7, 0.6])
-    for each in closed_form(KR_6).inverse(forward(KR_6, regular)):
-        assert not each.exact or each.singular == ()
+    for solution in closed_form(KR_6).inverse(forward(KR_6, regular)):
+        assert not solution.exact or solution.singular == ()
 
 
 def test_free_angle_is_that_of_the_hint() -> None:
@@ -242,22 +242,22 @@ def test_free_angle_is_that_of_the_hint() -> None:
     for six in (-2.0, 0.0, 0.6, 1.5):
         hint = q.copy()
         hint[5] = six
-        found = closed_form(UR5E).inverse(T, hint)
+        solutions = closed_form(UR5E).inverse(T, hint)
         # Axis 6 stays where it was, and axes 2 to 4 take what is left.
-        assert any(each.exact and abs(each.q[5] - six) < 1e-9 for each in found)
+        assert any(solution.exact and abs(solution.q[5] - six) < 1e-9 for solution in solutions)
 
 
 def test_turn_nearest_to_the_hint_is_taken() -> None:
     q = np.array([4.0, -1.0, 1.2, 0.4, 0.9, -5.0])
-    found = closed_form(UR5E).inverse(forward(UR5E, q), q)
-    assert min(float(np.abs(each.q - q).max()) for each in found) < 1e-9
+    solutions = closed_form(UR5E).inverse(forward(UR5E, q), q)
+    assert min(float(np.abs(solution.q - q).max()) for solution in solutions) < 1e-9
 
 
 def test_angles_are_in_the_turn_inside_the_limits() -> None:
     rng = np.random.default_rng(8)
     for q in rng.uniform(PUMA_560.lower, PUMA_560.upper, (50, 6)):
-        found = closed_form(PUMA_560).inverse(forward(PUMA_560, q))
-        assert any(each.exact and each.within_limits for each in found)
+        solutions = closed_form(PUMA_560).inverse(forward(PUMA_560, q))
+        assert any(solution.exact and solution.within_limits for solution in solutions)
 
 
 def test_wrong_hint_and_wrong_poses_are_refused() -> None:

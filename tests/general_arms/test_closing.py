@@ -135,7 +135,7 @@ def test_part_is_not_pushed_into_another_object(plan: Planned, before: State) ->
     (lopsided,) = (f for f in closed.findings if f.reason is Reason.LOPSIDED)
     assert lopsided.parts == ("gripper_link", "part")
     assert lopsided.amount > 3e-3
-    moved = next(each for each in closed.objects if each.name == "part").T[:2, 3] - part.T[:2, 3]
+    moved = next(item for item in closed.objects if item.name == "part").T[:2, 3] - part.T[:2, 3]
     assert 2e-3 < np.linalg.norm(moved) <= 3.1e-3
 
 
@@ -189,8 +189,8 @@ def test_distance_is_that_of_the_named_part_of_the_palm(tmp_path: Path) -> None:
     assert isinstance(hand.fixed_jaw, FixedJaw)
     assert hand.fixed_jaw.name == "gripper_link"
     for along, wanted in ((-0.055, "bumper"), (-0.085, "gripper_link")):
-        at = se3.from_rotation_translation(np.eye(3), (0.01, 0.0, along))
-        fixed = SceneObject("part", Shape.BOX, (0.01, 0.01, 0.01), at, fixed=True)
+        pose = se3.from_rotation_translation(np.eye(3), (0.01, 0.0, along))
+        fixed = SceneObject("part", Shape.BOX, (0.01, 0.01, 0.01), pose, fixed=True)
         T = session.environment.pose(fixed, state.x_setpoint)
         chip = replace(fixed, T=T, fixed=False, can_be_held=True)
         around = session.environment.world((chip,))
@@ -260,9 +260,9 @@ def test_katana_has_the_sides_and_ends_of_its_file() -> None:
     world, _ = world_of(robot)
     assert world is not None
     hand = hand_of(robot, world)
-    found = with_sides(world, hand)
-    assert found.gripper == hand.gripper
-    assert found.gripper.closed == hand.gripper.lower
-    assert found.fingers == hand.fingers == ("finger_right_link", "finger_left_link")
-    assert found.sides == hand.sides == (("finger_right_link",), ("finger_left_link",))
-    assert found.fixed_jaw is None
+    complete = with_sides(world, hand)
+    assert complete.gripper == hand.gripper
+    assert complete.gripper.closed == hand.gripper.lower
+    assert complete.fingers == hand.fingers == ("finger_right_link", "finger_left_link")
+    assert complete.sides == hand.sides == (("finger_right_link",), ("finger_left_link",))
+    assert complete.fixed_jaw is None

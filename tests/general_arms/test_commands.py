@@ -34,14 +34,16 @@ Q = [0.3, -0.8, 1.1, 0.4, 0.7, -0.5]
 def test_posture_comes_back(urdf: Urdf) -> None:
     options = ("--urdf", str(urdf("ur5")), "--frame", "base")
     (pose,) = ask("fk", [{"q": Q}], *options)
-    (found,) = ask("ik", [{"T": pose["T"], "q": Q}], *options)
-    near = [each for each in found["solutions"] if np.allclose(each["q"], Q, atol=1e-9)]
+    (answer,) = ask("ik", [{"T": pose["T"], "q": Q}], *options)
+    near = [
+        solution for solution in answer["solutions"] if np.allclose(solution["q"], Q, atol=1e-9)
+    ]
     assert len(near) == 1
     assert near[0]["within_limits"]
     assert near[0]["singular"] == []
-    assert found["residual_mm"] < 1e-9
-    assert found["residual_rad"] < 1e-9
-    assert len(found["solutions"]) == len({each["branch"] for each in found["solutions"]})
+    assert answer["residual_mm"] < 1e-9
+    assert answer["residual_rad"] < 1e-9
+    assert len(answer["solutions"]) == len({solution["branch"] for solution in answer["solutions"]})
 
 
 def test_tool_and_orientation_are_chosen_in_the_line(urdf: Urdf) -> None:
@@ -50,9 +52,9 @@ def test_tool_and_orientation_are_chosen_in_the_line(urdf: Urdf) -> None:
     gap = np.array(tcp["T"])[:3, 3] - np.array(flange["T"])[:3, 3]
     assert np.linalg.norm(gap) == pytest.approx(np.hypot(0.02, 0.1))
     line = {"p": [0.4, 0.1, 0.3], "rpy": [0.1, 0.2, 0.3]}
-    (found,) = ask("ik", [line], *options, "--tool", "flange")
-    assert found["residual_mm"] < 1e-9
-    solution = found["solutions"][0]
+    (answer,) = ask("ik", [line], *options, "--tool", "flange")
+    assert answer["residual_mm"] < 1e-9
+    solution = answer["solutions"][0]
     (pose,) = ask("fk", [{"q": solution["q"], "tool": "flange"}], *options)
     np.testing.assert_allclose(np.array(pose["T"])[:3, 3], line["p"], atol=1e-9)
 

@@ -235,13 +235,13 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
     session, start, T = ready(chain)
     arm = session.require_arm()
     choices = session.choices(start)
-    assert [each.metrics.branch for each in choices] == list(arm.kinematics.branches)
+    assert [choice.metrics.branch for choice in choices] == list(arm.kinematics.branches)
     usable = [
-        each.metrics
-        for each in choices
-        if not each.refusal
-        and each.metrics.position_error < 1e-6
-        and each.metrics.branch != start.branch
+        choice.metrics
+        for choice in choices
+        if not choice.refusal
+        and choice.metrics.position_error < 1e-6
+        and choice.metrics.branch != start.branch
     ]
     assert usable
     goal = with_branch(arm, start, usable[-1].branch).goal
@@ -254,7 +254,7 @@ def test_other_branch_keeps_the_pose(chain: Chain) -> None:
 def test_branch_that_the_limits_exclude_has_a_reason_and_is_refused_with_it(name: str) -> None:
     session = session_of(ARMS[name])
     arm, start = session.require_arm(), begun(session)
-    refused = {each.metrics.branch: each.refusal for each in session.choices(start)}
+    refused = {choice.metrics.branch: choice.refusal for choice in session.choices(start)}
     assert refused[start.branch] == ""
     assert set(refused) == set(arm.kinematics.branches)
     for branch, why in refused.items():
@@ -313,7 +313,7 @@ def test_state_of_a_drag_and_its_commands_are_recorded_to_the_bit() -> None:
     text = json_text(codec.encoded(state))
     again = codec.decoded(State, json_form(text))
     assert json_text(codec.encoded(again)) == text
-    following, repeated = (session.step(each, [], 2 * TICK) for each in (state, again))
+    following, repeated = (session.step(before, [], 2 * TICK) for before in (state, again))
     np.testing.assert_array_equal(following.goal, repeated.goal)
     for command in (cmd.Orient(TURN), cmd.Branch(name="left-up-noflip")):
         form = json_text(codec.encoded(command))

@@ -60,7 +60,7 @@ def robot_of(folder: Path, chain: Chain, decimals: int = DECIMALS) -> Robot:
     """Return the robot of a file that gives the rotations of ``chain`` with few decimals."""
     text = re.sub(
         r'rpy="([^"]*)"',
-        lambda found: f'rpy="{" ".join(f"{float(x):.{decimals}f}" for x in found[1].split())}"',
+        lambda match: f'rpy="{" ".join(f"{float(x):.{decimals}f}" for x in match[1].split())}"',
         chain_urdf("arm", chain),
     )
     path = folder / "arm.urdf"
@@ -99,12 +99,12 @@ def test_solutions_take_the_pose_of_the_arm_in_the_file(tmp_path: Path, name: st
     assert isinstance(kinematics, ClosedForm | SevenAxes)
     count = 0
     for q in postures(chain, 30):
-        found = kinematics.inverse(forward(chain, q), q)
-        exact = [each for each in found if each.exact]
-        assert max(each.position_error for each in exact) <= EXACT
-        assert max(each.rotation_error for each in exact) <= EXACT
+        solutions = kinematics.inverse(forward(chain, q), q)
+        exact = [solution for solution in solutions if solution.exact]
+        assert max(solution.position_error for solution in exact) <= EXACT
+        assert max(solution.rotation_error for solution in exact) <= EXACT
         if chain.n == 6:
-            away = np.array([each.q for each in exact]) - q
+            away = np.array([solution.q for solution in exact]) - q
             away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
             assert np.abs(away).max(axis=1).min() <= 1e-7
         count += len(exact)
@@ -140,8 +140,8 @@ def test_postures_near_singularities_are_taken_too(tmp_path: Path, name: str) ->
     in_line = singular.aligned_wrist(chain, rng, 40, 4, (0.0,))
     q = np.concatenate((near, in_line))
     T = forward_batch(chain, q)
-    found = np.array([solver.solve(t, each.tolist()) for t, each in zip(T, q, strict=True)])
-    distance, turn = errors_of(chain, found, T)
+    table = np.array([solver.solve(t, posture.tolist()) for t, posture in zip(T, q, strict=True)])
+    distance, turn = errors_of(chain, table, T)
     assert (np.maximum(distance, turn).min(axis=1) <= 1e-9).all()
 
 
@@ -172,8 +172,8 @@ def test_map_counts_the_poses_of_such_an_arm(tmp_path: Path) -> None:
     solver = kinematics_of(chain)
     assert isinstance(solver, SevenAxes)
     T = forward_batch(chain, 0.5 * postures(chain, 20))
-    taken = PoseSolver(solver, lambda q: np.ones(len(q), dtype=np.bool)).taken(T)
-    assert taken.mean() >= 0.9
+    is_taken = PoseSolver(solver, lambda q: np.ones(len(q), dtype=np.bool)).taken(T)
+    assert is_taken.mean() >= 0.9
 
 
 @pytest.mark.parametrize("chain", [UR5E, PANDA])
@@ -183,8 +183,8 @@ def test_coarser_file_means_the_exact_arm(tmp_path: Path, chain: Chain) -> None:
     exact = arm.chain_to(arm.default_tool)
     assert max(links_of(exact).rounding) < 1e-13
     q = postures(exact, 1)[0]
-    found = kinematics_of(exact).inverse(forward(exact, q))
-    assert min(each.position_error for each in found) < EXACT
+    solutions = kinematics_of(exact).inverse(forward(exact, q))
+    assert min(solution.position_error for solution in solutions) < EXACT
 
 
 def test_four_axes_hold_the_tool_point_and_nearly_the_rotation(tmp_path: Path) -> None:
@@ -195,10 +195,12 @@ def test_four_axes_hold_the_tool_point_and_nearly_the_rotation(tmp_path: Path) -
     # Poses of this arm, and poses of the exact arm, which it takes but for the rounding.
     for source in (chain, exact):
         for q in postures(chain, 20):
-            found = [each for each in solver.inverse(forward(source, q)) if each.exact]
-            assert len(found) == 2
-            assert max(each.position_error for each in found) <= EXACT
-            assert max(each.rotation_error for each in found) <= 1.3e-7
-            away = np.array([each.q for each in found]) - q
+            exact_solutions = [
+                solution for solution in solver.inverse(forward(source, q)) if solution.exact
+            ]
+            assert len(exact_solutions) == 2
+            assert max(solution.position_error for solution in exact_solutions) <= EXACT
+            assert max(solution.rotation_error for solution in exact_solutions) <= 1.3e-7
+            away = np.array([solution.q for solution in exact_solutions]) - q
             away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
             assert np.abs(away).max(axis=1).min() <= 1e-6

@@ -133,10 +133,10 @@ def test_fixed_jaw_on_the_other_side_is_not_out_of_reach(tmp_path: Path) -> None
     hand = hand_of(session, plan.robot.require_arm().T_base_shoulder, plan.start)
     assert hand.plane is not None
     middle = np.array((0.23, 0.06, 0.03))
-    at = hand.before(middle, Approach(0.5), 0.01)
+    target = hand.before(middle, Approach(0.5), 0.01)
     turned = so3.rotation_x(math.pi) @ hand.plane.R_hand_tool
     farther = replace(hand, plane=replace(hand.plane, R_hand_tool=turned))
     other = farther.before(middle, Approach(0.5, math.pi), 0.01)
-    assert math.remainder(other.roll - at.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(other.position, at.position, atol=1e-12)
+    assert math.remainder(other.roll - target.roll, math.tau) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(other.position, target.position, atol=1e-12)
     assert farther.branches_to(session.ready, other)

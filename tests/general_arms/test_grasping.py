@@ -47,7 +47,7 @@ def item(
     name: str,
     shape: str,
     size: tuple[float, ...],
-    at: tuple[float, float],
+    place: tuple[float, float],
     yaw: float = 0.0,
     *,
     can_be_held: bool = True,
@@ -56,7 +56,7 @@ def item(
     held = str(can_be_held).lower()
     return (
         f"{{name: {name}, shape: {shape}, size: {list(size)}, "
-        f"pose: [{at[0]}, {at[1]}, 0, 0, 0, {yaw}], can_be_held: {held}}}"
+        f"pose: [{place[0]}, {place[1]}, 0, 0, 0, {yaw}], can_be_held: {held}}}"
     )
 
 
@@ -64,8 +64,8 @@ def planned(tmp_path: Path, urdf: str, steps: list[str], *items: str) -> Planned
     """Return the steps, planned in a scene of the objects."""
     path = tmp_path / "arm.urdf"
     path.write_text(urdf, encoding="utf-8")
-    scene = "".join(f"  - {each}\n" for each in items)
-    text = f"frame: base\nscene:\n{scene}steps:\n" + "".join(f"  - {each}\n" for each in steps)
+    scene = "".join(f"  - {line}\n" for line in items)
+    text = f"frame: base\nscene:\n{scene}steps:\n" + "".join(f"  - {line}\n" for line in steps)
     return plan_script(parse(text), path)
 
 
@@ -125,7 +125,7 @@ def test_held_object_keeps_clear_of_a_wall_as_the_arm_does(tmp_path: Path) -> No
     steps = ["pick: {object: post, side: above}", "place: {at: {x: 480, y: -120}}", "home"]
     plan = planned(tmp_path, gripping_urdf("UR5e"), steps, post, wall)
     states = played(plan)
-    end = next(each for each in states[-1].objects if each.name == "post")
+    end = next(scene_object for scene_object in states[-1].objects if scene_object.name == "post")
     assert place(end) == pytest.approx([480.0, -120.0, 0.0], abs=1e-6)
     carried = [state for state in states if state.held is not None]
     gaps = []
@@ -161,12 +161,14 @@ def test_preview_shows_the_object_in_the_hand(tmp_path: Path) -> None:
         preview = Preview(server, plan.robot, lambda: plan.session)
         assert preview.show(plan.program, plan.start) > 0.0
         preview.look(lifted.t)
-        for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+        for thread in [
+            candidate for candidate in threading.enumerate() if candidate.name == "preview"
+        ]:
             thread.join(60.0)
         shown = preview._shown
-        seen = None if shown is None else shown.at(lifted.t)
-        assert seen is not None
-        expected = in_base(plan, seen)[:3, 3]
+        pose = None if shown is None else shown.at(lifted.t)
+        assert pose is not None
+        expected = in_base(plan, pose)[:3, 3]
         assert expected[2] > 0.02
         ghost = internals.nodes(server)["/path/objects/0"]
         assert ghost.visible

@@ -21,8 +21,8 @@ from tests.general_arms.published_arms import OPENMANIPULATOR_X, PANDA, UR5E
 
 def hand(chain: Chain) -> HandPlanning:
     """Return the hand of an arm whose tool frame is its grasp frame."""
-    made: PlanState = begin_plan(chain)
-    return HandPlanning(made.planning, np.eye(4), np.eye(4), 0.1, one_jaw=False, plane=None)
+    plan_state: PlanState = begin_plan(chain)
+    return HandPlanning(plan_state.planning, np.eye(4), np.eye(4), 0.1, one_jaw=False, plane=None)
 
 
 @pytest.mark.parametrize(("chain", "turn"), [(UR5E, 6.0 - math.tau), (PANDA, 6.0)])
@@ -49,5 +49,5 @@ def test_plane_of_the_arm_gives_the_tool_at_every_posture() -> None:
     pitch, roll = plane.angles(R)
     np.testing.assert_allclose(plane.rotation(pitch, roll), R, atol=1e-12)
     grasp = (T @ T_tool_grasp)[:3, 3]
-    beside = plane.beside_at(R, T_tool_grasp[:3, 3])
-    assert plane.turn(grasp, beside) == pytest.approx(plane.sign * turned[0], abs=1e-12)
+    offset = plane.beside_at(R, T_tool_grasp[:3, 3])
+    assert plane.turn(grasp, offset) == pytest.approx(plane.sign * turned[0], abs=1e-12)

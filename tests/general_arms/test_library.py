@@ -30,12 +30,12 @@ def test_posture_is_found_again(urdf: Urdf, name: str, frame: str) -> None:
     rng = np.random.default_rng(1)
     for q in rng.uniform(arm.lower, arm.upper, (5, arm.n)):
         T = arm.fk(q)
-        found = arm.ik(T, q)
-        assert found.q.shape == (NAMES[name], arm.n)
-        assert len(set(found.branches)) == NAMES[name]
-        assert min(float(np.abs(each.q - q).max()) for each in found.feasible) < 0.2
-        for each in found.feasible:
-            np.testing.assert_allclose(arm.fk(each.q), T, atol=1e-8)
+        solutions = arm.ik(T, q)
+        assert solutions.q.shape == (NAMES[name], arm.n)
+        assert len(set(solutions.branches)) == NAMES[name]
+        assert min(float(np.abs(solution.q - q).max()) for solution in solutions.feasible) < 0.2
+        for solution in solutions.feasible:
+            np.testing.assert_allclose(arm.fk(solution.q), T, atol=1e-8)
         best = arm.nearest(T)
         assert best.reason == ""
         np.testing.assert_allclose(best.T, T, atol=1e-8)
@@ -108,9 +108,9 @@ def test_five_axis_arm_of_the_family_stays_what_it_was(urdf: Urdf) -> None:
 
 
 def test_map_of_reachability_is_that_of_six_axes(urdf: Urdf) -> None:
-    found = load(urdf("ur5")).reachability(0.4)
-    assert len(found.points) > 10
-    assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
+    reachability = load(urdf("ur5")).reachability(0.4)
+    assert len(reachability.points) > 10
+    assert ((reachability.fraction > 0.0) & (reachability.fraction <= 1.0)).all()
 
 
 def test_two_axes_are_no_arm(tmp_path: Path) -> None:

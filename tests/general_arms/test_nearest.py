@@ -57,7 +57,7 @@ def test_pose_out_of_reach_has_the_distance_in_words(name: str) -> None:
     # The arm points at the target: no other posture is much nearer.
     rng = np.random.default_rng(2)
     others = [forward(chain, q) for q in rng.uniform(chain.lower, chain.upper, (300, chain.n))]
-    assert best.position_error < min(math.dist(T[:3, 3], each[:3, 3]) for each in others)
+    assert best.position_error < min(math.dist(T[:3, 3], pose[:3, 3]) for pose in others)
 
 
 def test_limit_that_holds_the_arm_is_named() -> None:
@@ -123,9 +123,9 @@ def test_plain_floats_are_the_forward_kinematics_and_the_jacobian(name: str) -> 
     rng = np.random.default_rng(1)
     for q in rng.uniform(chain.lower, chain.upper, (10, chain.n)):
         pose, axes = state(q.tolist())
-        here = se3.from_rotation_translation(np.reshape(pose[:9], (3, 3)).T, np.array(pose[9:]))
+        T_1_tool = se3.from_rotation_translation(np.reshape(pose[:9], (3, 3)).T, np.array(pose[9:]))
         T = forward(chain, q)
-        np.testing.assert_allclose(links.T_S_1 @ here, T, atol=1e-13)
+        np.testing.assert_allclose(links.T_S_1 @ T_1_tool, T, atol=1e-13)
         # Twists of the tool point, turned into {S}.
         R = links.T_S_1[:3, :3]
         J = jacobian_space(chain, q)
@@ -145,10 +145,10 @@ def test_reachable_poses_are_reached_inside_the_limits_in_time(name: str) -> Non
     for q in rng.uniform(chain.lower, chain.upper, (POSES, chain.n)):
         T = forward(chain, q)
         started = time.thread_time()
-        (found,) = solver.inverse(T)
+        (solution,) = solver.inverse(T)
         times.append(time.thread_time() - started)
-        assert found.within_limits
-        reached += found.position_error <= REACHED and found.rotation_error <= REACHED
+        assert solution.within_limits
+        reached += solution.position_error <= REACHED and solution.rotation_error <= REACHED
     assert reached >= 0.995 * POSES
     assert float(np.median(times)) <= 5e-3
 
@@ -158,8 +158,8 @@ def test_search_begins_at_the_hint() -> None:
     solver = numerical(SKEWED_6)
     for q in rng.uniform(-2.0, 2.0, (30, 6)):
         T = forward(SKEWED_6, q + 1e-3 * rng.normal(size=6))
-        (found,) = solver.inverse(T, q)
-        assert np.abs(found.q - q).max() < 0.2
+        (solution,) = solver.inverse(T, q)
+        assert np.abs(solution.q - q).max() < 0.2
 
 
 def test_same_pose_gives_the_same_posture() -> None:
@@ -172,25 +172,25 @@ def test_rotation_by_half_a_turn_is_followed() -> None:
     q = np.array([0.2, -1.0, 0.9, 0.3, 0.8, -0.4])
     T = forward(KR_6, q)
     T[:3, :3] = T[:3, :3] @ so3.rotation_x(math.pi)
-    (found,) = solver.inverse(T, q)
-    assert found.exact
+    (solution,) = solver.inverse(T, q)
+    assert solution.exact
 
 
 def test_pose_out_of_reach_gets_its_residual() -> None:
     T = se3.from_rotation_translation(np.eye(3), np.array([5.0, 0.0, 0.3]))
-    (found,) = numerical(SKEWED_6).inverse(T)
-    assert found.within_limits
-    assert not found.exact
-    assert 3.0 < found.position_error < 5.0
-    assert found.position_error == pytest.approx(
-        math.dist(forward(SKEWED_6, found.q)[:3, 3], T[:3, 3])
+    (solution,) = numerical(SKEWED_6).inverse(T)
+    assert solution.within_limits
+    assert not solution.exact
+    assert 3.0 < solution.position_error < 5.0
+    assert solution.position_error == pytest.approx(
+        math.dist(forward(SKEWED_6, solution.q)[:3, 3], T[:3, 3])
     )
 
 
 def test_limits_are_kept_where_they_forbid_the_pose() -> None:
     narrow = dataclasses.replace(PUMA_560, lower=np.full(6, -0.3), upper=np.full(6, 0.3))
     T = forward(PUMA_560, [0.9, 0.1, 0.1, 0.1, 0.2, 0.1])
-    (found,) = numerical(narrow).inverse(T)
-    assert found.within_limits
-    assert not found.exact
-    assert found.q[0] == pytest.approx(0.3)
+    (solution,) = numerical(narrow).inverse(T)
+    assert solution.within_limits
+    assert not solution.exact
+    assert solution.q[0] == pytest.approx(0.3)

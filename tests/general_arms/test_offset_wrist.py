@@ -112,7 +112,9 @@ def test_postures_are_those_of_a_search_from_many_starts(name: str) -> None:
         names = [str(solution.branch) for solution in solutions]
         assert len(set(names)) == len(names)
         assert set(names) <= set(solver.branches)
-        errors = [max(found.position_error, found.rotation_error) for found in solutions]
+        errors = [
+            max(candidate.position_error, candidate.rotation_error) for candidate in solutions
+        ]
         worst = max(worst, *errors)
         counts.append(len(postures))
         searched_counts.append(len(others) - (apart(q, others[:-1]) < SAME).any())
@@ -172,9 +174,9 @@ def test_rounding_of_a_file_changes_no_name() -> None:
         rounded = dataclasses.replace(chain, S=S)
         assert offset_wrist(rounded).branches == offset_wrist(chain).branches
         q = np.array([0.3, 1.2, 1.0, 0.4, 0.9, 0.6])
-        found = kinematics_of(rounded).inverse(forward(rounded, q))
-        assert min(float(apart(q, s.q[None])[0]) for s in found) <= SAME
-        assert max(s.position_error for s in found) <= EXACT
+        solutions = kinematics_of(rounded).inverse(forward(rounded, q))
+        assert min(float(apart(q, s.q[None])[0]) for s in solutions) <= SAME
+        assert max(s.position_error for s in solutions) <= EXACT
 
 
 def test_pose_has_sixteen_postures() -> None:
@@ -204,7 +206,7 @@ def test_singular_postures_are_found_again(name: str) -> None:
     for q in near:
         T = forward(chain, q)
         solutions = solver.inverse(T, q if name == "CRX-10iA" else None)
-        postures = np.array([found.q for found in solutions])
+        postures = np.array([solution.q for solution in solutions])
         assert max(max(s.position_error, s.rotation_error) for s in solutions) <= EXACT
         # A double root is known to the square root of rounding, and one of more less well.
         lost += apart(q, postures).min() > 1e-4
@@ -236,9 +238,9 @@ def test_batch_and_branches_agree_with_single_poses(name: str) -> None:
         for solution in solutions:
             first = "-".join(str(solution.branch).split("-")[:3])
             assert solver.branch_of(solution.q) == first
-        found = solver.on_branch(target, solver.branch_of(posture), posture)
-        assert found is not None
-        assert apart(found, posture[None]) <= 1e-7
+        same = solver.on_branch(target, solver.branch_of(posture), posture)
+        assert same is not None
+        assert apart(same, posture[None]) <= 1e-7
     distance, _ = errors_of(chain, solver.inverse_batch(T), T)
     assert np.isinf(distance).any()
     assert distance[np.isfinite(distance)].max() <= EXACT
@@ -247,10 +249,10 @@ def test_batch_and_branches_agree_with_single_poses(name: str) -> None:
 def test_pose_out_of_reach_has_the_posture_of_the_search() -> None:
     far = se3.from_rotation_translation(np.eye(3), np.array([3.0, 0.2, 0.1]))
     for chain in OFFSET.values():
-        (found,) = kinematics_of(chain).inverse(far)
-        assert not found.exact
-        assert np.isfinite(found.q).all()
-        assert found.position_error > 1.0
+        (solution,) = kinematics_of(chain).inverse(far)
+        assert not solution.exact
+        assert np.isfinite(solution.q).all()
+        assert solution.position_error > 1.0
 
 
 def test_turns_are_those_of_the_limits_and_the_hint() -> None:
@@ -266,11 +268,11 @@ def test_every_branch_is_taken_or_refused() -> None:
     session = session_of(CRX_10IA)
     arm = session.require_arm()
     rng, branches = np.random.default_rng(8), offset_wrist(CRX_10IA).branches
-    taken: set[str] = set()
-    while not 2 <= len(taken) <= 6:
+    occupied: set[str] = set()
+    while not 2 <= len(occupied) <= 6:
         q = rng.uniform(-2.0, 2.0, 6)
-        taken = {str(s.branch) for s in kinematics_of(CRX_10IA).inverse(forward(CRX_10IA, q))}
-        taken &= set(branches[:8])
+        occupied = {str(s.branch) for s in kinematics_of(CRX_10IA).inverse(forward(CRX_10IA, q))}
+        occupied &= set(branches[:8])
     state = session.begin(q, 0.0, 0.0)
     T, refused = pose(session, state), set()
     for option in branch_options(arm, state):
@@ -283,7 +285,7 @@ def test_every_branch_is_taken_or_refused() -> None:
         end = settled(session, state, [cmd.Branch(name=str(name))])
         assert end.branch == name
         np.testing.assert_allclose(pose(session, end), T, atol=1e-12)
-    assert refused == set(branches[:8]) - taken
+    assert refused == set(branches[:8]) - occupied
 
 
 def test_other_arms_of_these_makers() -> None:

@@ -78,14 +78,14 @@ class Pour(NamedTuple):
 
 def planned(tmp_path: Path, name: str, pour: str) -> Planned:
     """Return a script that fills the cup of the scene, and pours as the step says."""
-    path, at = tmp_path / "arm.urdf", SETTINGS.get(name, Setting())
+    path, setting = tmp_path / "arm.urdf", SETTINGS.get(name, Setting())
     path.write_text(gripping_urdf(name), encoding="utf-8")
     steps = (
-        "put: {{object: cup, x: {:g}, y: {:g}}}".format(*at.cup),
-        "put: {{object: basin, x: {:g}, y: {:g}}}".format(*at.basin),
-        f"fill: {at.water:g}",
+        "put: {{object: cup, x: {:g}, y: {:g}}}".format(*setting.cup),
+        "put: {{object: basin, x: {:g}, y: {:g}}}".format(*setting.basin),
+        f"fill: {setting.water:g}",
         "grasp: cup",
-        f"line: {{by: {{z: {at.lift:g}}}}}",
+        f"line: {{by: {{z: {setting.lift:g}}}}}",
         f"pour: {pour}",
         "set_down:",
         "home",
@@ -99,9 +99,9 @@ def planned(tmp_path: Path, name: str, pour: str) -> Planned:
 
 def poured(tmp_path: Path, name: str, pour: str) -> Pour:
     plan = planned(tmp_path, name, pour)
-    found = Pour(plan, run_by_clock(plan))
-    assert not any(state.findings for state in found.simulation.states)
-    return found
+    result = Pour(plan, run_by_clock(plan))
+    assert not any(state.findings for state in result.simulation.states)
+    return result
 
 
 def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> 
         off.append(float(np.abs(moved @ lip - lip).max()))
     assert min(off) < MICROMETRE
     # The cup turns evenly, about a level axis.
-    angles = [so3.angle(each[:3, :3], np.eye(3)) for each in moved]
+    angles = [so3.angle(pose[:3, :3], np.eye(3)) for pose in moved]
     np.testing.assert_allclose(np.degrees(angles), np.linspace(0.0, 120.0, 41), atol=1e-6)
     assert moved[-1][2, 2] == pytest.approx(-0.5, abs=1e-9)
 
@@ -130,40 +130,40 @@ def test_tool_turns_about_a_lip_over_the_middle_of_the_basin(tmp_path: Path) -> 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["UR5e", "Panda", "four long axes"])
 def test_cup_is_emptied_about_its_lip(name: str, tmp_path: Path) -> None:
-    found = poured(tmp_path, name, "{into: basin, shake: 1}")
-    trace = found.simulation.trace
-    values = measurements(found.plan.program, found.plan.robot.require_arm(), trace)
+    pour = poured(tmp_path, name, "{into: basin, shake: 1}")
+    trace = pour.simulation.trace
+    values = measurements(pour.plan.program, pour.plan.robot.require_arm(), trace)
     assert values["emptied_percent"] is not None
     assert 99.5 < values["emptied_percent"] < 99.99
     assert values["spilled_ml"] == 0.0
     assert values["carried_margin_to_rim_mm"] is not None
     assert values["carried_margin_to_rim_mm"] > 1.0
     # The lip stays where it is while the cup turns, and is over the middle of the basin.
-    names = [task.name for task in found.plan.program.tasks]
+    names = [task.name for task in pour.plan.program.tasks]
     ticks = np.flatnonzero(trace.task == names.index(POURING)).tolist()
-    tilted = [s for s in map(found.simulation.states.__getitem__, ticks) if _tilt(found, s) > 5.0]
-    lips = np.array([found.lip(state) for state in tilted])
+    tilted = [s for s in map(pour.simulation.states.__getitem__, ticks) if _tilt(pour, s) > 5.0]
+    lips = np.array([pour.lip(state) for state in tilted])
     assert np.ptp(lips, axis=0).max() < MICROMETRE
-    at = SETTINGS.get(name, Setting())
-    np.testing.assert_allclose(1e3 * lips[0, :2], at.basin, atol=1e-3)
-    assert _tilt(found, tilted[-1]) == pytest.approx(120.0, abs=1e-3)
-    cup = found.cup(found.simulation.states[-1])
-    np.testing.assert_allclose(1e3 * cup[:3, 3], (*at.cup, 0.0), atol=1e-6)
+    setting = SETTINGS.get(name, Setting())
+    np.testing.assert_allclose(1e3 * lips[0, :2], setting.basin, atol=1e-3)
+    assert _tilt(pour, tilted[-1]) == pytest.approx(120.0, abs=1e-3)
+    cup = pour.cup(pour.simulation.states[-1])
+    np.testing.assert_allclose(1e3 * cup[:3, 3], (*setting.cup, 0.0), atol=1e-6)
 
 
-def _tilt(found: Pour, state: State) -> float:
+def _tilt(pour: Pour, state: State) -> float:
     """Return the tilt of the cup [deg]."""
-    return float(np.degrees(np.arccos(np.clip(found.cup(state)[2, 2], -1.0, 1.0))))
+    return float(np.degrees(np.arccos(np.clip(pour.cup(state)[2, 2], -1.0, 1.0))))
 
 
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("name", ["four axes", "UR5e"])
 def test_flow_that_no_tilt_gives_is_refused(name: str, tmp_path: Path) -> None:
     """The last drops flow too slowly."""
-    at = SETTINGS.get(name, Setting())
+    setting = SETTINGS.get(name, Setting())
     why = "The cup cannot be emptied into basin: No tilt of the cup pours this part; pour all of it"
     with pytest.raises(ScriptError, match=why):
-        planned(tmp_path, name, f"{{into: basin, ml: {at.water:g}}}")
+        planned(tmp_path, name, f"{{into: basin, ml: {setting.water:g}}}")
 
 
 def test_basin_too_near_to_axis_1_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,15 +201,15 @@ def test_turn_by_a_polynomial_keeps_the_lip_in_its_place() -> None:
         np.testing.assert_allclose(pose, moved @ before, atol=1e-12)
 
 
-@pytest.mark.parametrize("kept", [True, False])
-def test_turn_is_read_from_recordings(kept: bool) -> None:
+@pytest.mark.parametrize("has_pose_axis", [True, False])
+def test_turn_is_read_from_recordings(has_pose_axis: bool) -> None:
     """Older recordings have no `axis_in_pose`: it is the axis then."""
     codec = Codec()
     form = codec.encoded(TURN)
-    if not kept:
+    if not has_pose_axis:
         del form["axis_in_pose"]
     read = codec.decoded(PoseTurn, form)
-    wanted = replace(TURN, axis_in_pose=TURN.axis_in_pose if kept else TURN.axis)
+    wanted = replace(TURN, axis_in_pose=TURN.axis_in_pose if has_pose_axis else TURN.axis)
     sigma = Jet.variable(np.linspace(0.0, 1.0, 5))
     np.testing.assert_array_equal(read.at(sigma).T, wanted.at(sigma).T)
 

@@ -58,8 +58,8 @@ EIGHT_AXES = craig(
 def test_arm_of_few_or_many_axes_follows_lines_and_circles(chain: Chain) -> None:
     p = middle(chain)
     text = f"circle: {{centre: {point(p - (0.0, 0.0, 15.0))}, normal: x, radius: 15}}"
-    made = program(chain, "line: {by: {y: 20}}", "line: {by: {y: -20}}", text)
-    line, _, circle = (each.segments[0].path for each in plans(made))
+    compiled_program = program(chain, "line: {by: {y: 20}}", "line: {by: {y: -20}}", text)
+    line, _, circle = (plan.segments[0].path for plan in plans(compiled_program))
     sigma = np.linspace(0.0, 1.0, 300)
     points = 1e3 * forward_batch(chain, joint_derivatives(line, sigma)[0])[:, :3, 3]
     np.testing.assert_allclose(points, p + np.outer(sigma, (0.0, 20.0, 0.0)), atol=1e-6)
@@ -81,23 +81,25 @@ def test_arm_without_fingers_has_no_hand() -> None:
 def test_plan_is_recorded_to_the_bit(chain: Chain) -> None:
     d, p = 0.3 * length(chain), middle(chain)
     through = ", ".join(map(point, (p - (0.0, 0.0, d), p - (0.0, d, d))))
-    made = program(chain, f"line: {{by: {{y: {d}}}}}", f"lines: {{through: [{through}]}}")
+    compiled_program = program(
+        chain, f"line: {{by: {{y: {d}}}}}", f"lines: {{through: [{through}]}}"
+    )
     writer, reader, session = Codec(), Codec(), session_of(chain)
     states: list[list[bytes]] = [[], []]
-    for plan in plans(made):
+    for plan in plans(compiled_program):
         form = json_text(writer.encoded(cmd.Follow(plan)))
         for shared in writer.shared.take_new():
             reader.shared.add(shared)
-        found = reader.decoded(cmd.Follow, json_form(form))
-        for command, seen in zip((cmd.Follow(plan), found), states, strict=True):
+        decoded = reader.decoded(cmd.Follow, json_form(form))
+        for command, setpoints in zip((cmd.Follow(plan), decoded), states, strict=True):
             state = session.begin(plan.start, 0.0, 0.0)
             for number in range(60):
                 commands = [command] if number == 0 else []
                 state = session.step(state, commands, state.t + TICK)
                 state = session.observe(state, state.setpoint, 0.0)
-                seen.append(state.setpoint.tobytes())
+                setpoints.append(state.setpoint.tobytes())
                 assert writer.encoded(state)
-        assert found.plan.segments[0].path.joins == plan.segments[0].path.joins
+        assert decoded.plan.segments[0].path.joins == plan.segments[0].path.joins
     assert states[0] == states[1]
     assert len(set(states[0])) > 60
 
@@ -115,8 +117,10 @@ def test_path_refuses_numbers_that_are_no_path() -> None:
 
 
 def test_angles_that_gimbal_lock_hides_are_asked_for() -> None:
-    made = begin_plan(UR5E)
-    target = made.planning.oriented(made.target, Angles(math.pi / 2, 0.0, 0.0), np.eye(3))
+    plan_state = begin_plan(UR5E)
+    target = plan_state.planning.oriented(
+        plan_state.target, Angles(math.pi / 2, 0.0, 0.0), np.eye(3)
+    )
     with pytest.raises(InputError, match="`roll`, `pitch` and `yaw` together"):
-        made.planning.oriented(target, Angles(yaw=0.3), np.eye(3))
-    assert made.planning.oriented(target, Angles(), np.eye(3)) is target
+        plan_state.planning.oriented(target, Angles(yaw=0.3), np.eye(3))
+    assert plan_state.planning.oriented(target, Angles(), np.eye(3)) is target

@@ -75,8 +75,8 @@ def test_line_through_a_singularity_is_refused_with_its_axes(name: str) -> None:
     assert "axes 4 and 6" in text
     # What the message proposes: `move` leads there.
     assert "`move`" in text
-    made, _, _ = run_from(chain, q, f"move: {to}")
-    reached = forward_batch(chain, plans(made)[-1].end[None])[0]
+    compiled_program, _, _ = run_from(chain, q, f"move: {to}")
+    reached = forward_batch(chain, plans(compiled_program)[-1].end[None])[0]
     np.testing.assert_allclose(reached, end, atol=1e-8)
 
 
@@ -86,13 +86,13 @@ def test_line_beside_a_singularity_turns_the_wrist_within_its_limits() -> None:
     other = q + np.array((0.0, 0.0, 0.0, 2.5, 0.0, -2.5))
     end = forward_batch(chain, other[None])[0]
     text = f"line: {{to: {point(1e3 * end[:3, 3])}, {angles_of(end[:3, :3])}}}"
-    made, state, _ = run_from(chain, q, text)
-    path = plans(made)[0].segments[0].path
+    compiled_program, state, _ = run_from(chain, q, text)
+    path = plans(compiled_program)[0].segments[0].path
     assert abs(path.end[3] - path.start[3]) > 2.4
     session = session_of(chain)
     run, setpoints = Run(0.0), [state.setpoint]
     while run.phase is Phase.RUNNING and len(setpoints) < 4000:
-        run, commands = step(made, run, state, state.t)
+        run, commands = step(compiled_program, run, state, state.t)
         state = session.step(state, commands, state.t + TICK)
         state = session.observe(state, state.setpoint, 0.0)
         setpoints.append(state.setpoint)
@@ -105,23 +105,23 @@ def test_line_beside_a_singularity_turns_the_wrist_within_its_limits() -> None:
 
 @every({"UR5e": UR5E}, {"Panda": PANDA, "OpenMANIPULATOR-X": OPENMANIPULATOR_X, **REST})
 def test_no_path_changes_its_branch(chain: Chain) -> None:
-    made, rng, found = begin_plan(chain), np.random.default_rng(4), 0
-    kinematics = made.plan_context.arm.kinematics
+    plan_state, rng, paths = begin_plan(chain), np.random.default_rng(4), 0
+    kinematics = plan_state.plan_context.arm.kinematics
     for _ in range(12):
-        start = made.target
+        start = plan_state.target
         end = start.moved(start.position + rng.normal(size=3) * 2.5e-3 * length(chain))
         if chain.n >= 6:
             end = replace(end, rotation=so3.exp(0.6 * rng.normal(size=3)) @ start.R)
-        curve = line_between(made.target, end)
+        curve = line_between(plan_state.target, end)
         try:
-            path = made.planning.path(made.q, curve, kinematics.branch_of(made.q))
+            path = plan_state.planning.path(plan_state.q, curve, kinematics.branch_of(plan_state.q))
         except InputError:
             continue
-        found += 1
+        paths += 1
         for q in joint_derivatives(path, np.linspace(0.0, 1.0, 40))[0]:
             assert kinematics.branch_of(q) == kinematics.branch_of(path.start)
             assert chain.within_limits(q)
-    assert found > 0
+    assert paths > 0
 
 
 @pytest.mark.parametrize(

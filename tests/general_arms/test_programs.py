@@ -37,39 +37,43 @@ from tests.general_arms.published_arms import KR_6, OPENMANIPULATOR_X, PANDA, SK
 
 @every(SOME, REST)
 def test_move_to_a_point_keeps_the_orientation_and_is_followed(chain: Chain) -> None:
-    made = begin_plan(chain)
-    session = made.plan_context.session
-    start = made.state
+    plan_state = begin_plan(chain)
+    session = plan_state.plan_context.session
+    start = plan_state.state
     T = pose(session, start)
-    there = T[:3, 3] + (0.0, 0.02, -0.02)
-    made = Move(StepTarget(position=there)).build(made)
-    _, untimed = made.actions[-1]
+    place = T[:3, 3] + (0.0, 0.02, -0.02)
+    plan_state = Move(StepTarget(position=place)).build(plan_state)
+    _, untimed = plan_state.actions[-1]
     assert isinstance(untimed, UntimedPath)
     reached = pose(session, settled(session, start, [cmd.Follow(untimed.timed().plan)]))
-    np.testing.assert_allclose(reached[:3, 3], there, atol=1e-6)
+    np.testing.assert_allclose(reached[:3, 3], place, atol=1e-6)
     if chain.n >= 6:
         assert so3.angle(reached[:3, :3], T[:3, :3]) < 1e-6
 
 
 @every(SOME, {})
 def test_joints_nudge_via_and_home_are_planned(chain: Chain) -> None:
-    made = begin_plan(chain)
-    q = np.array(made.q)
+    plan_state = begin_plan(chain)
+    q = np.array(plan_state.q)
     turned = q + 0.1
-    made = Joints(turned).build(made)
-    np.testing.assert_allclose(made.q, turned, atol=1e-9)
-    made = Nudge(0, -0.2).build(made)
-    assert made.q[0] == pytest.approx(turned[0] - 0.2)
-    made = Via((StepTarget(joints=q + 0.05), StepTarget(joints=q - 0.05)), 0.5).build(made)
-    np.testing.assert_allclose(made.q, q - 0.05, atol=1e-9)
-    made = Home().build(made)
-    np.testing.assert_allclose(made.q, q, atol=1e-9)
+    plan_state = Joints(turned).build(plan_state)
+    np.testing.assert_allclose(plan_state.q, turned, atol=1e-9)
+    plan_state = Nudge(0, -0.2).build(plan_state)
+    assert plan_state.q[0] == pytest.approx(turned[0] - 0.2)
+    plan_state = Via((StepTarget(joints=q + 0.05), StepTarget(joints=q - 0.05)), 0.5).build(
+        plan_state
+    )
+    np.testing.assert_allclose(plan_state.q, q - 0.05, atol=1e-9)
+    plan_state = Home().build(plan_state)
+    np.testing.assert_allclose(plan_state.q, q, atol=1e-9)
 
 
 @every(SOME, REST)
 def test_line_is_straight_and_keeps_the_orientation_at_every_tick(chain: Chain) -> None:
-    made = program(chain, f"line: {{by: {{y: {length(chain)}, z: {-0.5 * length(chain)}}}}}")
-    states = played(chain, made)
+    compiled_program = program(
+        chain, f"line: {{by: {{y: {length(chain)}, z: {-0.5 * length(chain)}}}}}"
+    )
+    states = played(chain, compiled_program)
     start = forward_batch(chain, states[0].setpoint[None])[0]
     end = forward_batch(chain, states[-1].setpoint[None])[0]
     by = 1e-3 * length(chain) * np.array((0.0, 1.0, -0.5))
@@ -98,8 +102,10 @@ def test_line_is_straight_and_keeps_the_orientation_at_every_tick(chain: Chain) 
 def test_circle_closes_in_the_tool_and_in_the_joints(chain: Chain, normal: str) -> None:
     radius = 0.4 * length(chain)
     centre = point(middle(chain) - (radius, 0.0, 0.0))
-    made = program(chain, f"circle: {{centre: {centre}, normal: {normal}, radius: {radius}}}")
-    path = plans(made)[-1].segments[0].path
+    compiled_program = program(
+        chain, f"circle: {{centre: {centre}, normal: {normal}, radius: {radius}}}"
+    )
+    path = plans(compiled_program)[-1].segments[0].path
     assert isinstance(path, PosePath)
     np.testing.assert_allclose(path.end, path.start, atol=1e-9)
     sigma = np.linspace(0.0, 1.0, 777)
@@ -144,13 +150,15 @@ def test_four_axes_have_a_pitch_wherever_the_tool_goes() -> None:
     p = middle(chain) - (20.0, -60.0, 20.0)
     # The frame of this tool lies on its side and turns about its y axis.
     now = so3.to_rpy(pose(session_of(chain), begun(session_of(chain)))[:3, :3])
-    made = program(chain, f"move: {point(p)[:-1]}, pitch: 25}}", "line: {by: {y: -40}, pitch: 5}")
-    one, two = (forward_batch(chain, each.end[None])[0] for each in plans(made))
+    compiled_program = program(
+        chain, f"move: {point(p)[:-1]}, pitch: 25}}", "line: {by: {y: -40}, pitch: 5}"
+    )
+    one, two = (forward_batch(chain, plan.end[None])[0] for plan in plans(compiled_program))
     np.testing.assert_allclose(one[:3, 3], 1e-3 * p, atol=2e-9)
     np.testing.assert_allclose(two[:3, 3] - one[:3, 3], (0.0, -0.04, 0.0), atol=2e-9)
     for T, pitch in ((one, 25.0), (two, 5.0)):
-        roll, found, _ = so3.to_rpy(T[:3, :3])
-        assert math.degrees(found) == pytest.approx(pitch, abs=1e-6)
+        roll, angle, _ = so3.to_rpy(T[:3, :3])
+        assert math.degrees(angle) == pytest.approx(pitch, abs=1e-6)
         assert abs(math.remainder(roll - now[0], math.tau)) < 1e-9
 
 
@@ -159,26 +167,26 @@ def test_four_axes_have_a_pitch_wherever_the_tool_goes() -> None:
 def test_lines_and_arc_are_planned(chain: Chain) -> None:
     p, d = middle(chain), 0.3 * length(chain)
     corners = [p - (0.0, -d, 0.0), p - (0.0, -d, d), p - (0.0, 0.0, d)]
-    made = program(
+    compiled_program = program(
         chain,
         f"lines: {{through: [{', '.join(map(point, corners))}]}}",
         f"lines: {{through: [{point(p)}, {point(corners[0])}], blend: 0}}",
         f"arc: {{centre: {point(p)}, axis: x, angle: 45, climb: 5}}",
         "home",
     )
-    blended = plans(made)[0].segments[0].path
+    blended = plans(compiled_program)[0].segments[0].path
     np.testing.assert_allclose(
         forward_batch(chain, blended.end[None])[0, :3, 3], 1e-3 * corners[-1], atol=2e-9
     )
     assert isinstance(blended, PosePath)
     assert len(blended.joins) >= 4
-    assert len(plans(made)[1].segments) == 2
+    assert len(plans(compiled_program)[1].segments) == 2
     # The corner is rounded: the path passes beside it.
     sigma = np.linspace(0.0, 1.0, 1000)
     points = 1e3 * forward_batch(chain, joint_derivatives(blended, sigma)[0])[:, :3, 3]
-    beside = np.linalg.norm(points - corners[0], axis=1).min()
-    assert 0.02 * d < beside < 0.3 * d
-    end = forward_batch(chain, plans(made)[2].end[None])[0, :3, 3]
+    distance = np.linalg.norm(points - corners[0], axis=1).min()
+    assert 0.02 * d < distance < 0.3 * d
+    end = forward_batch(chain, plans(compiled_program)[2].end[None])[0, :3, 3]
     turn = so3.rotation_x(math.radians(45.0)) @ (corners[0] - p)
     np.testing.assert_allclose(1e3 * end, p + turn + (5.0, 0.0, 0.0), atol=1e-5)
 
@@ -197,5 +205,7 @@ def test_arm_angle_turns_where_it_must() -> None:
 def test_trajectory_of_all_joints_is_followed(chain: Chain) -> None:
     q = np.degrees(begin_plan(chain).q)
     rows = [[0.5 * number, *(q + 5.0 * number).tolist()] for number in range(4)]
-    made = program(chain, f"trajectory: {{through: {rows}}}")
-    np.testing.assert_allclose(played(chain, made)[-1].setpoint, np.radians(q + 15.0), atol=1e-9)
+    compiled_program = program(chain, f"trajectory: {{through: {rows}}}")
+    np.testing.assert_allclose(
+        played(chain, compiled_program)[-1].setpoint, np.radians(q + 15.0), atol=1e-9
+    )

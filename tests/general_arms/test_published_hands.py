@@ -140,9 +140,9 @@ def test_box_is_picked_and_placed(name: str, tmp_path: Path) -> None:
     assert place(states[-1].objects[0]) == pytest.approx([*kind.to, 0.0], abs=1e-3)
     carried = [state for state in states if state.held is not None]
     first = states.index(carried[0])
-    found = gaps(plan, states[first - 1], carried[0], kind.jaw)
-    assert len(found) == 2
-    assert max(found) < TOUCH
+    distances = gaps(plan, states[first - 1], carried[0], kind.jaw)
+    assert len(distances) == 2
+    assert max(distances) < TOUCH
     lifted = [in_base(plan, state) for state in carried]
     assert max(T[2, 3] for T in lifted) > 0.05
     assert min(T[2, 2] for T in lifted) > 1.0 - 1e-5

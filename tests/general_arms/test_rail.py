@@ -73,8 +73,8 @@ def test_kinematics_count_the_length_of_the_axis_that_slides(name: str, tmp_path
     for q in rng.uniform(chain.lower, chain.upper, (8, chain.n)):
         T = forward(chain, q)
         np.testing.assert_allclose(forward_batch(chain, q[None])[0], T, atol=1e-14)
-        beside = [forward(chain, q + 1e-6 * axis) for axis in np.eye(chain.n)]
-        columns = [se3.log(se3.inverse(T) @ other) / 1e-6 for other in beside]
+        moved = [forward(chain, q + 1e-6 * axis) for axis in np.eye(chain.n)]
+        columns = [se3.log(se3.inverse(T) @ other) / 1e-6 for other in moved]
         np.testing.assert_allclose(jacobian_body(chain, q), np.column_stack(columns), atol=1e-8)
         (solution,) = arm.ik(T)
         assert solution.exact
@@ -134,8 +134,8 @@ def test_script_moves_the_tool_and_gives_no_lengths_as_angles(tmp_path: Path) ->
     session = session_of("rail", tmp_path)
     context, start = PlanContext(session, np.eye(4)), session.begin(session.ready, 0.0, 0.0)
     text = "steps:\n  - line: {by: {x: 50, z: 30}}\n  - move: {by: {y: 20}}\n  - home\n"
-    made = compiled(parse(text), context, start)
-    ends = [task.action.plan.end for task in made.tasks if isinstance(task.action, FollowPlan)]
+    program = compiled(parse(text), context, start)
+    ends = [task.action.plan.end for task in program.tasks if isinstance(task.action, FollowPlan)]
     places = forward_batch(session.require_arm().chain, np.array([start.q, *ends]))[:, :3, 3]
     np.testing.assert_allclose(places[1] - places[0], (0.05, 0.0, 0.03), atol=1e-9)
     np.testing.assert_allclose(places[2] - places[1], (0.0, 0.02, 0.0), atol=1e-9)

@@ -69,15 +69,15 @@ def on_branch(tool: DrivenTool, place: ToolTarget, branch: str, q: FloatArray) -
     """
     solver, chain = tool.solver, tool.chain
     if isinstance(solver, SevenAxes):
-        found = solver.at_arm_angle_of(place.T[None], q)[0, solver.branches.index(branch)]
-        return near_turns(chain, found, q) if np.isfinite(found).all() else None
+        posture = solver.at_arm_angle_of(place.T[None], q)[0, solver.branches.index(branch)]
+        return near_turns(chain, posture, q) if np.isfinite(posture).all() else None
     for _ in range(SETTLINGS if chain.n < 6 else 1):
         pose = np.array(place.T)
         pose[:3, :3] = tool.pan(q) @ pose[:3, :3]
-        found = solver.on_branch(pose, branch, q)
-        if found is None:
+        posture = solver.on_branch(pose, branch, q)
+        if posture is None:
             return None
-        q = found
+        q = posture
     return q
 
 
@@ -94,18 +94,18 @@ def is_clear(
     descent = tool._tracker.descent
     for k in range(PLACES + 1):
         place = start.towards(target, k / PLACES)
-        found = on_branch(tool, place, branch, q)
-        if found is None or not tool.chain.within_limits(found):
+        posture = on_branch(tool, place, branch, q)
+        if posture is None or not tool.chain.within_limits(posture):
             return False
-        if np.abs(found - q).max() > CLEAR_STEP or tool.branch_of(found) != branch:
+        if np.abs(posture - q).max() > CLEAR_STEP or tool.branch_of(posture) != branch:
             return False
-        if max(tool.target_at(found).apart(place)) > 1e-9:
+        if max(tool.target_at(posture).apart(place)) > 1e-9:
             return False
         if not tool.solver.is_exact:
-            look = descent.look(descent.goal(place), tuple(found.tolist()))
+            look = descent.look(descent.goal(place), tuple(posture.tolist()))
             if look.least < NEAR:
                 return False
-        q = found
+        q = posture
     return True
 
 
@@ -113,7 +113,7 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
     """Drag the tool along ``count`` random paths and check every call."""
     tool = DrivenTool(chain)
     rng = np.random.default_rng(23)
-    arrived = held = clear = beside = calls = 0
+    arrived = held = clear = aside = calls = 0
     seconds = 0.0
     ready = tool.ready((), np.eye(4))
     exact = True
@@ -136,64 +136,63 @@ def drags(chain: Chain, count: int, priority: Priority = Priority.POSE) -> Dragg
         )
         for _ in range(MAX_CALLS if way_is_clear else HELD_CALLS):
             begin = time.thread_time()
-            found = tool.track(state, target, since)
+            tracked = tool.track(state, target, since)
             seconds += time.thread_time() - begin
             calls += 1
-            goal = found.best.q
+            goal = tracked.best.q
             assert ((goal >= chain.lower) & (goal <= chain.upper)).all()
             assert np.abs(goal - state.goal).max() <= MAX_MOVE
-            assert tool.branch_of(goal) == found.best.branch
+            assert tool.branch_of(goal) == tracked.best.branch
             if tool.solver.are_separate:
-                assert found.best.branch == state.branch
+                assert tracked.best.branch == state.branch
             elif chain.n == 6:
                 assert side(chain, goal) == side(chain, state.goal)
-            state = replace(state, goal=goal, branch=found.best.branch)
-            if found.since is None:
+            state = replace(state, goal=goal, branch=tracked.best.branch)
+            if tracked.since is None:
                 break
-            assert found.since is not None
-            since = found.since
+            assert tracked.since is not None
+            since = tracked.since
         since = target
-        exact = found.best.position_error < 1e-6 and found.best.rotation_error < 1e-6
+        exact = tracked.best.position_error < 1e-6 and tracked.best.rotation_error < 1e-6
         if way_is_clear and not exact:
             assert chain.n == 7, f"drag {number} has a clear way and does not arrive"
-            assert found.beyond_gap is not None
-            beside += 1
+            assert tracked.beyond_gap is not None
+            aside += 1
         clear += way_is_clear
         arrived += exact
         held += not exact
-    return Dragged(arrived, held, clear, beside, calls, seconds)
+    return Dragged(arrived, held, clear, aside, calls, seconds)
 
 
 @pytest.mark.cases(3)
 @pytest.mark.parametrize("name", ["UR5e", "xArm 6", "KR 6", "OpenMANIPULATOR-X", "skewed 6"])
 def test_drags_keep_branch_and_limits(name: str) -> None:
-    found = drags(ARMS[name], 20)
-    assert found.arrived + found.held == 20
-    assert found.arrived >= 3
+    dragged = drags(ARMS[name], 20)
+    assert dragged.arrived + dragged.held == 20
+    assert dragged.arrived >= 3
     if name != "skewed 6":
-        assert found.clear >= 2
+        assert dragged.clear >= 2
 
 
 @pytest.mark.cases(1)
 @pytest.mark.parametrize("name", SEVEN)
 def test_drags_of_seven_axes_keep_branch_and_limits(name: str) -> None:
-    found = drags(ARMS[name], 26)
-    assert found.clear >= 2
-    assert found.beside == 0
+    dragged = drags(ARMS[name], 26)
+    assert dragged.clear >= 2
+    assert dragged.beside == 0
     # Free joints do not go on to the middle of their limits while the tool waits beside its place.
-    assert found.calls <= 20 * 26
+    assert dragged.calls <= 20 * 26
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ARMS)
 def test_many_drags_keep_branch_and_limits(name: str) -> None:
-    found = drags(ARMS[name], MANY_DRAGS)
-    assert found.beside <= found.clear / 1000
+    dragged = drags(ARMS[name], MANY_DRAGS)
+    assert dragged.beside <= dragged.clear / 1000
     print(
-        f"{name}: {found.arrived} arrived, {found.clear} had a clear way, {found.beside} of these "
-        f"were held, "
-        f"{found.held} held, {found.calls} calls, "
-        f"{1e3 * found.seconds / found.calls:.2f} ms each"
+        f"{name}: {dragged.arrived} arrived, {dragged.clear} had a clear way, "
+        f"{dragged.beside} of these were held, {dragged.held} held, {dragged.calls} calls, "
+        f"{1e3 * dragged.seconds / dragged.calls:.2f} ms each"
     )
 
 

@@ -52,7 +52,9 @@ def test_preview_and_trace_show_the_curves(ur5e_file: Path) -> None:
         span = preview.show(plan.program, plan.start)
         assert span == pytest.approx(states[-1].t, abs=0.3)
         preview.look(0.5 * span)
-        for thread in [each for each in threading.enumerate() if each.name == "preview"]:
+        for thread in [
+            candidate for candidate in threading.enumerate() if candidate.name == "preview"
+        ]:
             thread.join(30.0)
         traces = Traces(server, plan.robot.require_arm())
         for state in states:

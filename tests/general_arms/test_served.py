@@ -42,10 +42,10 @@ def served(folder: Path, text: str) -> Iterator[tuple[Client, Session]]:
     """Serve the arm of a description; return a program with the lease, and the arm's session."""
     path = folder / "arm.urdf"
     path.write_text(text, encoding="utf-8")
-    found = find_robot(Settings(), path, None)
-    with VirtualServer(found) as server, server.connect() as arm:
+    described = find_robot(Settings(), path, None)
+    with VirtualServer(described) as server, server.connect() as arm:
         arm.ask(requests.Acquire())
-        yield arm, found.session
+        yield arm, described.session
 
 
 def state(arm: Client) -> answers.State:

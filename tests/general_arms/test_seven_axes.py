@@ -23,9 +23,9 @@ REACHED = 1e-6
 
 
 def seven_axes(chain: Chain) -> SevenAxes:
-    found = kinematics_of(chain)
-    assert isinstance(found, SevenAxes), found.method
-    return found
+    kinematics = kinematics_of(chain)
+    assert isinstance(kinematics, SevenAxes), kinematics.method
+    return kinematics
 
 
 def fraction(chain: Chain, q: FloatArray) -> float:
@@ -44,8 +44,8 @@ def test_posture_is_found_again_at_its_arm_angle(name: str) -> None:
     solver = seven_axes(chain)
     rng = np.random.default_rng(1)
     for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
-        found = solver.at_arm_angles(forward(chain, q), np.array([q[solver.arm_angle_joint]]))[0]
-        assert np.abs(found - q).max(axis=1).min() < 1e-6
+        postures = solver.at_arm_angles(forward(chain, q), np.array([q[solver.arm_angle_joint]]))[0]
+        assert np.abs(postures - q).max(axis=1).min() < 1e-6
 
 
 @pytest.mark.parametrize("name", SEVEN)
@@ -58,11 +58,12 @@ def test_reachable_poses_are_reached_inside_the_limits(name: str) -> None:
     for q in rng.uniform(chain.lower, chain.upper, (POSES, 7)):
         T = forward(chain, q)
         started = time.thread_time()
-        found = list(solver.inverse(T))
+        solutions = list(solver.inverse(T))
         times.append(time.thread_time() - started)
-        usable = [each for each in found if each.within_limits]
+        usable = [solution for solution in solutions if solution.within_limits]
         reached += any(
-            each.position_error <= REACHED and each.rotation_error <= REACHED for each in usable
+            solution.position_error <= REACHED and solution.rotation_error <= REACHED
+            for solution in usable
         )
     assert reached >= 0.995 * POSES
     assert float(np.median(times)) <= 5e-3
@@ -75,7 +76,7 @@ def test_arm_angle_without_hint_keeps_room_to_the_limits(name: str) -> None:
     rng = np.random.default_rng(3)
     for q in rng.uniform(chain.lower, chain.upper, (20, 7)):
         T = forward(chain, q)
-        room = max(fraction(chain, each.q) for each in solver.inverse(T) if each.exact)
+        room = max(fraction(chain, solution.q) for solution in solver.inverse(T) if solution.exact)
         assert room >= fraction(chain, q) - 0.005
 
 
@@ -88,15 +89,19 @@ def test_small_move_from_a_hint_moves_the_joints_little(name: str) -> None:
     for _ in range(20):
         q = middle + 0.8 * half * rng.uniform(-1.0, 1.0, 7)
         T = forward(chain, q + 1e-3 * rng.normal(size=7))
-        found = [each for each in solver.inverse(T, q) if each.exact and each.within_limits]
-        assert min(float(np.abs(each.q - q).max()) for each in found) < 0.15
+        solutions = [
+            solution
+            for solution in solver.inverse(T, q)
+            if solution.exact and solution.within_limits
+        ]
+        assert min(float(np.abs(solution.q - q).max()) for solution in solutions) < 0.15
 
 
 def test_pose_out_of_reach_says_so() -> None:
     T = np.eye(4)
     T[0, 3] = 3.0
     for chain in SEVEN.values():
-        for each in seven_axes(chain).inverse(T):
-            assert np.isfinite(each.q).all()
-            assert not each.exact
-            assert each.position_error > 1.5
+        for solution in seven_axes(chain).inverse(T):
+            assert np.isfinite(solution.q).all()
+            assert not solution.exact
+            assert solution.position_error > 1.5
