@@ -120,7 +120,9 @@ class Control:
         """All known values of the status."""
         self.alive = True
         self.last_beat = 0.0
-        self._tasks = [asyncio.create_task(each) for each in (self._listen(), self._beat())]
+        self._tasks = [
+            asyncio.create_task(coroutine) for coroutine in (self._listen(), self._beat())
+        ]
 
     async def say(self, do: str, **request: Any) -> None:
         """Send the request ``do``."""
@@ -144,10 +146,10 @@ class Control:
         """Wait for the first notice of ``kind``, remove it, and return it."""
         async with asyncio.timeout(seconds):
             while True:
-                for each in self.heard:
-                    if each["is"] == kind:
-                        self.heard.remove(each)
-                        return each
+                for message in self.heard:
+                    if message["is"] == kind:
+                        self.heard.remove(message)
+                        return message
                 await asyncio.sleep(0.01)
 
     async def close(self) -> None:

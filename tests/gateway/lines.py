@@ -62,9 +62,9 @@ class Lines(JsonProgram):
     @staticmethod
     def port(server: AppServer) -> int:
         """Return the TCP port of the server for programs."""
-        found = AT.search(server.output)
-        assert found is not None
-        return int(found[1])
+        match = AT.search(server.output)
+        assert match is not None
+        return int(match[1])
 
     def raw(self, data: bytes) -> None:
         self.socket.sendall(data)

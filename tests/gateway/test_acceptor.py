@@ -57,10 +57,10 @@ async def _accepting() -> AsyncIterator[tuple[Acceptor, tuple[str, int]]]:
 
 
 async def _connected(
-    server: tuple[str, int], of: str = "127.0.0.1", sent: bytes = b""
+    server: tuple[str, int], address: str = "127.0.0.1", sent: bytes = b""
 ) -> socket.socket:
-    """Connect from the address ``of``, send ``sent``, and give the server time to accept."""
-    connection = socket.create_connection(server, timeout=2.0, source_address=(of, 0))
+    """Connect from ``address``, send ``sent``, and give the server time to accept."""
+    connection = socket.create_connection(server, timeout=2.0, source_address=(address, 0))
     connection.sendall(sent)
     connection.setblocking(False)
     await asyncio.sleep(0.02)
@@ -81,11 +81,11 @@ async def test_oldest_connection_of_the_most_frequent_address_is_closed() -> Non
         lonely = await _connected(server, "127.0.0.2")
         crowd = [await _connected(server) for _ in range(3 * WAITING)]
         await asyncio.sleep(0.1)
-        found = [_is_open(each) for each in crowd]
-        assert found == [False] * (len(crowd) - WAITING + 1) + [True] * (WAITING - 1)
+        open_ones = [_is_open(connection) for connection in crowd]
+        assert open_ones == [False] * (len(crowd) - WAITING + 1) + [True] * (WAITING - 1)
         assert _is_open(lonely)
-        for each in (lonely, *crowd):
-            each.close()
+        for connection in (lonely, *crowd):
+            connection.close()
 
 
 async def test_small_messages_do_not_wait_for_acknowledgements() -> None:
@@ -113,9 +113,9 @@ async def test_closed_connections_make_room_for_others() -> None:
         for _ in range(3 * WAITING):
             (await _connected(server)).close()
             await asyncio.sleep(0.01)
-        assert all(_is_open(each) for each in early)
-        for each in early:
-            each.close()
+        assert all(_is_open(connection) for connection in early)
+        for connection in early:
+            connection.close()
 
 
 async def test_kept_connection_is_not_closed_for_others() -> None:
@@ -125,39 +125,39 @@ async def test_kept_connection_is_not_closed_for_others() -> None:
         with acceptor.kept((host, port)):
             crowd = [await _connected(server) for _ in range(3 * WAITING)]
             assert _is_open(driver)
-        for each in (driver, *crowd):
-            each.close()
+        for connection in (driver, *crowd):
+            connection.close()
 
 
 def test_accept_failures_are_logged_once_and_do_not_block_the_loop(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    tried = []
+    attempts = []
 
     async def fail(_listening: socket.socket) -> tuple[socket.socket, tuple[str, int]]:
-        tried.append(1)
+        attempts.append(1)
         raise OSError(errno.EMFILE, "Too many open files")
 
     async def act(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(asyncio.get_running_loop(), "sock_accept", fail)
         monkeypatch.setattr(acceptors, "BACK_OFF", 0.02)
         async with _accepting(), asyncio.timeout(20.0):
-            while len(tried) < 3:
+            while len(attempts) < 3:
                 await asyncio.sleep(0.01)
 
     with caplog.at_level(logging.WARNING), pytest.MonkeyPatch.context() as monkeypatch:
         asyncio.run(act(monkeypatch))
-    assert len(tried) < 20
-    assert [each.getMessage() for each in caplog.records] == [
+    assert len(attempts) < 20
+    assert [record.getMessage() for record in caplog.records] == [
         "A connection could not be accepted: Too many open files."
     ]
 
 
-@pytest.mark.parametrize("of", [["127.0.0.1"], [f"127.0.1.{n}" for n in range(1, 30)]])
+@pytest.mark.parametrize("addresses", [["127.0.0.1"], [f"127.0.1.{n}" for n in range(1, 30)]])
 async def test_connections_beyond_the_rate_are_opened_once_they_send(
-    of: list[str], monkeypatch: pytest.MonkeyPatch
+    addresses: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one, total = (3.0, 1e3) if len(of) == 1 else (1e3, 3.0)
+    one, total = (3.0, 1e3) if len(addresses) == 1 else (1e3, 3.0)
     for name, value in {
         "PREFIX_BURST": one,
         "PREFIX_RATE": 0.0,
@@ -166,18 +166,18 @@ async def test_connections_beyond_the_rate_are_opened_once_they_send(
     }.items():
         monkeypatch.setattr(acceptors, name, value)
     async with _accepting() as (acceptor, server):
-        silent = [await _connected(server, of[n % len(of)]) for n in range(6)]
-        speaking = await _connected(server, of[-1], b"x")
+        silent = [await _connected(server, addresses[n % len(addresses)]) for n in range(6)]
+        speaking = await _connected(server, addresses[-1], b"x")
         await asyncio.sleep(0.1)
-        assert [_is_open(each) for each in silent] == [True] * 3 + [False] * 3
+        assert [_is_open(connection) for connection in silent] == [True] * 3 + [False] * 3
         assert _is_open(speaking)
         assert not acceptor._surplus
         # A prefix of its own has places of its own.
         other = await _connected(server, "127.0.2.1")
         await asyncio.sleep(0.1)
-        assert _is_open(other) == (len(of) == 1)
-        for each in (speaking, other, *silent):
-            each.close()
+        assert _is_open(other) == (len(addresses) == 1)
+        for connection in (speaking, other, *silent):
+            connection.close()
 
 
 @pytest.mark.parametrize(
@@ -202,8 +202,8 @@ def test_hundreds_of_connections_wait_for_a_server_that_is_busy() -> None:
         crowd = []
         for _ in range(300):
             crowd.append(socket.create_connection(listening.getsockname(), timeout=0.2))
-        for each in crowd:
-            each.close()
+        for connection in crowd:
+            connection.close()
 
 
 @pytest.mark.parametrize(("soft", "hard"), [(256, 2048), (256, 512)])
@@ -259,16 +259,16 @@ def test_flooding_client_does_not_delay_others() -> None:
         program = ProgramChannel(hub, torrent, Budgets(hub.clock).of("a"))
         window = hub.join(Identity("session", "Torrent", Role.OPERATOR), "a-page", program.notify)
         asking = asyncio.create_task(program.run(window))
-        taken = [torrent.left]
+        remaining = [torrent.left]
         while torrent.left:
             await asyncio.sleep(0)
-            taken.append(torrent.left)
+            remaining.append(torrent.left)
         asking.cancel()
-        return taken
+        return remaining
 
-    taken = asyncio.run(ask())
-    assert taken[-1] == 0
-    assert max(before - after for before, after in pairwise(taken)) == 1
+    remaining = asyncio.run(ask())
+    assert remaining[-1] == 0
+    assert max(before - after for before, after in pairwise(remaining)) == 1
 
 
 async def test_unresponsive_flooder_is_disconnected() -> None:
@@ -394,15 +394,15 @@ def test_client_that_hangs_up_in_its_body_leaves_no_traceback(
 
 def test_other_requests_wait_for_the_application(web: WebServer) -> None:
     with ThreadPoolExecutor(1) as pool:
-        asked: Future[int] = pool.submit(lambda: ask(f"{url_of(web)}/health")[0])
+        response: Future[int] = pool.submit(lambda: ask(f"{url_of(web)}/health")[0])
         with pytest.raises(FutureTimeoutError):
-            asked.result(0.1)
+            response.result(0.1)
         answer = PlainTextResponse("ok", 203)
         web.loop.call_soon_threadsafe(web.show, answer)
         with pytest.raises(FutureTimeoutError):
-            asked.result(0.1)
+            response.result(0.1)
         web.loop.call_soon_threadsafe(web.complete)
-        assert asked.result(10.0) == 203
+        assert response.result(10.0) == 203
 
 
 async def test_socket_of_the_page_opens_with_the_scene_and_its_requests_wait(

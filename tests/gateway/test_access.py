@@ -90,8 +90,8 @@ def test_roles_grant_exactly_their_rights(guarded: VirtualServer, file: AccessFi
 def test_identity_whose_link_ends_is_disconnected(
     guarded: VirtualServer, file: AccessFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now, ahead = time.time, [0.0]
-    monkeypatch.setattr(time, "time", lambda: now() + ahead[0])
+    now, offsets = time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: now() + offsets[0])
 
     async def stay(token: str, end: Callable[[], object]) -> None:
         control = await guarded.control(await guarded.enter(token))
@@ -106,7 +106,7 @@ def test_identity_whose_link_ends_is_disconnected(
     assert known is not None
     command = ["access", "revoke", known[0], "--file", str(file.path)]
     guarded.run(stay(token, lambda: main(command)))
-    guarded.run(stay(give(file, Role.ADMIN), lambda: ahead.insert(0, 2.0 * HOUR)))
+    guarded.run(stay(give(file, Role.ADMIN), lambda: offsets.insert(0, 2.0 * HOUR)))
 
 
 def test_no_link_is_in_the_log(
@@ -238,9 +238,9 @@ def test_last_readable_links_stay_valid_and_the_error_is_logged_once(
     fault(file.path)
     with caplog.at_level(logging.ERROR):
         for _ in range(3):
-            found = served.check(token, 0.0)
-            assert found is not None
-            assert found[1].name == "Anna"
+            grant = served.check(token, 0.0)
+            assert grant is not None
+            assert grant[1].name == "Anna"
         assert served.check("guess", 0.0) is None
     assert len(caplog.records) == 1
 

@@ -38,17 +38,17 @@ from tests.waiting import state_when
 
 
 def test_program_moves_joints_and_waits_for_their_arrival(program: Client, arm: MountedArm) -> None:
-    there = program.joints(THERE)
-    assert there.status == "ok"
-    assert there.why == ""
-    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(np.array(there.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
+    state = program.joints(THERE)
+    assert state.status == "ok"
+    assert state.why == ""
+    np.testing.assert_allclose(state.q, THERE, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(np.array(state.T), forward(arm.chain, THERE), rtol=0, atol=1e-12)
     # The client of the test before may not have left yet; then this one has a number too.
-    assert there.holder == program.welcome.name
+    assert state.holder == program.welcome.name
     assert program.welcome.name.startswith("Test")
     described = program.query(answers.Arm)
     assert described.touch
-    assert there.touch is not None
+    assert state.touch is not None
     assert described.joints == list(arm.chain.names)
     np.testing.assert_array_equal(described.ready, READY)
     np.testing.assert_array_equal(described.T_base_shoulder, arm.T_base_shoulder)
@@ -59,24 +59,24 @@ def test_pose_can_be_in_either_frame(
     program: Client, arm: MountedArm, frame: requests.Frame
 ) -> None:
     T = forward(arm.chain, THERE)
-    asked = T if frame is requests.Frame.SHOULDER else arm.T_base_shoulder @ T
-    there = program.go(requests.Pose(T=asked, frame=frame))
-    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=1e-9)
-    p = asked[:3, 3] + [0.0, 0.0, 0.02]
-    there = program.go(requests.Position(p=p, frame=frame))
-    np.testing.assert_allclose(np.array(there.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
-    assert there.pitch is not None
-    there = program.go(requests.Turn(pitch=there.pitch, roll=0.25))
-    assert there.roll == pytest.approx(0.25, abs=1e-12)
+    target = T if frame is requests.Frame.SHOULDER else arm.T_base_shoulder @ T
+    state = program.go(requests.Pose(T=target, frame=frame))
+    np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=1e-9)
+    p = target[:3, 3] + [0.0, 0.0, 0.02]
+    state = program.go(requests.Position(p=p, frame=frame))
+    np.testing.assert_allclose(np.array(state.T)[:3, 3], T[:3, 3] + [0, 0, 0.02], rtol=0, atol=1e-9)
+    assert state.pitch is not None
+    state = program.go(requests.Turn(pitch=state.pitch, roll=0.25))
+    assert state.roll == pytest.approx(0.25, abs=1e-12)
 
 
 def test_unreachable_request_gives_the_reason(program: Client) -> None:
-    there = program.go(requests.Position(p=np.array((0.9, 0.0, 0.0))))
-    assert there.status == "limited"
-    assert there.findings[0].reason == "out of reach"
-    assert there.findings[0].unit == "m"
-    assert there.findings[0].amount == pytest.approx(
-        0.9 - math.hypot(*np.array(there.T)[:3, 3]), abs=0.02
+    state = program.go(requests.Position(p=np.array((0.9, 0.0, 0.0))))
+    assert state.status == "limited"
+    assert state.findings[0].reason == "out of reach"
+    assert state.findings[0].unit == "m"
+    assert state.findings[0].amount == pytest.approx(
+        0.9 - math.hypot(*np.array(state.T)[:3, 3]), abs=0.02
     )
     with pytest.raises(RefusedError, match="There is no tool 'spoon'; this arm has"):
         program.ask(requests.Tool(name="spoon"))
@@ -121,15 +121,15 @@ def test_condition_number_is_null_in_a_singularity(program: Client) -> None:
 
 def test_other_branch_is_reached_on_a_clear_path(program: Client) -> None:
     program.joints(np.deg2rad((0.0, -68.0, 85.0, 40.0, 0.0)))
-    there = program.go(requests.Branch(shoulder="front", elbow="down"))
-    assert there.branch == ("front", "down")
-    assert there.status == "ok"
+    state = program.go(requests.Branch(shoulder="front", elbow="down"))
+    assert state.branch == ("front", "down")
+    assert state.status == "ok"
     back = program.go(requests.Branch(shoulder="front", elbow="up"))
     assert back.branch == ("front", "up")
 
 
 def test_objects_are_moved_touched_and_removed(program: Client) -> None:
-    known = {each.name: each for each in program.query(answers.Objects).objects}
+    known = {item.name: item for item in program.query(answers.Objects).objects}
     assert set(known) == {"cup", "basin"}
     T = np.array(known["cup"].T)
     T[:2, 3] = (0.1, -0.45)
@@ -139,13 +139,13 @@ def test_objects_are_moved_touched_and_removed(program: Client) -> None:
     program.ask(
         requests.Place(name="wall", T=wall, shape=requests.Shape.BOX, size=[0.05, 0.3, 0.5])
     )
-    met = program.go(requests.Joint(axis=1, value=1.2))
-    assert met.status == "blocked"
-    assert "wall" in (met.findings[0].parts or ())
-    assert "wall" in met.why
+    state = program.go(requests.Joint(axis=1, value=1.2))
+    assert state.status == "blocked"
+    assert "wall" in (state.findings[0].parts or ())
+    assert "wall" in state.why
     program.ask(requests.Remove(name="wall"))
     assert program.go(requests.Joint(axis=1, value=1.2)).status == "ok"
-    now = {each.name: each for each in program.query(answers.Objects).objects}
+    now = {item.name: item for item in program.query(answers.Objects).objects}
     assert set(now) == {"cup", "basin"}
     np.testing.assert_array_equal(now["cup"].T, T)
     beyond_the_table = T.copy()
@@ -164,23 +164,23 @@ def test_objects_are_moved_touched_and_removed(program: Client) -> None:
 
 
 def test_each_joint_names_its_link_and_the_way_to_it(program: Client, robot: Robot) -> None:
-    found = program.query(answers.Arm).links
+    links = program.query(answers.Arm).links
     arm = robot.require_arm()
     by_name = {link.name: link for link in robot.links}
-    assert [each.label for each in found][:2] == ["1 base turn", "2 shoulder"]
-    for each, name in zip(found, arm.chain.names, strict=True):
-        link = by_name[each.path[-1]]
+    assert [link_path.label for link_path in links][:2] == ["1 base turn", "2 shoulder"]
+    for link_path, name in zip(links, arm.chain.names, strict=True):
+        link = by_name[link_path.path[-1]]
         assert link.joint is not None
-        assert (link.joint.name, by_name[each.path[0]].parent) == (name, None)
-        assert np.allclose(each.axis, link.joint.axis)
-        for above, below in itertools.pairwise(each.path):
+        assert (link.joint.name, by_name[link_path.path[0]].parent) == (name, None)
+        assert np.allclose(link_path.axis, link.joint.axis)
+        for above, below in itertools.pairwise(link_path.path):
             assert by_name[below].parent == above
 
 
 def test_nudges_of_one_tick_add_up(session: Session) -> None:
     before = session.begin(session.ready, 0.0, 0.0)
-    given: list[cmd.Command] = [cmd.Nudge(1, 0.1), cmd.Nudge(1, 0.1), cmd.Nudge(5, -0.2)]
-    after = session.step(before, given, 0.01)
+    commands: list[cmd.Command] = [cmd.Nudge(1, 0.1), cmd.Nudge(1, 0.1), cmd.Nudge(5, -0.2)]
+    after = session.step(before, commands, 0.01)
     moved = np.array((0.2, 0.0, 0.0, 0.0, -0.2))
     np.testing.assert_allclose(after.goal, session.ready + moved, rtol=0, atol=1e-12)
     assert after.findings == ()
@@ -190,8 +190,8 @@ def test_nudge_is_limited_to_the_range_of_the_joint(session: Session) -> None:
     before = session.begin(session.ready, 0.0, 0.0)
     after = session.step(before, [cmd.Nudge(2, 9.0)], 0.01)
     assert after.goal[1] == session.require_arm().chain.upper[1]
-    (found,) = after.findings
-    assert (found.reason, found.axis) == (Reason.AXIS_LIMIT, 1)
+    (finding,) = after.findings
+    assert (finding.reason, finding.axis) == (Reason.AXIS_LIMIT, 1)
     # The next nudge counts from the limit, not from the requested angle beyond it.
     back = session.step(after, [cmd.Nudge(2, -0.1)], 0.02)
     assert back.goal[1] == pytest.approx(session.require_arm().chain.upper[1] - 0.1)
@@ -206,17 +206,17 @@ def test_invalid_nudge_is_refused(session: Session, bad: tuple[int, float]) -> N
 
 def test_program_nudges_a_joint_of_a_real_server(program: Client) -> None:
     start = program.query(answers.State)
-    there = program.nudge(1, 0.1)
-    assert there.why == ""
-    assert there.q[0] == pytest.approx(start.goal[0] + 0.1)
-    assert there.q[1:] == pytest.approx(start.goal[1:])
-    there = program.nudge(1, 10.0)
-    assert "limit" in there.why
-    assert there.q[0] == pytest.approx(program.query(answers.Arm).upper[0])
+    state = program.nudge(1, 0.1)
+    assert state.why == ""
+    assert state.q[0] == pytest.approx(start.goal[0] + 0.1)
+    assert state.q[1:] == pytest.approx(start.goal[1:])
+    state = program.nudge(1, 10.0)
+    assert "limit" in state.why
+    assert state.q[0] == pytest.approx(program.query(answers.Arm).upper[0])
     answer = program.ask(requests.Nudge(axis=1, by=1.0))
     assert isinstance(answer, answers.Done)
     assert answer.outcome == "limited"
-    assert [found.reason for found in answer.findings] == ["axis limit"]
+    assert [finding.reason for finding in answer.findings] == ["axis limit"]
     with pytest.raises(RefusedError, match="no axis 9"):
         program.nudge(9, 0.1)
 
@@ -250,8 +250,8 @@ def test_joint_stream_is_followed_and_ends_at_rest(program: Client) -> None:
     # The arm braked at once and did not continue to the last target of the stream.
     assert abs(rest.q[0] - 0.2 * math.sin(2.0 * 1.5)) < 0.2
     # A target of another kind stays until it is reached.
-    there = program.joints(THERE)
-    np.testing.assert_allclose(there.q, THERE, rtol=0, atol=1e-12)
+    state = program.joints(THERE)
+    np.testing.assert_allclose(state.q, THERE, rtol=0, atol=1e-12)
 
 
 def test_states_arrive_at_the_requested_rate(program: Client) -> None:
@@ -303,8 +303,8 @@ def check_printed(program: Client, T: FloatArray, decimals: int) -> None:
     assert isinstance(accepted, answers.Done)
     assert accepted.rotation_misfit is not None
     assert 1e-3 * rounding < accepted.rotation_misfit < 4.0 * rounding
-    there = program.go(requests.Pose(T=printed))
-    np.testing.assert_allclose(np.array(there.T), T, rtol=0, atol=10.0 * rounding)
+    state = program.go(requests.Pose(T=printed))
+    np.testing.assert_allclose(np.array(state.T), T, rtol=0, atol=10.0 * rounding)
 
 
 def test_object_is_placed_at_a_printed_pose(program: Client) -> None:
@@ -332,8 +332,8 @@ def test_skewed_pose_is_refused_with_the_error(program: Client) -> None:
 def test_object_is_placed_near_a_point_of_the_table(program: Client) -> None:
     ball = requests.Place(name="near", shape=Shape.SPHERE, size=[0.02], can_be_held=True)
     program.ask(structs.replace(ball, near=(0.1, 0.5)))
-    (found,) = (each for each in program.query(answers.Objects).objects if each.name == "near")
-    np.testing.assert_allclose(np.array(found.T)[:3, 3], (0.1, 0.5, 0.0), rtol=0, atol=1e-9)
+    (placed,) = (item for item in program.query(answers.Objects).objects if item.name == "near")
+    np.testing.assert_allclose(np.array(placed.T)[:3, 3], (0.1, 0.5, 0.0), rtol=0, atol=1e-9)
     program.ask(requests.Remove(name="near"))
     with pytest.raises(RefusedError, match="nothing carries it there"):
         program.ask(structs.replace(ball, near=(1.3, 1.3)))

@@ -24,12 +24,12 @@ from tests.gateway.client import HOUR
 
 def test_link_is_valid_for_its_person_until_it_expires(file: AccessFile) -> None:
     token = file.give("Anna", Role.OPERATOR, 1000.0)
-    found = file.check(token, 999.0)
-    assert found is not None
-    assert (found[1].name, found[1].role) == ("Anna", Role.OPERATOR)
+    grant = file.check(token, 999.0)
+    assert grant is not None
+    assert (grant[1].name, grant[1].role) == ("Anna", Role.OPERATOR)
     assert file.check(token, 1000.0) is None
     # The end that the token names counts too.
-    number, secret = found[0], json.loads(file.path.read_text())["secret"]
+    number, secret = grant[0], json.loads(file.path.read_text())["secret"]
     for expires in (500.0, 2000.0):
         other = URLSafeSerializer(secret, salt=SALT).dumps([number, expires])
         assert file.check(other, min(expires, 1000.0) - 1.0) is not None
@@ -51,7 +51,7 @@ def test_revoked_link_is_invalid(file: AccessFile) -> None:
 def test_link_that_is_revoked_during_another_change_stays_revoked(
     file: AccessFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept, revoked = (number_of(file, name) for name in ("Anna", "Bert"))
+    remaining, revoked = (number_of(file, name) for name in ("Anna", "Bert"))
     other = AccessFile.open(file.path)
     revoking = threading.Thread(target=other.revoke, args=(revoked,))
 
@@ -65,14 +65,14 @@ def test_link_that_is_revoked_during_another_change_stays_revoked(
     monkeypatch.setattr(access_links, "write_files", write)
     added = number_of(file, "Cleo")
     revoking.join()
-    assert set(file.grants) == {kept, added}
+    assert set(file.grants) == {remaining, added}
 
 
 def number_of(file: AccessFile, name: str) -> str:
     """Return the number of a new link."""
-    found = file.check(file.give(name, Role.VIEWER, time.time() + HOUR), time.time())
-    assert found is not None
-    return found[0]
+    grant = file.check(file.give(name, Role.VIEWER, time.time() + HOUR), time.time())
+    assert grant is not None
+    return grant[0]
 
 
 def test_change_of_a_file_that_stays_locked_is_refused(
@@ -197,15 +197,15 @@ def test_cookie_is_bound_to_its_link_and_is_no_link(file: AccessFile) -> None:
         name, _, rest = response.headers["set-cookie"].partition("=")
         cookies.append(rest.partition(";")[0])
     assert cookies[0] != cookies[1]
-    found = [authenticator.identity({name: each}) for each in cookies]
-    assert found[0] == found[1] is not None
+    identities = [authenticator.identity({name: cookie}) for cookie in cookies]
+    assert identities[0] == identities[1] is not None
     # Neither serves as the other.
     assert authenticator.identity({name: token}) is None
     assert authenticator.program("", f"Bearer {cookies[0]}") is None
     assert not authenticator.sign_in(cookies[0], Response())
     # A server that starts again knows the cookie; revoking the link ends it.
     again = AccessFile.open(file.path)
-    assert Authenticator(again, 8080, LOOPBACK).identity({name: cookies[0]}) == found[0]
+    assert Authenticator(again, 8080, LOOPBACK).identity({name: cookies[0]}) == identities[0]
     (number,) = again.grants
     again.revoke(number)
     assert authenticator.identity({name: cookies[0]}) is None

@@ -100,12 +100,12 @@ def test_identity_that_ignores_refusals_is_disconnected_and_later_accepted() -> 
     clocks = Clocks()
     budget = clocks.budgets().of("a")
     clocks.ask(budget, IDENTITY_BUDGET)
-    gone = []
+    dropped = []
     for _ in range(int(1.1 * MAX_DEBT / REQUEST_COST)):
         with pytest.raises(BusyError) as refused:
             clocks.ask(budget, 0.0)
-        gone.append(refused.value.gone)
-    assert gone.index(True) == pytest.approx(MAX_DEBT / REQUEST_COST, rel=0.01)
+        dropped.append(refused.value.gone)
+    assert dropped.index(True) == pytest.approx(MAX_DEBT / REQUEST_COST, rel=0.01)
     assert budget.is_exhausted()
     clocks.now += 0.6 * MAX_DEBT / IDENTITY_BUDGET
     assert not budget.is_exhausted()

@@ -115,7 +115,7 @@ def test_copy_of_the_press_of_an_unknown_page_names_it(table: ClearingTable) -> 
         assert table.hub.stop(actor, "one") == 0
         assert table.hub.stopped is not None
         assert table.hub.stopped.why == f"{why} pressed STOP."
-        names = [each.cause.by for each in table.stoppable.sent[sent:]]
+        names = [note.cause.by for note in table.stoppable.sent[sent:]]
         assert names == ([] if stopped.why == table.hub.stopped.why else ["Window 9"])
         assert table.hub.stopped.cause.at == 5.0
 
@@ -124,7 +124,7 @@ def stops(table: ClearingTable) -> list[Note]:
     """Return the stops that were noted for the event log."""
     recorder = table.hub.recorder
     notes = [recorder.notes.get_nowait() for _ in range(recorder.notes.qsize())]
-    return [each for each in notes if each is not None and each.kind == "stop"]
+    return [note for note in notes if note is not None and note.kind == "stop"]
 
 
 @pytest.mark.parametrize("copy_first", [False, True])
@@ -166,7 +166,7 @@ def test_press_that_the_gate_learns_after_its_own_stop_is_noted_once(
 def test_presser_without_a_window_has_the_role_and_the_number_of_its_link() -> None:
     vera = Person("7/page", "Vera", Role.OPERATOR, "7", "10.0.0.7")
     cause = pressed("Vera, curl", "7", "one", 5.0)
-    known, unknown = (presser_of(cause, each, links=True) for each in ([vera], []))
+    known, unknown = (presser_of(cause, people, links=True) for people in ([vera], []))
     assert known == Actor(
         Person("7", "Vera, curl", Role.OPERATOR), CommandChannel.HTTP, grounds=Grounds.SAFETY
     )

@@ -61,9 +61,9 @@ async def _welcoming(connection: ServerConnection) -> None:
 async def _silent_watch(connection: ServerConnection) -> None:
     await connection.send(WELCOME)
     async for text in connection:
-        asked = msgspec.json.decode(text)
-        if asked["do"] == "watch":
-            await connection.send(msgspec.json.encode({"is": "done", "id": asked["id"]}).decode())
+        request = msgspec.json.decode(text)
+        if request["do"] == "watch":
+            await connection.send(msgspec.json.encode({"is": "done", "id": request["id"]}).decode())
 
 
 async def _deaf(connection: ServerConnection) -> None:

@@ -231,8 +231,8 @@ def test_undone_change_is_kept_only_if_the_arm_refuses_its_inverse(
     table.arm.outcome = lambda _ticket: reported
 
     def undoable() -> list[str]:
-        found: list[str] = handler.page_status(driver)["undo"]
-        return found
+        names: list[str] = handler.page_status(driver)["undo"]
+        return names
 
     table.hub.move(driver, cmd.Speed(0.5))
     assert undoable() == ["speed"]
@@ -294,9 +294,9 @@ def test_only_the_gate_delivers_commands() -> None:
 
 
 def test_only_the_front_end_makes_command_messages() -> None:
-    made = {
+    makers = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
         if "CommandMessage(" in path.read_text(encoding="utf-8")
     }
-    assert made == {"arm/runtime/pipes/front_end.py"}
+    assert makers == {"arm/runtime/pipes/front_end.py"}

@@ -91,8 +91,8 @@ def changed(message: Any, rng: random.Random, nasty: tuple[Any, ...]) -> Any:
         return copy
     if isinstance(message, list) and message and rng.random() < 0.6:
         copied = list(message)
-        at = rng.randrange(len(copied))
-        copied[at : at + 1] = [changed(copied[at], rng, nasty)] * rng.randrange(3)
+        place = rng.randrange(len(copied))
+        copied[place : place + 1] = [changed(copied[place], rng, nasty)] * rng.randrange(3)
         return copied
     return rng.choice(nasty)
 
@@ -101,17 +101,17 @@ def broken(data: bytes, rng: random.Random) -> bytes:
     """Return ``data`` cut, with flipped bits, or with other bytes inserted."""
     if not data:
         return data
-    at = rng.randrange(len(data))
+    place = rng.randrange(len(data))
     match rng.randrange(4):
         case 0:
-            return data[:at]
+            return data[:place]
         case 1:
             flipped = bytearray(data)
             for _ in range(rng.randint(1, 6)):
                 flipped[rng.randrange(len(flipped))] ^= 1 << rng.randrange(8)
             return bytes(flipped)
         case 2:
-            return data[:at] + rng.randbytes(rng.randint(1, 40)) + data[at:]
+            return data[:place] + rng.randbytes(rng.randint(1, 40)) + data[place:]
     return rng.randbytes(rng.randint(0, 200))
 
 
@@ -244,8 +244,8 @@ async def storm(server: AppServer, lines_port: int, uuids: list[str]) -> dict[st
         ),
         "lines": (lambda: json_mutant(rngs[3]), lambda: TcpLine(lines_port)),
     }
-    taken = await asyncio.gather(*(pour_in(fraction, *kind) for kind in kinds.values()))
-    return dict(zip(kinds, taken, strict=True))
+    counts = await asyncio.gather(*(pour_in(fraction, *kind) for kind in kinds.values()))
+    return dict(zip(kinds, counts, strict=True))
 
 
 async def learned(url: str) -> list[str]:
@@ -278,8 +278,8 @@ def test_broken_messages_cause_no_crash_and_no_motion(server: AppServer) -> None
         before = arm.query(answers.State)
         objects = arm.query(answers.Objects).objects
         uuids = asyncio.run(learned(server.url))
-        taken = asyncio.run(storm(server, lines_port, uuids))
-        print(f"{MESSAGES} messages; lines it took: {taken}")
+        counts = asyncio.run(storm(server, lines_port, uuids))
+        print(f"{MESSAGES} messages; lines it took: {counts}")
         after = arm.query(answers.State)
         assert kept(after) == kept(before)
         assert not after.moving

@@ -289,6 +289,6 @@ async def moves_the_arm(good: Peer, degrees: float) -> list[dict[str, Any]]:
     await good.set("1 base turn", value=degrees)
     heard: list[dict[str, Any]] = []
     async with asyncio.timeout(20.0):
-        while not any(each["type"] == "SetOrientationMessage" for each in heard):
+        while not any(message["type"] == "SetOrientationMessage" for message in heard):
             heard += await good.listen()
     return heard

@@ -65,8 +65,8 @@ class House:
 
     def number(self, session: str) -> int:
         """Return the number of a person who is shown."""
-        (found,) = (n for n, each in self.people.shown.items() if each.session == session)
-        return found
+        (number,) = (n for n, identity in self.people.shown.items() if identity.session == session)
+        return number
 
     async def post(
         self, body: bytes, token: str = "", meanwhile: Callable[[], object] = lambda: None
@@ -174,11 +174,11 @@ def test_connected_and_absent_people_are_never_forgotten(
 ) -> None:
     monkeypatch.setattr(people_module, "MAX_REMEMBERED", 3)
     people = table.hub.people
-    kept = [Identity(name, name, Role.VIEWER) for name in ("present", "absent")]
-    connections = [Connection(each, "127.0.0.1") for each in kept]
+    identities = [Identity(name, name, Role.VIEWER) for name in ("present", "absent")]
+    connections = [Connection(identity, "127.0.0.1") for identity in identities]
     for connection in connections:
         people.add(connection)
-    people.kick(kept[1], 60.0)
+    people.kick(identities[1], 60.0)
     for connection in connections[1:]:
         people.remove(connection)
     for number in range(5):
@@ -186,7 +186,7 @@ def test_connected_and_absent_people_are_never_forgotten(
         visitor = Identity(session, "Visitor", Role.VIEWER)
         with people.connected(Connection(visitor, "127.0.0.1")):
             assert visitor in people.shown.values()
-        assert list(people.shown.values()) == kept
+        assert list(people.shown.values()) == identities
     assert len(people._known) <= 4
 
 
@@ -201,7 +201,7 @@ def test_new_name_is_seen_everywhere_and_the_driver_keeps_the_arm(table: Table) 
     assert (table.arm.holds, table.hub.gate.revocations) == (holds, revocations)
     table.hub.request(other)
     table.hub.rename(other, "Ben")
-    assert [each["name"] for each in status.of(table.hub, driver)["asking"]] == ["Ben"]
+    assert [person["name"] for person in status.of(table.hub, driver)["asking"]] == ["Ben"]
     table.hub.move(driver, cmd.Pause())
     assert table.arm.actors[-1].name == "Anna B."
     # A page that is reloaded keeps its name.
@@ -253,7 +253,7 @@ def test_new_name_is_in_the_event_log(table: Table) -> None:
     window = table.join(PAGES[0])
     table.hub.rename(window, "Ann")
     notes = [table.hub.recorder.notes.get() for _ in range(table.hub.recorder.notes.qsize())]
-    (note,) = [each for each in notes if each is not None and each.kind == "rename"]
+    (note,) = [entry for entry in notes if entry is not None and entry.kind == "rename"]
     assert note.actor is not None
     assert (note.actor.name, note.what) == ("Window 1", {"name": "Ann"})
 

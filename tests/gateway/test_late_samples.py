@@ -190,7 +190,7 @@ def test_late_drag_is_shown_and_not_followed_and_its_end_counts(table: Table) ->
             hooked.receive(delay)
             await hooked.handle(message)
             await asyncio.sleep(0.01)
-            return [type(each).__name__ for each in table.arm.commands]
+            return [type(command).__name__ for command in table.arm.commands]
 
         name = "/target/move"
         assert await say(internals.drag(name, "start"), 2.0) == []
@@ -219,11 +219,11 @@ def test_time_of_a_message_of_viser_is_taken_from_it() -> None:
         start = {"type": "TransformControlsDragStartMessage", "name": "/move", "made": 12.5}
         result = message_filter.judge(msgspec.msgpack.encode(start), 0.0)
         assert (result.ruling, result.made) == (Ruling.PASS, 12.5)
-        seen = {"type": "Seen", "count": 3, "made": 13}
-        result = message_filter.judge(msgspec.msgpack.encode(seen), 0.0)
+        message = {"type": "Seen", "count": 3, "made": 13}
+        result = message_filter.judge(msgspec.msgpack.encode(message), 0.0)
         assert (result.seen, result.made) == (3, 13)
-        for made in (math.nan, math.inf, "now", [1.0]):
-            result = message_filter.judge(msgspec.msgpack.encode({**start, "made": made}), 0.0)
+        for stamp in (math.nan, math.inf, "now", [1.0]):
+            result = message_filter.judge(msgspec.msgpack.encode({**start, "made": stamp}), 0.0)
             assert (result.ruling, result.message) == (Ruling.DROP, None)
     finally:
         server.stop()

@@ -236,7 +236,7 @@ class LateServer(Staged):
 
     @property
     def resumes(self) -> int:
-        return sum(isinstance(each, cmd.Resume) for each in self.arm.commands)
+        return sum(isinstance(command, cmd.Resume) for command in self.arm.commands)
 
 
 @pytest.fixture

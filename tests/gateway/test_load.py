@@ -36,16 +36,16 @@ def silent(port: int, count: int, data: bytes = b"") -> Iterator[list[socket.soc
     sockets: list[socket.socket] = []
     try:
         for _ in range(count):
-            each = socket.socket()
-            sockets.append(each)
-            each.settimeout(2.0)
+            connection = socket.socket()
+            sockets.append(connection)
+            connection.settimeout(2.0)
             with suppress(OSError):
-                each.connect(("127.0.0.1", port))
-                each.sendall(data)
+                connection.connect(("127.0.0.1", port))
+                connection.sendall(data)
         yield sockets
     finally:
-        for each in sockets:
-            each.close()
+        for connection in sockets:
+            connection.close()
 
 
 async def stop_seconds(control: Control, times: int, seconds: float = 30.0) -> list[float]:

@@ -27,8 +27,8 @@ ENTRY = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} [A-Z]+ ")
 
 
 def test_message_stays_on_its_line() -> None:
-    for each in BREAKS:
-        evil = (f"Eve{each}{FORGED}",)
+    for line_break in BREAKS:
+        evil = (f"Eve{line_break}{FORGED}",)
         record = logging.LogRecord("katana450", logging.INFO, "", 0, "%s asks.", evil, None)
         line = LineFormatter().format(record)
         assert line.isprintable()
@@ -83,15 +83,15 @@ def test_requests_cannot_forge_a_line_of_the_log(
     local: VirtualServer, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Send fields, values, names, headers and paths through every channel."""
-    for each in BREAKS:
-        evil = f"x{each}{FORGED}"
-        asked: list[dict[str, Any]] = [
+    for line_break in BREAKS:
+        evil = f"x{line_break}{FORGED}"
+        questions: list[dict[str, Any]] = [
             {"do": evil},
             {"do": "stop", evil: 1},
             {"do": "tool", "name": evil},
         ]
-        with local.speaking(quote(f"x{each}y")) as rows:
-            for request in asked:
+        with local.speaking(quote(f"x{line_break}y")) as rows:
+            for request in questions:
                 rows.say(**request)
                 assert rows.hear()["is"] == "refused"
     forged = json.dumps({"do": FORGED}).encode()

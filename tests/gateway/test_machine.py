@@ -57,8 +57,8 @@ def test_every_link_is_where_another_program_has_it(
     urdf = yourdfpy.URDF.load(str(path), load_meshes=False)
     for seed in range(3):
         q = somewhere(robot, seed)
-        there = program.joints(q)
-        np.testing.assert_allclose(there.q, q, rtol=0, atol=1e-12)
+        state = program.joints(q)
+        np.testing.assert_allclose(state.q, q, rtol=0, atol=1e-12)
         # It gets the driven joints alone, and computes the following joints itself.
         urdf.update_cfg(dict(zip(robot.joint_group.names, q.tolist(), strict=True)))
         poses = {link.name: link.T for link in program.query(answers.Links).links}
@@ -160,11 +160,11 @@ def end(answer: object) -> answers.MotionEnd:
 def place(
     client: Client,
     name: str = "block",
-    at: tuple[float, float] = (0.2, 0.0),
+    position: tuple[float, float] = (0.2, 0.0),
     size: Sequence[float] = (0.05, 0.05, 0.1),
 ) -> None:
     """Place a box on the table."""
-    T = se3.from_rotation_translation(np.eye(3), np.array((*at, -0.3)))
+    T = se3.from_rotation_translation(np.eye(3), np.array((*position, -0.3)))
     client.ask(requests.Place(name=name, T=T, shape=requests.Shape.BOX, size=list(size)))
 
 
@@ -172,16 +172,16 @@ def test_table_is_named_at_the_start_and_stops_a_joint(
     on_table: DescribedRobot, column_arm: Client
 ) -> None:
     assert "The table is 300 mm below the base, under base." in " ".join(on_table.notes)
-    found = end(column_arm.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
-    assert found.how == "contact"
-    assert found.why.startswith("Beam and table are ")
+    outcome = end(column_arm.ask(requests.Joint(axis=1, value=-0.4, wait=30)))
+    assert outcome.how == "contact"
+    assert outcome.why.startswith("Beam and table are ")
     assert STOP - 1e-7 <= height(column_arm) <= STOP + SHORT
 
 
 def test_object_is_attached_undone_and_saved_with_the_scene(
     column_server: VirtualServer, column_arm: Client
 ) -> None:
-    place(column_arm, at=(0.2, -0.2))
+    place(column_arm, position=(0.2, -0.2))
     column_arm.ask(requests.Attach(name="block", to=requests.Attachment.TABLE))
     with pytest.raises(RefusedError, match="Nothing can be fixed to a hand: there is no arm"):
         column_arm.ask(requests.Attach(name="block", to=requests.Attachment.HAND))
@@ -191,5 +191,5 @@ def test_object_is_attached_undone_and_saved_with_the_scene(
     assert (status, body[:2]) == (200, b"PK")
     column_arm.ask(requests.Remove(name="block"))
     column_arm.ask(requests.Undo())
-    assert {each.name for each in column_arm.query(answers.Objects).objects} == {"crate", "block"}
+    assert {item.name for item in column_arm.query(answers.Objects).objects} == {"crate", "block"}
     column_arm.ask(requests.Remove(name="block"))

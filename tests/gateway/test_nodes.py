@@ -43,13 +43,13 @@ def test_arm_is_driven_by_name_over_tcp(local: VirtualServer, arm: MountedArm) -
         arrived(lines, done["ticket"])
         more = [{"node": name, "field": "rotation"} for name in THERE]
         values = lines.answer(do="get", node="tcp", field="translation", more=more)["values"]
-        assert [each["node"] for each in values] == ["tcp", *THERE]
+        assert [value["node"] for value in values] == ["tcp", *THERE]
         tool = values[0]["value"]
         # The root's frame stands on the table, {S} is in the shoulder.
         T = T_base_shoulder @ np.array(lines.answer(do="query")["T"])
         np.testing.assert_allclose(tool, T[:3, 3], rtol=0, atol=1e-9)
-        for each, (name, angle) in zip(values[1:], THERE.items(), strict=True):
-            np.testing.assert_allclose(each["value"], rotation(name, angle), rtol=0, atol=1e-9)
+        for value, (name, angle) in zip(values[1:], THERE.items(), strict=True):
+            np.testing.assert_allclose(value["value"], rotation(name, angle), rtol=0, atol=1e-9)
         # The tool is set by its name too.
         place = [tool[0], tool[1], tool[2] + 0.01]
         done = lines.answer(do="set", node="tcp", field="translation", value=place)
@@ -95,7 +95,7 @@ def test_appearance_and_objects_are_set_and_watched_by_name(local: VirtualServer
         values: list[Any] = []
         while values[:3] != wanted:
             state = lines.hear()
-            values = [each["value"] for each in state.get("fields", ())]
+            values = [entry["value"] for entry in state.get("fields", ())]
         assert values[3] == [0.0, 1.0, 0.0, state["q"][1]]
         lines.say(do="watch", hz=0)
         nothing = lines.answer(do="watch", hz=5, fields=[{"node": "cups", "field": "translation"}])
@@ -124,9 +124,9 @@ def test_server_and_exported_file_have_the_same_names(local: VirtualServer, tmp_
     assert in_file == on_server
     assert world["axis_2"]["fields"][0]["type"] == "SFRotation"
     for name in ("cup", "basin", "tcp", "flange"):
-        fields = {each["field"]: each for each in world[name]["fields"]}
+        fields = {field["field"]: field for field in world[name]["fields"]}
         assert {"translation", "rotation"} == fields.keys()
-        assert all(each["settable"] for each in fields.values())
+        assert all(field["settable"] for field in fields.values())
 
 
 @pytest.mark.parametrize("tool", ["flange", "tcp"])

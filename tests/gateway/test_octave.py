@@ -27,23 +27,23 @@ def octave_path() -> str:
 
 def output_of(octave_path: str, server: AppServer, script: str) -> dict[str, Any]:
     """Return the output of a script of examples/octave."""
-    found = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
-    assert found is not None
+    match = re.search(r"JSON lines on 127\.0\.0\.1:(\d+)", server.output)
+    assert match is not None
     command = [octave_path, "--quiet", "--path", str(ROOT / "examples" / "octave")]
-    done = completed([*command, "--eval", f"port = {found[1]}; {script}"], seconds=90)
+    done = completed([*command, "--eval", f"port = {match[1]}; {script}"], seconds=90)
     assert done.returncode == 0, done.stderr
     output: dict[str, Any] = json.loads(done.stdout.splitlines()[0])
     return output
 
 
-def check_kinematics(arm: MountedArm, angles: list[float], asked: list[list[float]]) -> None:
+def check_kinematics(arm: MountedArm, angles: list[float], postures: list[list[float]]) -> None:
     """Compare Octave's joint angles on the circle with ours."""
     chain = arm.chain_to("tcp")
-    for angle, q in zip(angles, asked, strict=True):
+    for angle, q in zip(angles, postures, strict=True):
         p = np.array((0.150, 0.100 * math.sin(angle), -0.110 + 0.100 * math.cos(angle)))
         target = ToolTarget(p, math.radians(75.0 - 13.0 * math.cos(angle)), 0.0)
         T = target.pose(chain, math.atan2(p[1], p[0]))
-        assert min(np.abs(each.q - q).max() for each in inverse(chain, T)) < 1e-9
+        assert min(np.abs(solution.q - q).max() for solution in inverse(chain, T)) < 1e-9
 
 
 @pytest.mark.long

@@ -39,7 +39,7 @@ def done(answer: answers.Answer) -> answers.Done:
 
 
 def reasons(answer: answers.Done) -> list[str]:
-    return [found.reason for found in answer.findings]
+    return [finding.reason for finding in answer.findings]
 
 
 def test_command_is_accepted_once_a_state_includes_it(program: Client) -> None:
@@ -53,9 +53,9 @@ def test_command_beyond_a_limit_is_limited_with_the_finding(program: Client) -> 
     limits = program.query(answers.Arm)
     answer = done(program.ask(requests.Joint(axis=5, value=30.0)))
     assert answer.outcome == "limited"
-    (found,) = answer.findings
-    assert (found.reason, found.axis) == ("axis limit", 5)
-    assert found.amount == pytest.approx(limits.upper[4])
+    (finding,) = answer.findings
+    assert (finding.reason, finding.axis) == ("axis limit", 5)
+    assert finding.amount == pytest.approx(limits.upper[4])
     # The repeated command is limited again, although the state is unchanged.
     assert done(program.ask(requests.Joint(axis=5, value=30.0))).outcome == "limited"
     # Limits of the joints do not affect the outcome of the gripper, and vice versa.
@@ -80,13 +80,13 @@ def test_samples_of_a_stream_are_answered_at_once(program: Client) -> None:
 
 def plain_sample(kind: type[requests.Request]) -> requests.Request:
     """Return a request of a class whose fields are numbers, near 0.1 within their bounds."""
-    given: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for field in cast(StructType, type_info(kind)).fields:
         if field.required:
             number = field.type
             assert isinstance(number, IntType | FloatType), f"add a sample of {kind.__name__}"
-            given[field.name] = max(number.ge or 0, 0.1 if isinstance(number, FloatType) else 0)
-    return kind(**given)
+            values[field.name] = max(number.ge or 0, 0.1 if isinstance(number, FloatType) else 0)
+    return kind(**values)
 
 
 def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
@@ -110,7 +110,7 @@ def test_every_request_that_becomes_a_command_is_answered_with_its_outcome(
         requests.Position: [requests.Position(p=np.array((0.3, 0.1, 0.0)))],
         requests.Tool: [requests.Tool(name="flange"), requests.Tool(name="tcp")],
         requests.SetPriority: [
-            requests.SetPriority(priority=each) for each in reversed(PRIORITIES)
+            requests.SetPriority(priority=priority) for priority in reversed(PRIORITIES)
         ],
         requests.Branch: [requests.Branch(shoulder="front", elbow="down")],
         requests.Hold: [requests.Hold()],
@@ -188,14 +188,14 @@ def wait_until_planned(program: Client) -> None:
 
 def test_partly_refused_batch_names_the_refused_parts(session: Session) -> None:
     state = session.begin(session.ready, 0.0, 0.0)
-    gone, turned = cmd.MoveObject("ball", position=np.zeros(3)), cmd.Joint(5, 30.0)
-    state = session.step(state, [cmd.Batch((turned, gone))], 0.01)
+    missing, turned = cmd.MoveObject("ball", position=np.zeros(3)), cmd.Joint(5, 30.0)
+    state = session.step(state, [cmd.Batch((turned, missing))], 0.01)
     answer = done(serialize.concluded(answers.Done(ticket=1), *state.outcomes))
     assert (answer.outcome, reasons(answer)) == ("limited", ["axis limit"])
     (part,) = answer.refused
     assert (part.part, part.command, part.why) == (2, "move_object", "There is no 'ball'.")
     other = cmd.MoveObject("cube", position=np.zeros(3))
-    state = session.step(state, [cmd.Batch((gone, other))], 0.02)
+    state = session.step(state, [cmd.Batch((missing, other))], 0.02)
     refused = serialize.concluded(answers.Done(ticket=2), *state.outcomes)
     assert isinstance(refused, answers.Refused)
     assert refused.why == "There is no 'ball'. There is no 'cube'."

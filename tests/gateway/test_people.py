@@ -29,10 +29,10 @@ async def asked(control: Control, do: str, **request: Any) -> dict[str, Any]:
     await control.say(do, id=name, **request)
     async with asyncio.timeout(5.0):
         while True:
-            for each in control.heard:
-                if each.get("id") == name:
-                    control.heard.remove(each)
-                    return each
+            for message in control.heard:
+                if message.get("id") == name:
+                    control.heard.remove(message)
+                    return message
             await asyncio.sleep(0.01)
 
 
@@ -40,7 +40,7 @@ async def listed(control: Control) -> dict[str, dict[str, Any]]:
     """Return the people by name."""
     answer = await asked(control, "list_people")
     assert answer["is"] == "people", answer
-    return {each["name"]: each for each in answer["people"]}
+    return {person["name"]: person for person in answer["people"]}
 
 
 async def ends(control: Control) -> int | None:
@@ -64,13 +64,13 @@ async def test_admin_sees_everybody_with_all_connections(
     await admin.wait(holder="Oda, Sorter")
     people = await listed(admin)
     assert list(people) == ["Ada", "Vera", "Oda"]
-    assert [each["you"] for each in people.values()] == [True, False, False]
-    assert [each["drives"] for each in people.values()] == [False, False, True]
-    assert [each["role"] for each in people.values()] == ["admin", "viewer", "operator"]
-    assert [len(each["connections"]) for each in people.values()] == [1, 1, 3]
+    assert [entry["you"] for entry in people.values()] == [True, False, False]
+    assert [entry["drives"] for entry in people.values()] == [False, False, True]
+    assert [entry["role"] for entry in people.values()] == ["admin", "viewer", "operator"]
+    assert [len(entry["connections"]) for entry in people.values()] == [1, 1, 3]
     oda = people["Oda"]["connections"]
-    assert [each["name"] for each in oda[1:]] == ["Oda, Sorter", "Oda, Lathe"]
-    assert {each["address"] for each in oda} == {"127.0.0.1"}
+    assert [entry["name"] for entry in oda[1:]] == ["Oda, Sorter", "Oda, Lathe"]
+    assert {entry["address"] for entry in oda} == {"127.0.0.1"}
     assert people["Oda"]["link"] in file.grants
     # No key of an identity is shown, only the numbers of links.
     assert cookie.partition("=")[2] not in json.dumps(people)

@@ -291,7 +291,7 @@ def test_speed_set_by_a_person_lasts_until_the_program_ends(table: Staged) -> No
     table.wait(0.5, participant)
     table.arm.rest = replace(table.arm.rest, speed=0.3)
     table.wait(3.0, participant)
-    speeds = [each.value for each in table.arm.commands if isinstance(each, cmd.Speed)]
+    speeds = [command.value for command in table.arm.commands if isinstance(command, cmd.Speed)]
     assert speeds == [1.0, 0.3]
     assert table.status == "done"
     assert table.arm.fraction == 0.3
@@ -309,9 +309,9 @@ def test_tool_frame_is_restored_at_every_end_of_a_program(table: Staged, ends: s
         table.stop("Anybody")
         table.wait(0.2, participant)
         # Nothing is selected before the stop is cleared.
-        assert [each for each in table.arm.commands if each == cmd.Tool(before)] == []
+        assert [command for command in table.arm.commands if command == cmd.Tool(before)] == []
         table.hub.move(participant, cmd.ClearStop())
     table.wait(3.0, participant)
     assert table.status == ("done" if ends == "done" else "stopped")
-    chosen = [each.name for each in table.arm.commands if isinstance(each, cmd.Tool)]
+    chosen = [command.name for command in table.arm.commands if isinstance(command, cmd.Tool)]
     assert chosen == ["flange", before]

@@ -40,9 +40,9 @@ def arm(local: VirtualServer) -> Iterator[Client]:
 
 def planned(arm: Client, text: str) -> answers.Progress:
     """Send a script and wait until it is planned or refused."""
-    for at in range(0, len(text), 100):
-        more = at + 100 < len(text)
-        arm.ask(Program(text=text[at : at + 100], more=more))
+    for start in range(0, len(text), 100):
+        more = start + 100 < len(text)
+        arm.ask(Program(text=text[start : start + 100], more=more))
     return wait(arm, lambda program: program.status != "planning")
 
 
@@ -149,16 +149,16 @@ def posture(ready: Client) -> np.ndarray:
 
 def ended(ready: Client) -> answers.Progress:
     """Return the progress at the end of the run, which comes after its planning."""
-    return wait(ready, lambda each: each.status in ("done", "failed", "refused", "stopped"))
+    return wait(ready, lambda status: status.status in ("done", "failed", "refused", "stopped"))
 
 
 def test_stopped_program_is_continued_after_the_stop_is_cleared(ready: Client) -> None:
     ready.ask(Steer(order=ProgramOrder.RUN))
     with pytest.raises(RefusedError, match="`resume` ends a pause"):
         ready.ask(Steer(order=ProgramOrder.CONTINUE))
-    wait(ready, lambda each: each.step == 2 and each.fraction > 0.3)
+    wait(ready, lambda status: status.step == 2 and status.fraction > 0.3)
     ready.stop()
-    assert wait(ready, lambda each: each.status == "stopped").can_continue
+    assert wait(ready, lambda status: status.status == "stopped").can_continue
     with pytest.raises(RefusedError, match="clear the stop"):
         ready.ask(Steer(order=ProgramOrder.CONTINUE))
     ready.clear_stop()
@@ -181,7 +181,7 @@ def test_stopped_program_is_continued_after_the_stop_is_cleared(ready: Client) -
 
 def test_continuation_is_refused_after_the_gripper_has_moved(ready: Client) -> None:
     ready.ask(Steer(order=ProgramOrder.RUN))
-    wait(ready, lambda each: each.step == 1 and each.fraction > 0.2)
+    wait(ready, lambda status: status.step == 1 and status.fraction > 0.2)
     ready.ask(Steer(order=ProgramOrder.END))
     ready.go(requests.Gripper(angle=float(np.deg2rad(20.0))))
     with pytest.raises(RefusedError, match="the gripper has moved"):
@@ -191,7 +191,7 @@ def test_continuation_is_refused_after_the_gripper_has_moved(ready: Client) -> N
 def test_program_begins_at_a_step_and_pauses_before_another(ready: Client) -> None:
     ready.ask(Breakpoints(steps=(3,)))
     ready.ask(Steer(order=ProgramOrder.RUN, at=2))
-    paused = wait(ready, lambda each: each.status == "paused")
+    paused = wait(ready, lambda status: status.status == "paused")
     assert (paused.step, paused.steps, paused.breakpoints) == (3, 3, (3,))
     assert paused.skipped == (1,)
     assert posture(ready)[0] == pytest.approx(np.deg2rad(24.0), abs=1e-9)
@@ -205,7 +205,7 @@ def test_program_begins_at_a_step_and_pauses_before_another(ready: Client) -> No
 
 def test_step_that_does_not_exist_is_refused(ready: Client) -> None:
     ready.ask(Steer(order=ProgramOrder.RUN, at=4))
-    refused = wait(ready, lambda each: each.status == "refused")
+    refused = wait(ready, lambda status: status.status == "refused")
     assert "There is no step 4: Three steps has 3 steps." in refused.why
     with pytest.raises(RefusedError, match="begin at a step"):
         ready.ask(Steer(order=ProgramOrder.PAUSE, at=1))
@@ -222,7 +222,7 @@ def test_program_key_is_secret_and_required(
         return status, json.loads(body)
 
     assert do(do="acquire")[0] == 200
-    pages = [json.loads(local.ask(f"/api/v1/{at}")[2]) for at in ("state", "arm")]
+    pages = [json.loads(local.ask(f"/api/v1/{page}")[2]) for page in ("state", "arm")]
     assert pages[0]["holder"] == "Sorter"
     assert key not in json.dumps(pages)
     # The name of a program does not serve as its key.

@@ -88,7 +88,7 @@ def arm(local: VirtualServer, tokens: dict[str, str]) -> Iterator[Client]:
 
 
 def objects(arm: Client) -> dict[str, answers.SceneObject]:
-    return {each.name: each for each in arm.query(answers.Objects).objects}
+    return {item.name: item for item in arm.query(answers.Objects).objects}
 
 
 def test_server_starts_with_its_scene_and_objects(arm: Client) -> None:
@@ -114,9 +114,9 @@ def test_mesh_is_placed_fixed_to_the_hand_and_touched(
     form = requests.Shape.MESH
     arm.ask(requests.Place(name="it", shape=form, mesh=uploaded.key, scale=0.5, opacity=0.4))
     until(lambda: "it" in objects(arm))
-    at = np.array(objects(arm)["it"].T)[:3, 3]
-    assert 0.3 < np.hypot(*at[:2]) < 0.7
-    assert at[2] == 0.0
+    position = np.array(objects(arm)["it"].T)[:3, 3]
+    assert 0.3 < np.hypot(*position[:2]) < 0.7
+    assert position[2] == 0.0
     on_tool = np.eye(4)
     on_tool[:3, 3] = (-0.05, 0.0, 0.06)
     arm.ask(requests.Attach(name="it", to=requests.Attachment.HAND, T=on_tool))

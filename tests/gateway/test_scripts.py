@@ -43,19 +43,19 @@ def post(server: VirtualServer, text: str | bytes, name: str = "") -> tuple[int,
 def read(server: VirtualServer, text: str) -> dict[str, Any]:
     status, body = post(server, text)
     assert status == 200, body
-    found: dict[str, Any] = json.loads(body)
-    return found
+    answer: dict[str, Any] = json.loads(body)
+    return answer
 
 
 def test_text_is_read_as_poses_or_with_its_problems(server: VirtualServer) -> None:
-    found = read(server, POSES)
-    assert found["problems"] == []
+    answer = read(server, POSES)
+    assert answer["problems"] == []
     pose = {"joints": [0.0, -68.0, 85.0, 8.0, 0.0], "speed": 1.0, "blend": False}
     poses = [{**pose, "gripper": None, "wait": 1.0}]
-    assert found["taught"] == {"name": "Mine", "times": 1, "poses": poses}
+    assert answer["taught"] == {"name": "Mine", "times": 1, "poses": poses}
     assert read(server, "steps: [home]") == {"problems": [], "taught": None}
     problems = read(server, "steps:\n  - hme\n  - wait: -1\n")["problems"]
-    assert [each["line"] for each in problems] == [2, 3]
+    assert [problem["line"] for problem in problems] == [2, 3]
     assert "did you mean 'home'" in problems[0]["text"]
     assert read(server, "")["problems"][0]["line"] == 1
 
@@ -145,10 +145,10 @@ def test_server_checks_the_scene_of_a_script(
     with server.connect("Owner") as arm:
         objects = arm.query(answers.Objects).objects
         scene = ", ".join(
-            f"{{name: {each.name}, shape: {each.shape}, "
-            f"size: {[1e3 * size for size in each.size]}, can_be_held: {each.can_be_held}, "
-            f"pose: {[1e3 * each.T[0][3] + moved, 1e3 * each.T[1][3], 0, 0, 0, 0]}}}"
-            for each in objects
+            f"{{name: {item.name}, shape: {item.shape}, "
+            f"size: {[1e3 * size for size in item.size]}, can_be_held: {item.can_be_held}, "
+            f"pose: {[1e3 * item.T[0][3] + moved, 1e3 * item.T[1][3], 0, 0, 0, 0]}}}"
+            for item in objects
         )
         arm.ask(Program(text=f"scene: [{scene}]\nsteps:\n  - nudge: {{axis: 5, by: 5}}\n"))
         while (program := arm.query(answers.State).program) is None or program.status == "planning":

@@ -38,16 +38,16 @@ def test_pause_names_the_person_and_the_time_until_resume(table: Staged) -> None
     table.hub.move(driver, cmd.Pause())
     paused(table, value=True)
     shown = table.bar(driver), table.bar(other)
-    assert [each["headline"] for each in shown] == ["Paused by you", "Paused by Window 1"]
+    assert [status["headline"] for status in shown] == ["Paused by you", "Paused by Window 1"]
     assert shown[0]["paused_at"] == shown[1]["paused_at"] is not None
-    assert [each["mood"] for each in shown] == ["paused", "paused"]
+    assert [status["mood"] for status in shown] == ["paused", "paused"]
     # A second press keeps the first time.
     table.hub.move(driver, cmd.Pause())
     assert table.bar(driver)["paused_at"] == shown[0]["paused_at"]
     table.hub.move(driver, cmd.Resume())
     paused(table, value=False)
     shown = table.bar(driver), table.bar(other)
-    assert [each["headline"] for each in shown] == ["On target", "On target"]
+    assert [status["headline"] for status in shown] == ["On target", "On target"]
     assert shown[0]["paused_at"] is None
 
 
@@ -139,7 +139,7 @@ def test_remaining_time_counts_the_present_speed(table: Staged) -> None:
     table.arm.rest = replace(table.arm.rest, speed=0.5)
     table.wait(0.1, participant)
     progress = table.progress
-    (plan,) = (each.action.plan for each in program.tasks if isinstance(each.action, FollowPlan))
+    (plan,) = (task.action.plan for task in program.tasks if isinstance(task.action, FollowPlan))
     assert plan.duration_at(0.5) > 1.2 * plan.duration
     assert progress.seconds_left == pytest.approx(0.4 + plan.duration_at(0.5), abs=0.1)
 
@@ -259,11 +259,11 @@ async def agree(control: Control, done: list[str]) -> str:
         await control.say("query")
         state = await control.notice("state")
         shown = dict(control.status)
-        found = contradiction(shown, state)
-        if not found:
+        difference = contradiction(shown, state)
+        if not difference:
             return str(shown["mood"])
         assert time.monotonic() < due, (
-            found,
+            difference,
             done[-12:],
             shown,
             state.get("program"),
@@ -287,9 +287,9 @@ def test_state_line_never_contradicts_the_state(local: VirtualServer, actions: i
             who = "one" if control is one else "other"
             done.append(f"{who} {await act(control, chance)}")
             await asyncio.sleep(chance.choice((0.0, 0.05, 0.3)))
-            for each in (one, other):
-                moods.add(await agree(each, done))
-                each.heard.clear()
+            for window in (one, other):
+                moods.add(await agree(window, done))
+                window.heard.clear()
             if one.status["stopped"] and not one.status["wait"] and chance.random() < 0.5:
                 driver = one if one.status["may_clear_stop"] else other
                 await driver.say("clear_stop")

@@ -31,9 +31,9 @@ def answer(server: AppServer, *parts: bytes) -> dict[str, str]:
             line.sendall(part)
             time.sleep(0.05)
         with line.makefile("rb") as stream:
-            found: dict[str, str] = json.loads(stream.readline())
+            row: dict[str, str] = json.loads(stream.readline())
             assert stream.read() == b""
-    return found
+    return row
 
 
 def stopped(program: Client) -> str:

@@ -72,14 +72,14 @@ class Port:
 
     def number(self, token: str) -> str:
         """Return the number of the link of ``token``."""
-        found = self.file.check(token, time.time())
-        assert found is not None
-        return found[0]
+        grant = self.file.check(token, time.time())
+        assert grant is not None
+        return grant[0]
 
     @property
     def sent(self) -> list[str]:
         """The presses that the arm got."""
-        return [each.cause.press for each in self.pipe.presses]
+        return [press.cause.press for press in self.pipe.presses]
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ async def test_press_that_finds_the_arm_running_is_never_delayed(port: Port) -> 
     await exhaust(port, port.vera)
     port.pipe.status, sent = RUNS, len(port.pipe.presses)
     assert await port.stop(port.vera, "three") == (202, "requested")
-    assert [each.cause.press for each in port.pipe.presses[sent:]] == ["three"]
+    assert [press.cause.press for press in port.pipe.presses[sent:]] == ["three"]
 
 
 async def test_delayed_press_counts_once_the_stop_is_cleared(
@@ -169,11 +169,11 @@ async def test_wrong_tokens_of_an_address_are_delayed_and_send_nothing(port: Por
 
 async def problem_with(answer: bytes, arm_age: float) -> str:
     """Return the problem of a server of STOP that gives ``answer``, after several checks."""
-    path, asked = StopPath(), asyncio.Semaphore(0)
+    path, checks = StopPath(), asyncio.Semaphore(0)
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.readline()
-        asked.release()
+        checks.release()
         writer.write(answer)
         writer.close()
 
@@ -184,7 +184,7 @@ async def problem_with(answer: bytes, arm_age: float) -> str:
         )
         # The fourth request follows the judgement of the third answer.
         for _ in range(4):
-            await asyncio.wait_for(asked.acquire(), 10.0)
+            await asyncio.wait_for(checks.acquire(), 10.0)
         watch.cancel()
         await asyncio.gather(watch, return_exceptions=True)
     return path.problem

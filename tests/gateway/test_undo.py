@@ -21,7 +21,7 @@ def undo(program: Client) -> answers.State:
 
 
 def names(program: Client) -> set[str]:
-    return {each.name for each in program.query(answers.Objects).objects}
+    return {item.name for item in program.query(answers.Objects).objects}
 
 
 def test_goals_are_undone_in_order(program: Client) -> None:
@@ -38,18 +38,18 @@ def test_undone_changes_are_redone_until_the_next_change(program: Client) -> Non
     start = program.go(requests.Home())
     nudged = program.nudge(1, 0.2)
     program.ask(requests.Remove(name="basin"))
-    there = names(program)
+    before = names(program)
     program.ask(requests.Undo())
     undo(program)
     np.testing.assert_allclose(state(program).q, start.q, atol=1e-6)
     np.testing.assert_allclose(program.go(requests.Redo()).q, nudged.q, atol=1e-6)
     program.ask(requests.Redo())
-    assert names(program) == there
+    assert names(program) == before
     with pytest.raises(RefusedError, match="nothing to redo"):
         program.ask(requests.Redo())
     # What was redone is undone again, and a new change ends what can be redone.
     program.ask(requests.Undo())
-    assert names(program) == there | {"basin"}
+    assert names(program) == before | {"basin"}
     np.testing.assert_allclose(undo(program).q, start.q, atol=1e-6)
     program.nudge(2, 0.05)
     with pytest.raises(RefusedError, match="nothing to redo"):
@@ -70,19 +70,19 @@ def test_settings_are_undone(program: Client) -> None:
 
 
 def test_removed_object_returns_and_new_one_goes(program: Client) -> None:
-    there = names(program)
+    before = names(program)
     program.ask(requests.Remove(name="basin"))
     program.ask(requests.Place(name="block", shape=requests.Shape.BOX, size=[0.03, 0.03, 0.03]))
-    assert names(program) == there - {"basin"} | {"block"}
+    assert names(program) == before - {"basin"} | {"block"}
     program.ask(requests.Undo())
     program.ask(requests.Undo())
-    assert names(program) == there
+    assert names(program) == before
 
 
 def test_look_and_place_of_an_object_are_undone_one_by_one(program: Client) -> None:
     def basin() -> answers.SceneObject:
         objects = program.query(answers.Objects).objects
-        return next(each for each in objects if each.name == "basin")
+        return next(item for item in objects if item.name == "basin")
 
     before = basin()
     T = np.array(before.T)

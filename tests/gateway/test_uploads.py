@@ -117,7 +117,7 @@ def test_dripping_uploads_give_their_places_away_and_leave_one_to_an_admin(
             for _ in range(WAITING_EACH)
         ]
         await asyncio.sleep(0.3 * BODY_SECONDS)
-        assert not any(each.done() for each in dripping)
+        assert not any(upload.done() for upload in dripping)
         assert await drips(server, tokens[0]) == 429
         assert await drips(server, bearer(links, Role.OPERATOR)) == 429
         admin = asyncio.create_task(drips(server, bearer(links, Role.ADMIN)))

@@ -39,9 +39,9 @@ def moving(
 ) -> Iterator[Callable[[], tuple[int, Any]]]:
     """Send a request with `wait` over HTTP; enter the block once the arm moves, with its answer."""
     slow(watcher)
-    asked = {"do": "joints", "q": THERE.tolist(), "wait": 30} | request
-    asked = {name: value for name, value in asked.items() if value is not None}
-    answer = local.loop.create_task(local.posted("a-test-that-posts", **asked))
+    request_fields = {"do": "joints", "q": THERE.tolist(), "wait": 30} | request
+    request_fields = {name: value for name, value in request_fields.items() if value is not None}
+    answer = local.loop.create_task(local.posted("a-test-that-posts", **request_fields))
     state_when(watcher, under_way)
     yield lambda: local.run(wait_of(answer))
 
@@ -80,7 +80,7 @@ def test_one_request_over_http_makes_one_whole_motion(
     local: VirtualServer, watcher: Client
 ) -> None:
     slow(watcher)
-    asked: list[dict[str, Any]] = [
+    bodies: list[dict[str, Any]] = [
         {"do": "joints", "q": THERE.tolist()},
         {"do": "joint", "axis": 1, "value": 0.5},
         {"do": "nudge", "axis": 1, "by": -0.4},
@@ -92,7 +92,7 @@ def test_one_request_over_http_makes_one_whole_motion(
         {"do": "set", "node": "axis_1", "field": "rotation", "value": [0, 0, 1, 0.6]},
     ]
     wrong = []
-    for request in asked:
+    for request in bodies:
         began = watcher.query(answers.State)
         status, done = local.post(**request, wait=60)
         end, now = done["end"], watcher.query(answers.State)
@@ -206,7 +206,7 @@ def test_admin_who_takes_the_lease_ends_the_wait(local: VirtualServer, watcher: 
 
 def test_disconnected_program_is_stopped(local: VirtualServer, watcher: Client) -> None:
     with moving(local, watcher) as answer:
-        (person,) = (each.person for each in watcher.people() if each.drives)
+        (person,) = (entry.person for entry in watcher.people() if entry.drives)
         watcher.kick(person, 60.0)
     watcher.kick(person, 0.0)
     status, refused = answer()

@@ -90,8 +90,8 @@ def strike(server: AppServer, process: str, number: signal.Signals) -> None:
         arm.clear_stop()
         time.sleep(0.3)
         assert arm.query(answers.State).q == q
-        there = q[0] + (0.1 if q[0] < 0.0 else -0.1)
-        assert arm.joints([there, *q[1:]]).q[0] == pytest.approx(there)
+        angle = q[0] + (0.1 if q[0] < 0.0 else -0.1)
+        assert arm.joints([angle, *q[1:]]).q[0] == pytest.approx(angle)
 
 
 def lost_connection() -> suppress:
@@ -182,8 +182,8 @@ def test_no_process_outlives_the_supervisor(number: signal.Signals) -> None:
             arm.ask(requests.Joints(q=FAR))
             time.sleep(0.3)
             os.kill(server.pid, number)
-            until(lambda: all(process_state(each) == "Z" for each in others), 10.0)
-        assert all(process_state(each) == "Z" for each in others)
+            until(lambda: all(process_state(process) == "Z" for process in others), 10.0)
+        assert all(process_state(process) == "Z" for process in others)
 
 
 def test_arm_that_was_frozen_rests_and_waits_for_clear_stop() -> None:

@@ -76,13 +76,13 @@ class _Pipe:
 
     def __init__(
         self,
-        found: DescribedRobot,
+        described: DescribedRobot,
         loop: VirtualLoop,
         clock: VirtualClock,
         profile: SilenceProfile,
         scene: InitialScene | None,
     ) -> None:
-        robot, session, _ = found
+        robot, session, _ = described
         self._loop = loop
         arm = robot.joint_group if robot.arm is None else robot.arm
         self._mailbox = Mailbox(session.check)
@@ -286,7 +286,7 @@ class VirtualServer:
 
     def __init__(
         self,
-        found: DescribedRobot,
+        described: DescribedRobot,
         *words: str,
         access: AccessFile | None = None,
         profile: SilenceProfile = SilenceProfile.REAL_ARM,
@@ -299,7 +299,7 @@ class VirtualServer:
         self.clock = VirtualClock()
         self.loop = VirtualLoop(self.clock)
         options, settings, now = _options(words), Settings(), self.clock.now
-        robot, session, _ = found
+        robot, session, _ = described
         self.hub = hub = Hub(now, settings.silence)
         hub.people = People(now)
         hub.people.links = access
@@ -324,9 +324,9 @@ class VirtualServer:
         admission = Admission(app, hub, self.authenticator, acceptor)
         self.app = SecurityMiddleware(admission, address)
         scenes = (make(options, lambda: session) for make in provided("initial_scene"))
-        scene = next((each for each in scenes if each is not None), None)
+        scene = next((part for part in scenes if part is not None), None)
         hub.meshes.put(() if scene is None else scene.meshes, ())
-        self.arm = _Pipe(found, self.loop, self.clock, profile, scene)
+        self.arm = _Pipe(described, self.loop, self.clock, profile, scene)
         pipe = cast(Any, self.arm)
         worker = None
         if robot.arm is not None:
@@ -339,7 +339,7 @@ class VirtualServer:
         if detours and worker is not None:
             self._detours = DetourPlanner(session, self.arm.state_publisher, worker)
             self._detours.start()
-        self._tasks = [self.loop.create_task(each) for each in (self.arm.run(hub), self._watch())]
+        self._tasks = [self.loop.create_task(part) for part in (self.arm.run(hub), self._watch())]
 
     def _soon(self, act: Any, *arguments: Any) -> None:
         self.loop.call_soon_threadsafe(act, *arguments)
@@ -421,7 +421,7 @@ class VirtualServer:
         """
         scope = self.scope(path, headers) | {"method": "GET" if data is None else "POST"}
         messages = [{"type": "http.request", "body": data or b"", "more_body": False}]
-        status, found, body = 0, {}, b""
+        status, answer_headers, body = 0, {}, b""
 
         async def receive() -> dict[str, Any]:
             if messages:
@@ -430,15 +430,15 @@ class VirtualServer:
             return {"type": "http.disconnect"}
 
         async def send(message: dict[str, Any]) -> None:
-            nonlocal status, found, body
+            nonlocal status, answer_headers, body
             if message["type"] == "http.response.start":
                 status = message["status"]
-                found = {name.decode(): text.decode() for name, text in message["headers"]}
+                answer_headers = {name.decode(): text.decode() for name, text in message["headers"]}
             else:
                 body += message.get("body", b"")
 
         await self.app(scope, receive, cast(Any, send))
-        return status, found, body
+        return status, answer_headers, body
 
     def ask(
         self, path: str, *, data: bytes | None = None, **headers: Any
@@ -458,9 +458,9 @@ class VirtualServer:
 
     def state(self) -> answers.State:
         """Return the state, as nobody in particular asks for it."""
-        found = answers.decoded(self.ask("/api/v1/state")[2].decode())
-        assert isinstance(found, answers.State)
-        return found
+        state = answers.decoded(self.ask("/api/v1/state")[2].decode())
+        assert isinstance(state, answers.State)
+        return state
 
     async def program_socket(self, name: str, token: str = "") -> Socket:
         """Return the websocket of a program, whose welcome is read."""
