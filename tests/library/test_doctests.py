@@ -14,7 +14,7 @@ import katana450
 from katana450 import library
 
 MODULES = [
-    *(f"katana450.library.{each.name}" for each in pkgutil.iter_modules(library.__path__)),
+    *(f"katana450.library.{module.name}" for module in pkgutil.iter_modules(library.__path__)),
     "katana450.maths.kinematics.pose",
 ]
 
@@ -29,10 +29,10 @@ MUST_HAVE.add("katana450.maths.kinematics.pose.SE3")
 FINDER = doctest.DocTestFinder(exclude_empty=True)
 
 EXAMPLES = [
-    found
+    example
     for name in MODULES
-    for found in FINDER.find(importlib.import_module(name), name)
-    if found.examples
+    for example in FINDER.find(importlib.import_module(name), name)
+    if example.examples
 ]
 
 
@@ -49,4 +49,4 @@ def test_examples_in_docstrings_run(
 
 
 def test_every_method_that_computes_has_an_example() -> None:
-    assert {each.name for each in EXAMPLES} >= MUST_HAVE
+    assert {example.name for example in EXAMPLES} >= MUST_HAVE

@@ -31,8 +31,8 @@ def mounted(robot: Robot) -> MountedArm:
 
 @pytest.fixture(params=["shoulder_arm", "base_arm"])
 def arm(request: pytest.FixtureRequest) -> katana450.Arm:
-    found: katana450.Arm = request.getfixturevalue(request.param)
-    return found
+    loaded: katana450.Arm = request.getfixturevalue(request.param)
+    return loaded
 
 
 def test_forward_kinematics_are_those_of_the_core(
@@ -48,14 +48,14 @@ def test_forward_kinematics_are_those_of_the_core(
 
 def test_many_postures_are_the_same_as_one_at_a_time(arm: katana450.Arm) -> None:
     q = postures(arm, 20)
-    np.testing.assert_allclose(arm.fk(q), [arm.fk(each) for each in q], atol=1e-14)
-    found = arm.ik(arm.fk(q))
-    for number, each in enumerate(q):
-        single = arm.ik(arm.fk(each))
-        np.testing.assert_allclose(found.q[number], single.q, atol=1e-7)
-        assert (found.within_limits[number] == single.within_limits).all()
-        assert found.position_error[number] == pytest.approx(single.position_error, abs=1e-12)
-        assert found.rotation_error[number] == pytest.approx(single.rotation_error, abs=1e-9)
+    np.testing.assert_allclose(arm.fk(q), [arm.fk(posture) for posture in q], atol=1e-14)
+    solutions = arm.ik(arm.fk(q))
+    for number, posture in enumerate(q):
+        single = arm.ik(arm.fk(posture))
+        np.testing.assert_allclose(solutions.q[number], single.q, atol=1e-7)
+        assert (solutions.within_limits[number] == single.within_limits).all()
+        assert solutions.position_error[number] == pytest.approx(single.position_error, abs=1e-12)
+        assert solutions.rotation_error[number] == pytest.approx(single.rotation_error, abs=1e-9)
 
 
 def test_all_branches_come_back_with_limits_and_residuals(
@@ -63,26 +63,26 @@ def test_all_branches_come_back_with_limits_and_residuals(
 ) -> None:
     for q in postures(arm, 20):
         T = arm.fk(q)
-        found = arm.ik(T)
-        assert [each.branch for each in found] == list(found.branches)
-        for solution, inside in zip(found, found.within_limits, strict=True):
+        solutions = arm.ik(T)
+        assert [candidate.branch for candidate in solutions] == list(solutions.branches)
+        for solution, inside in zip(solutions, solutions.within_limits, strict=True):
             assert solution.within_limits == mounted.chain.within_limits(solution.q) == inside
             missed = np.linalg.norm(arm.fk(solution.q)[:3, 3] - T[:3, 3])
             assert missed == pytest.approx(solution.position_error, abs=1e-12)
-        assert any(np.abs(each.q - q).max() < 1e-6 for each in found.feasible)
+        assert any(np.abs(candidate.q - q).max() < 1e-6 for candidate in solutions.feasible)
 
 
 def test_hint_chooses_the_turn(shoulder_arm: katana450.Arm, mounted: MountedArm) -> None:
     T = shoulder_arm.fk(Q)
     hint = Q + 2.0 * np.pi * np.eye(5)[4]
-    expected = [each.q for each in inverse(mounted.chain, T, q_hint=hint)]
+    expected = [solution.q for solution in inverse(mounted.chain, T, q_hint=hint)]
     np.testing.assert_array_equal(shoulder_arm.ik(T, hint).q, expected)
 
 
 def test_solutions_of_many_poses_are_not_iterated(shoulder_arm: katana450.Arm) -> None:
-    found = shoulder_arm.ik(shoulder_arm.fk(postures(shoulder_arm, 3)))
+    solutions = shoulder_arm.ik(shoulder_arm.fk(postures(shoulder_arm, 3)))
     with pytest.raises(katana450.InputError, match="3 poses"):
-        list(found)
+        list(solutions)
 
 
 def test_nearest_pose_of_a_feasible_one_is_itself(arm: katana450.Arm) -> None:
@@ -136,9 +136,9 @@ def test_tool_is_chosen_when_the_arm_is_loaded(mounted: MountedArm) -> None:
 
 
 def test_reachability_map_is_in_the_base_frame(shoulder_arm: katana450.Arm) -> None:
-    found = shoulder_arm.reachability(0.2)
-    assert (found.points[:, 2] > 0.0).all()
-    assert ((found.fraction > 0.0) & (found.fraction <= 1.0)).all()
+    reachability = shoulder_arm.reachability(0.2)
+    assert (reachability.points[:, 2] > 0.0).all()
+    assert ((reachability.fraction > 0.0) & (reachability.fraction <= 1.0)).all()
 
 
 Refused = Callable[[katana450.Arm], Any]
@@ -193,15 +193,15 @@ def test_printed_pose_is_solved_and_its_misfit_is_stated(arm: katana450.Arm, dec
     printed = poses.round(decimals)
     feasible = 0
     for T, text in zip(poses, printed, strict=True):
-        found = arm.ik(text)
-        assert isinstance(found.rotation_misfit, float)
-        assert 0.0 < found.rotation_misfit <= 2.0 * 10.0**-decimals
+        solutions = arm.ik(text)
+        assert isinstance(solutions.rotation_misfit, float)
+        assert 0.0 < solutions.rotation_misfit <= 2.0 * 10.0**-decimals
         assert arm.nearest(text).position_error < 2.0 * 10.0**-decimals
         assert arm.ik(T).rotation_misfit < 1e-14
-        feasible += bool(found.feasible)
+        feasible += bool(solutions.feasible)
     assert feasible >= 18
     misfits = arm.ik(printed).rotation_misfit
-    np.testing.assert_array_equal(misfits, [arm.ik(each).rotation_misfit for each in printed])
+    np.testing.assert_array_equal(misfits, [arm.ik(pose).rotation_misfit for pose in printed])
 
 
 def test_pose_in_millimetres_is_asked_about(arm: katana450.Arm) -> None:

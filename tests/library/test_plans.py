@@ -41,11 +41,11 @@ def test_samples_are_what_the_controller_does(
     dt, session = 0.01, shoulder_arm.session
     samples = circle.sample(dt)
     state = session.begin(circle.start, 0.0, 0.0)
-    given: tuple[cmd.Command, ...] = (cmd.Follow(circle.core),)
+    commands: tuple[cmd.Command, ...] = (cmd.Follow(circle.core),)
     for number in range(1, len(samples)):
-        state = session.step(state, given, number * dt)
+        state = session.step(state, commands, number * dt)
         state = session.observe(state, state.setpoint, state.gripper_setpoint)
-        given = ()
+        commands = ()
         # The controller plans the rest of the motion again in each tick, which delays it by up to
         # a millisecond.
         np.testing.assert_allclose(state.setpoint, samples.q[number], atol=1e-3)
@@ -81,12 +81,12 @@ def test_circle_from_a_start_goes_to_it_first(
 def test_line_is_straight_and_keeps_the_tool_as_it_is(base_arm: katana450.Arm) -> None:
     by = np.array([0.04, 0.03, -0.05])
     samples = base_arm.line(by=by).sample(0.01)
-    gone = samples.points - samples.points[0]
-    np.testing.assert_allclose(np.cross(gone, by), 0.0, atol=1e-12)
-    np.testing.assert_allclose(gone[-1], by, atol=1e-12)
+    offsets = samples.points - samples.points[0]
+    np.testing.assert_allclose(np.cross(offsets, by), 0.0, atol=1e-12)
+    np.testing.assert_allclose(offsets[-1], by, atol=1e-12)
     np.testing.assert_allclose(samples.q[:, 1:4].sum(axis=1), base_arm.ready[1:4].sum())
-    there = base_arm.line(samples.points[-1])
-    np.testing.assert_allclose(there.end, samples.q[-1], atol=1e-9)
+    same = base_arm.line(samples.points[-1])
+    np.testing.assert_allclose(same.end, samples.q[-1], atol=1e-9)
 
 
 def test_goal_may_be_a_pose(base_arm: katana450.Arm) -> None:

@@ -28,13 +28,13 @@ def records(path: Path) -> list[TickRecord]:
 
 def test_arrays_are_those_of_the_session(path: Path, records: list[TickRecord]) -> None:
     recording = katana450.open(path)
-    by_time = {each.state.t: each.state for each in records}
+    by_time = {record.state.t: record.state for record in records}
     states = [by_time[t] for t in recording.t.tolist()]
     assert len(states) > 50
-    np.testing.assert_array_equal(recording.q, [each.q for each in states])
-    np.testing.assert_array_equal(recording.setpoint, [each.setpoint for each in states])
-    np.testing.assert_array_equal(recording.gripper, [each.gripper for each in states])
-    np.testing.assert_allclose(recording.qd, [each.motion.qd for each in states], atol=5.1e-5)
+    np.testing.assert_array_equal(recording.q, [state.q for state in states])
+    np.testing.assert_array_equal(recording.setpoint, [state.setpoint for state in states])
+    np.testing.assert_array_equal(recording.gripper, [state.gripper for state in states])
+    np.testing.assert_allclose(recording.qd, [state.motion.qd for state in states], atol=5.1e-5)
     pose = katana450.load(frame="base").fk(recording.q[-1])
     np.testing.assert_allclose(recording.position[-1], pose[:3, 3], atol=5.1e-6)
     np.testing.assert_allclose(np.linalg.norm(recording.orientation, axis=1), 1.0, atol=1e-5)
@@ -44,15 +44,15 @@ def test_arrays_are_those_of_the_session(path: Path, records: list[TickRecord]) 
 
 def test_commands_and_events_are_listed(path: Path, records: list[TickRecord]) -> None:
     recording = katana450.open(str(path))
-    given = [(each.t, sub) for each in records for sub in each.submissions]
-    assert [type(each.command) for each in recording.commands] == [
-        type(sub.command) for _, sub in given
+    submissions = [(entry.t, sub) for entry in records for sub in entry.submissions]
+    assert [type(entry.command) for entry in recording.commands] == [
+        type(sub.command) for _, sub in submissions
     ]
-    assert [each.t for each in recording.commands] == [t for t, _ in given]
-    assert {each.giver for each in recording.commands} == {"Ada", "the server"}
+    assert [entry.t for entry in recording.commands] == [t for t, _ in submissions]
+    assert {entry.giver for entry in recording.commands} == {"Ada", "the server"}
     first = recording.commands[0].command
     assert isinstance(first, cmd.Position)
-    assert [each["number"] for each in recording.events] == [100]
+    assert [entry["number"] for entry in recording.events] == [100]
 
 
 def test_recording_verifies_itself(path: Path, records: list[TickRecord]) -> None:

@@ -85,9 +85,9 @@ def test_plan_is_followed_at_a_fraction_of_its_speed(
 ) -> None:
     plan = shoulder_arm.plan([0.2, -1.0, 1.4, 0.3, 0.0])
     client.joints(plan.start)
-    begun = time.monotonic()
+    start = time.monotonic()
     state = plan.run(client, speed=0.5)
-    assert 2.0 * plan.duration < time.monotonic() - begun < 2.0 * plan.duration + 3.0
+    assert 2.0 * plan.duration < time.monotonic() - start < 2.0 * plan.duration + 3.0
     np.testing.assert_allclose(state.q, plan.end, atol=1e-9)
     with pytest.raises(katana450.InputError, match=r"speed is 0\.0; it must be above 0"):
         plan.run(client, speed=0.0)
@@ -148,7 +148,7 @@ def test_stop_that_is_cleared_at_once_ends_the_run(
         running.join(60.0)
         assert len(refused) == 1
         assert re.search("STOP|stopped", str(refused[0]))
-        at_rest = next(each for each in onlooker.states() if not each.moving)
+        at_rest = next(snapshot for snapshot in onlooker.states() if not snapshot.moving)
         assert at_rest.stopped is None
         time.sleep(0.2)
         assert onlooker.query(answers.State).q == at_rest.q

@@ -160,7 +160,7 @@ def test_alternatives_and_scenes_are_written(tmp_path: Path) -> None:
     p.save(tmp_path / "script.yaml")
     script = parse(script_text(tmp_path / "script.yaml"))
     assert script.scene is not None
-    assert [each.name for each in script.scene.draft.entries] == ["a"]
+    assert [entry.name for entry in script.scene.draft.entries] == ["a"]
     assert count(script.steps) == 5
     with pytest.raises(katana450.InputError, match="must follow a block `when`"), p.otherwise():
         pass

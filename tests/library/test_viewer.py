@@ -26,12 +26,12 @@ def test_viewer_shows_postures_and_plans(shoulder_arm: katana450.Arm) -> None:
         plan = shoulder_arm.plan(q, [-0.7, *q[1:]])
         viewer.play(plan, speed=4.0)
         assert viewer._path.visible
-        seen: set[float] = set()
+        angles: set[float] = set()
         until = time.monotonic() + 30.0
-        while len(seen) < 5 and time.monotonic() < until:
-            seen.add(angle_shown(viewer))
+        while len(angles) < 5 and time.monotonic() < until:
+            angles.add(angle_shown(viewer))
             time.sleep(0.01)
-        assert len(seen) >= 5
+        assert len(angles) >= 5
         viewer.move(shoulder_arm.ready)
         assert angle_shown(viewer) == shoulder_arm.ready[0]
         time.sleep(0.1)
