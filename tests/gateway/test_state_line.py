@@ -16,7 +16,7 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.messages import STATUS
 from katana450.arm.control.state.state import Finding, Reason, Status
 from katana450.extensions.programs.building.actions import FollowPlan
-from katana450.extensions.programs.server.state_line import duration
+from katana450.extensions.programs.server.state_line import ENDS, duration
 from katana450.server.api.program_requests import ProgramOrder
 from tests.gateway.client import Control
 from tests.gateway.test_hub import PAGES
@@ -112,17 +112,17 @@ def test_end_of_a_program_is_told_until_the_next_command(table: Staged) -> None:
     table.programs.steer(owner, ProgramOrder.END)
     table.wait(0.1, owner)
     shown = table.bar(other)
-    assert (shown["headline"], shown["end"]) == ("Nap: ended at step 1 of 2", "step 1 of 2")
-    assert shown["why"] == "Window 1 ended it. Continue resumes it there."
+    assert (shown["headline"], shown["end"]) == ("Ended: Nap", "")
+    assert shown["why"] == "Window 1 ended it at step 1 of 2. Continue resumes it there."
     shown = table.bar(owner)
-    assert shown["why"] == "You ended it. Continue resumes it there."
+    assert shown["why"] == "You ended it at step 1 of 2. Continue resumes it there."
     assert (shown["orders"], shown["continues"]) == (["continue"], ["Nap", 1, 2])
     table.programs.steer(owner, ProgramOrder.CONTINUE)
     table.wait(32.0, owner)
     assert table.bar(owner)["headline"] == "Nap: done in 42 s"
     table.plan(owner, "steps:\n  - joints: [20, -60, 80, 8, 999]\n")
     shown = table.bar(owner)
-    assert (shown["mood"], shown["headline"]) == ("limited", "The script: cannot run")
+    assert (shown["mood"], shown["headline"]) == ("limited", "Cannot run: the script")
     assert "999" in shown["why"]
     # As the planning worker reports a motion.
     table.programs.redirected()
@@ -209,9 +209,8 @@ def contradiction(shown: dict[str, Any], state: dict[str, Any]) -> str:
     """Return what the status ``shown`` by a page says other than ``state`` of the API; else ""."""
     mood, headline, status = shown["mood"], shown["headline"], state["status"]
     program = state.get("program") or {"status": "", "name": ""}
-    news = program["status"] in ENDED and headline.startswith(
-        (f"{program['name']}: ", "The script: ")
-    )
+    heads = (f"{program['name']}: done", *(f"{word}: " for word in ENDS.values()))
+    news = program["status"] in ENDED and headline.startswith(heads)
     if state.get("stopped") is not None:
         words = "Stopping…" if state["moving"] or state.get("stop") == "requested" else "Stopped"
         wanted, right = "stopped", headline == words

@@ -65,7 +65,7 @@ def state_line(hub: Hub, reader: Person | None = None) -> StatusLine:
         head = paused_headline(hub, reader) if rests_paused(state) else headline(state)
         now = StatusLine(mood(state), head, sentence(state))
         plans = hub.arm is not None and hub.arm.busy and not state.moving and not state.paused
-        if plans:
+        if plans and not hub.runner.running:
             now = StatusLine("planning", "Planning a path", "The arm then follows it.")
         if state.status not in FIRST:
             now = hub.runner.status_line(state, now, reader)

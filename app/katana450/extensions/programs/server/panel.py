@@ -317,8 +317,8 @@ def _is_text(scripts: Scripts, name: str, text: str) -> bool:
 
 
 def _page(progress: Progress | None) -> str:
-    """Return what the bar does not say of a program as HTML; empty for one that is under way."""
-    if progress is None or progress.status in (*RUNS, "planning"):
+    """Return the plan, or why there is none or it failed, as HTML; the bar says all else."""
+    if progress is None or progress.status not in ("ready", "refused", "cancelled", "failed"):
         return ""
     lines = [f"<b>{escape(progress.name)}</b> {escape(progress.status)}"]
     if progress.status == "ready":

@@ -21,10 +21,10 @@ ENDED = (Phase.DONE.value, Phase.STOPPED.value, Phase.FAILED.value)
 """Statuses of a program whose run has ended."""
 
 ENDS = {
-    Phase.STOPPED.value: "ended",
-    Phase.FAILED.value: "failed",
-    PlanningPhase.REFUSED.value: "cannot run",
-    PlanningPhase.CANCELLED.value: "not planned",
+    Phase.STOPPED.value: "Ended",
+    Phase.FAILED.value: "Failed",
+    PlanningPhase.REFUSED.value: "Cannot run",
+    PlanningPhase.CANCELLED.value: "Not planned",
 }
 """The sentence of the page about a program with this status."""
 
@@ -107,14 +107,18 @@ def _ended(line: StatusLine, program: Progress, news: RunNews) -> StatusLine:
         return line._replace(headline=f"{program.name}: done {took}", end=took)
     if program.status not in ENDS:
         return line
-    end = f"step {program.step} of {program.steps}" if program.step else ""
-    head = f"{program.name or 'The script'}: {ENDS[program.status]}{end and f' at {end}'}"
-    more = "Continue resumes it there." if program.can_continue else ""
+    head = f"{ENDS[program.status]}: {program.name or 'the script'}"
     why = " ".join(program.why.split())
     why = why if news.reader is None else addressed(why, news.reader.name)
+    step = f"step {program.step} of {program.steps}" if program.step else ""
+    if step and program.status == Phase.STOPPED.value:
+        why = f"{why.removesuffix('.')} at {step}."
+    elif step:
+        why = f"{step.capitalize()}: {why}"
+    more = "Continue resumes it there." if program.can_continue else ""
     whys = (why, more, line.why)
     mood = "limited" if program.status in UNPLANNED_ENDS else line.mood
-    return StatusLine(mood, head, " ".join(filter(None, whys)), end)
+    return StatusLine(mood, head, " ".join(filter(None, whys)))
 
 
 def duration(seconds: float) -> str:
