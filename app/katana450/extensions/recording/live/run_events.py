@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from katana450.arm.control.actor import CommandChannel
+from katana450.arm.control.state.following import Following
 from katana450.arm.control.state.state import State
 from katana450.arm.runtime.tick import TickRecord
 
@@ -34,10 +35,15 @@ class RunEvents:
             return
         yield from _stops(before, record.state)
         was, now = before.following, record.state.following
-        if now is not None and (was is None or was.plan is not now.plan):
+        if now is not None and now.fraction < 1.0 and _begins(was, now):
             # On the clock of the program: at its speed, and without what is done already.
             seconds = now.plan.duration_at(record.state.speed) * (1.0 - now.fraction)
             yield STEP, {"seconds": seconds}
+
+
+def _begins(was: Following | None, now: Following) -> bool:
+    """Return whether ``now`` is on another plan than ``was``; a later record has a copy of it."""
+    return was is None or was.plan.span != now.plan.span or now.tau < was.tau
 
 
 def _stops(before: State, after: State) -> Iterator[tuple[str, dict[str, Any]]]:

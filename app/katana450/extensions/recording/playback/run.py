@@ -192,6 +192,8 @@ class PlaybackRun:
         """Return the newest marks in their order. Raises InputError for a damaged file."""
         with self._lock:
             marks = [mark for file in self._files for mark in self._marks(file)]
+            # What follows from scripts and names is written later than it happens.
+            marks.sort(key=lambda mark: mark.t)
             return [entry._replace(t=entry.t + self._offset) for entry in marks[-MAX_MARKS:]]
 
     def at(self, t: float) -> RecordedMoment | None:
