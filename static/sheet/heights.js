@@ -59,6 +59,7 @@ function choose(next) {
   const [name, tall] = HEIGHTS[height];
   if (height) dataset.sheet = name;
   else delete dataset.sheet;
+  outer?.document.body.toggleAttribute("data-raised", height > 0);
   size(tall, HEIGHTS[Math.min(height, 1)][1]);
   button.setAttribute("aria-label", `Controls, ${name}`);
   button.setAttribute("aria-expanded", String(height > 0));

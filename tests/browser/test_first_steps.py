@@ -13,6 +13,7 @@ from tests.browser.conftest import OpenPage
 from tests.browser.page import FIRST_VISIT, ViserPage
 from tests.browser.server import APP, AppServer
 from tests.browser.session import MOVE, Truth, clear_stop
+from tests.browser.sizes import PHONE, PORTRAIT
 from tests.general_arms.links_of_arms import ur5e
 
 COUNTED = """
@@ -142,6 +143,20 @@ def test_card_is_dismissed_for_good_and_returns_by_the_help(visit: ViserPage) ->
     window.click("#help-button")
     window.get_by_role("button", name="First steps").click()
     window.wait_for_selector("#welcome:not([hidden])")
+
+
+def test_card_lies_over_no_sheet_of_a_phone(server: AppServer, open_page: OpenPage) -> None:
+    page = open_page(server.url, window=PORTRAIT, script=FIRST_VISIT, **PHONE)
+    card = page.page.locator("#welcome")
+    card.wait_for()
+    for opener in (page.frame.locator("#k450-sheet"), page.page.locator("#jog-button")):
+        opener.tap()
+        card.wait_for(state="hidden")
+        opener.tap()
+        if opener.get_attribute("aria-label") == "Controls, full height":
+            opener.tap()
+        card.wait_for()
+    assert page.errors == []
 
 
 @pytest.mark.long
