@@ -1,6 +1,6 @@
 // The real arm: its mode, what it measures, and the acts of a person. Loaded when a driver reports.
 import { first, styled, write } from "../dom.js";
-import { html, signed } from "../instruments/shape.js";
+import { button, html, signed } from "../instruments/shape.js";
 
 /** @typedef {Api.ArmAct} Act */
 /** @typedef {Page.ArmStatus["acts"]} Acts */
@@ -82,9 +82,8 @@ export class Arm {
     // A working arm needs no act.
     const first = FOLLOWS.includes(this.#mode) ? null : Object.keys(acts)[0];
     const made = entriesOf(acts).map(([act, hazard]) => {
-      const button = html("button", { type: "button", "data-act": act, ...(act === first && { class: "main" }) }, NAMES[act]);
-      button.addEventListener("click", () => (hazard ? this.#ask(act, hazard) : this.#give(act)));
-      return button;
+      const give = () => (hazard ? this.#ask(act, hazard) : this.#give(act));
+      return button(NAMES[act], give, { "data-act": act, ...(act === first && { class: "main" }) });
     });
     this.#buttons.replaceChildren(...made);
     write(this.#hint, entriesOf(acts).map(([act]) => SENTENCES[act]).filter(Boolean).join(" "));
@@ -96,9 +95,8 @@ export class Arm {
     const tick = html("input", { type: "checkbox" });
     const words = act === "release" ? "I hold the arm by hand." : act === "calibrate" ? "The space is clear, and I have the switch in reach." : "It was calibrated since it was switched on.";
     const go = html("button", { type: "button", class: "main", disabled: "" }, NAMES[act].replace("…", ""));
-    const back = html("button", { type: "button" }, "Cancel");
+    const back = button("Cancel", () => this.#dialog.close());
     tick.addEventListener("change", () => (go.disabled = !tick.checked));
-    back.addEventListener("click", () => this.#dialog.close());
     go.addEventListener("click", () => {
       this.#dialog.close();
       this.#give(act, true);

@@ -1,6 +1,6 @@
 // Episodes: REC, the judgement of attempts, and their list. Loaded when the server records.
 import { element, first, styled, write } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 
 /** @typedef {Page.Outcome} Outcome */
 /** @typedef {"success" | "failure" | "discard" | "rerecord" | "undo"} Act */
@@ -17,7 +17,7 @@ const OUTCOMES = { success: "Success", failure: "Failure", unjudged: "Not judged
 const ACTS = { success: ["Success", "Y"], failure: ["Failure", "N"], discard: ["Discard", "X"], rerecord: ["Re-record", "B"], undo: ["Undo", "U"] };
 const MEGA = 1e6; // bytes
 const entriesOfActs = /** @type {[Act, [string, string]][]} */ (Object.entries(ACTS));
-const button = element("episodes-button", HTMLButtonElement);
+const opener = element("episodes-button", HTMLButtonElement);
 /** @param {number} seconds */
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 /** @param {number} bytes */
@@ -55,9 +55,7 @@ export class Episodes {
     this.toast = page.toast;
     styled("episodes.css", import.meta.url);
     for (const [act, [label, letter]] of entriesOfActs) {
-      const made = html("button", { type: "button", "data-act": act, "aria-keyshortcuts": letter }, label, key(letter));
-      made.addEventListener("click", () => this.#act(act));
-      this.#acts.append(made);
+      this.#acts.append(button([label, key(letter)], () => this.#act(act), { "data-act": act, "aria-keyshortcuts": letter }));
     }
     this.#rec.addEventListener("click", () => this.#act("rec"));
     this.#task.addEventListener("keydown", (event) => {
@@ -87,12 +85,12 @@ export class Episodes {
     if (!state && before?.running) this.toast("The recording is interrupted. It begins again in a few seconds.");
     this.#state = state ?? null;
     this.#may = role !== "viewer";
-    button.hidden = !state;
+    opener.hidden = !state;
     if (!state) return;
     const { running, saving, last, undo, problem } = state;
-    button.classList.toggle("on", Boolean(running));
+    opener.classList.toggle("on", Boolean(running));
     const parts = running ? [`REC ${clock(running.seconds)}`, size(running.bytes)] : ["REC", ""];
-    [...button.children].forEach((span, i) => write(span, parts[i]));
+    [...opener.children].forEach((span, i) => write(span, parts[i]));
     this.#task.labels?.forEach((label) => (label.hidden = !this.#may));
     for (const control of [this.#rec, this.#acts]) control.hidden = !this.#may;
     if (document.activeElement !== this.#task && before?.task !== state.task) this.#task.value = state.task;
@@ -218,8 +216,7 @@ export class Episodes {
     const seconds = (value) => ({ type: "number", step: 0.1, min: 0, max: recorded.toFixed(1), value: value.toFixed(1) });
     const select = html("select", {}, ...Object.entries(OUTCOMES).slice(0, outcome === "unfinished" ? 4 : 3).map(([value, words]) => html("option", { value, ...(value === outcome && { selected: "" }) }, words)));
     select.addEventListener("change", () => ask({ do: "judge", outcome: select.value }));
-    const discard = html("button", { type: "button", "data-key": `${number} kept` }, "Discard");
-    discard.addEventListener("click", () => ask({ do: "discard" }));
+    const discard = button("Discard", () => ask({ do: "discard" }), { "data-key": `${number} kept` });
     row.append(
       html("label", {}, "Outcome", select),
       field("Task", { maxlength: 200, value: task }, (value) => ask({ do: "describe", task: value })),
@@ -233,8 +230,7 @@ export class Episodes {
 
   /** @param {Episode} episode */
   #gone({ number, task }) {
-    const back = html("button", { type: "button", "data-key": `${number} kept`, "aria-label": `Restore episode ${number}` }, "Restore");
-    back.addEventListener("click", () => this.#ask({ do: "restore", number }));
+    const back = button("Restore", () => this.#ask({ do: "restore", number }), { "data-key": `${number} kept`, "aria-label": `Restore episode ${number}` });
     return html("li", { class: "gone" }, html("b", {}, `${number}`), html("span", {}, `discarded ${task}`), ...(this.#may ? [back] : []));
   }
 }

@@ -7,6 +7,13 @@ export function html(tag, attributes = {}, ...children) {
   return filled(document.createElement(tag), attributes, children);
 }
 
+/** Return a button. @param {Node | string | (Node | string)[]} content @param {() => void} act @param {Attributes} attributes */
+export function button(content, act, attributes = {}) {
+  const control = html("button", { type: "button", ...attributes }, ...[content].flat());
+  control.addEventListener("click", act);
+  return control;
+}
+
 /** @template {keyof SVGElementTagNameMap} K @param {K} tag @param {Attributes} attributes @param {(Node | string)[]} children */
 export function svg(tag, attributes = {}, ...children) {
   return filled(document.createElementNS(SVG, tag), attributes, children);

@@ -1,6 +1,6 @@
 // The choice of another robot. Loaded on first use.
 import { element, styled } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
 /** @typedef {{ name: string, title: string, kind: "own" | "first" | "uploaded" | "gallery", maker?: string, licence?: string, arguments?: Record<string, string> }} Robot */
@@ -72,10 +72,9 @@ function draw() {
     if (group.length) list.append(html("h2", {}, KINDS[kind]));
     for (const robot of group) {
       const note = [robot.maker, robot.licence].filter(Boolean).join(" · ");
-      const button = html("button", { type: "button" }, html("b", {}, robot.title), " ", html("span", {}, note));
-      if (robot.name === driven?.name) button.setAttribute("aria-current", "true");
-      button.addEventListener("click", () => ask(robot));
-      list.append(button);
+      const opens = button([html("b", {}, robot.title), " ", html("span", {}, note)], () => ask(robot));
+      if (robot.name === driven?.name) opens.setAttribute("aria-current", "true");
+      list.append(opens);
     }
   }
   if (!matches.length) list.append(html("p", {}, "No robot has this name or maker."));
@@ -98,12 +97,7 @@ async function upload(file, main = "") {
     const { robot, why, choices } = await answer.json();
     if (choices) {
       report(why);
-      const buttons = choices.map((/** @type {string} */ path) => {
-        const button = html("button", { type: "button" }, path);
-        button.addEventListener("click", () => upload(file, path));
-        return button;
-      });
-      return list.replaceChildren(...buttons);
+      return list.replaceChildren(...choices.map((/** @type {string} */ path) => button(path, () => upload(file, path))));
     }
     if (!answer.ok) return report(why);
     report("");

@@ -1,7 +1,7 @@
 // The joints in the picture: which link is under the pointer, its highlight, and the bar of the selected
 // one. A link that is dragged turns its joint; the pointer's events come from `stage.js`.
 import { element, sceneIn, write } from "../dom.js";
-import { html, signed } from "../instruments/shape.js";
+import { button, html, signed } from "../instruments/shape.js";
 import { readState } from "../server.js";
 import { Glow, shapesOf } from "./glow.js";
 import { Grab } from "./grab.js";
@@ -46,14 +46,9 @@ export class Joints {
     this.#scene = scene;
     this.#page = page;
     /** @param {number} sign */
-    const step = (sign) => {
-      const button = html("button", { type: "button" });
-      button.addEventListener("click", () => this.#step(sign));
-      return button;
-    };
+    const step = (sign) => button("", () => this.#step(sign));
     this.#steps = [step(-1), step(1)];
-    const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
-    clear.addEventListener("click", () => this.select(null));
+    const clear = button("×", () => this.select(null), { "aria-label": "Deselect" });
     this.#bar = html(
       "div", { id: "joint", role: "group", "aria-label": "Selected joint", hidden: "" },
       this.#name, this.#steps[0], this.#angle, this.#steps[1], clear,

@@ -1,7 +1,7 @@
 // The view cube: it turns as the scene does, and its faces turn the camera. Below it are the views that are
 // no face, and Fit. For fingers, to which some faces are too narrow, a list replaces it.
 import { sceneIn, sceneOf } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { NARROW, PANEL } from "../viser/names.js";
 
 const NEAR = 0.6; // m, maximum distance to a point that is looked at
@@ -56,22 +56,17 @@ export class Views {
   constructor(stage, scene) {
     this.#scene = scene;
     /** @param {string} label @param {string} view @param {string} name */
-    const button = (label, view, name) => {
-      const made = html("button", { type: "button", "aria-label": name, title: name }, label);
-      made.addEventListener("click", () => this.#choose(view));
-      return made;
-    };
+    const choosing = (label, view, name) => button(label, () => this.#choose(view), { "aria-label": name, title: name });
     for (const [label, view, out, up] of FACES) {
-      const face = button(label, view, `View: ${label.toLowerCase()}`);
+      const face = choosing(label, view, `View: ${label.toLowerCase()}`);
       face.style.transform = facing(out, up);
       this.#cube.append(face);
     }
     const below = html("i", { "aria-hidden": "true" });
     below.style.transform = facing(...BELOW);
     this.#cube.append(below);
-    const fit = html("button", { type: "button", title: "Show all of arm and handle" }, "Fit");
-    fit.addEventListener("click", () => this.#fit());
-    const more = MORE.map(([label, view, name]) => button(label, view, name));
+    const fit = button("Fit", () => this.#fit(), { title: "Show all of arm and handle" });
+    const more = MORE.map(([label, view, name]) => choosing(label, view, name));
     const list = html("select", { "aria-label": "View" }, new Option("View", ""));
     for (const [label, view] of [...FACES, ...MORE]) list.add(new Option(label, view));
     list.addEventListener("change", () => {

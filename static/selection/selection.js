@@ -1,7 +1,7 @@
 // The selected object: a frame round it in the picture, with its name and a button to remove it, and the
 // arrows that move it, in this window alone.
 import { sceneOf, styled, write } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 
 const EVERY = 100; // ms between two updates of the frame
 const MARGIN = 6; // px
@@ -36,10 +36,8 @@ export class Selection {
     this.#scene = scene;
     this.#page = page;
     styled("selection.css", import.meta.url);
-    const remove = html("button", { type: "button" }, "Remove ", html("kbd", {}, "Del"));
-    const clear = html("button", { type: "button", "aria-label": "Deselect" }, "×");
-    remove.addEventListener("click", () => this.remove());
-    clear.addEventListener("click", () => this.clear());
+    const remove = button(["Remove ", html("kbd", {}, "Del")], () => this.remove());
+    const clear = button("×", () => this.clear(), { "aria-label": "Deselect" });
     this.#bar = html("div", { role: "group", "aria-label": "Selected object" }, this.#name, remove, clear);
     this.#frame = html("div", { id: "selection", hidden: "" }, this.#bar);
     stage.append(this.#frame);

@@ -1,5 +1,5 @@
 // The text of a script, with the numbers of its lines and what the server says about them.
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 
 /** @typedef {{ line: number, text: string, file?: string }} Problem */
 /** @typedef {{ problems: Problem[], taught: import("./poses.js").Taught | null }} Reading */
@@ -61,9 +61,7 @@ export class Editor {
     this.#problems.replaceChildren(
       ...problems.map(({ line, text, file }) => {
         if (file) return html("li", {}, html("b", {}, `${file}, line ${line}`), ` ${text}`);
-        const button = html("button", { type: "button" }, html("b", {}, `Line ${line}`), ` ${text}`);
-        button.addEventListener("click", () => this.#select(line));
-        return html("li", {}, button);
+        return html("li", {}, button([html("b", {}, `Line ${line}`), ` ${text}`], () => this.#select(line)));
       }),
     );
   }

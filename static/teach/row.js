@@ -1,6 +1,6 @@
 // One pose in the list: its picture, which is also its handle, its numbers and its buttons.
 import { write } from "../dom.js";
-import { html, set, svg } from "../instruments/shape.js";
+import { button, html, set, svg } from "../instruments/shape.js";
 import { MAX_WAIT, restsBecause } from "./poses.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
@@ -21,14 +21,9 @@ const SHAPES = {
   blend: "M3 16c9 0 3-12 14-12",
 };
 
-/** @param {Name} name @param {string} label @param {() => void} act */
-function button(name, label, act, text = "") {
-  const icon = svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] }));
-  const made = html("button", { type: "button", class: name, title: label, "aria-label": label }, icon);
-  if (text) made.append(html("span", {}, text));
-  made.addEventListener("click", act);
-  return made;
-}
+/** @param {Name} name @param {() => void} act @param {Node[]} words */
+const drawn = (name, act, ...words) =>
+  button([svg("svg", { viewBox: "0 0 20 20", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] })), ...words], act, { class: name });
 
 /**
  * @param {string} label @param {string} unit @param {number} low @param {number} high @param {number} step
@@ -67,12 +62,12 @@ export class Row {
     [this.#speed, this.#wait] = [speed.input, wait.input];
     /** @type {Record<Name, HTMLButtonElement>} */
     this.#buttons = {
-      grip: button("grip", "", () => acts.toggleGrip(id)),
-      blend: button("blend", "", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose?.blend })),
-      go: button("go", "", () => acts.go(id), "Go"),
-      up: button("up", "", () => !this.#isOff("up") && acts.move(id, -1)),
-      down: button("down", "", () => !this.#isOff("down") && acts.move(id, 1)),
-      remove: button("remove", "", () => acts.remove(id)),
+      grip: drawn("grip", () => acts.toggleGrip(id)),
+      blend: drawn("blend", () => !this.#isOff("blend") && acts.put(id, { blend: !this.#pose?.blend })),
+      go: drawn("go", () => acts.go(id), html("span", {}, "Go")),
+      up: drawn("up", () => !this.#isOff("up") && acts.move(id, -1)),
+      down: drawn("down", () => !this.#isOff("down") && acts.move(id, 1)),
+      remove: drawn("remove", () => acts.remove(id)),
     };
     if (!fingers) this.#buttons.grip.hidden = true;
     this.handle.append(this.#picture, this.#number);

@@ -1,6 +1,6 @@
 // Scripts in files: those of the server's folder, and those of the person.
 import { save } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { messageOf, request } from "../server.js";
 
 const FILE = ".yaml";
@@ -12,13 +12,6 @@ const FILE = ".yaml";
  * @property {(text: string, name: string, asText: boolean) => Promise<void>} load
  * @property {(words: string, bad?: boolean) => void} report
  */
-
-/** @param {string} words @param {() => void} act @param {import("../instruments/shape.js").Attributes} fields */
-export const button = (words, act, fields = {}) => {
-  const control = html("button", { type: "button", ...fields }, words);
-  control.addEventListener("click", act);
-  return control;
-};
 
 export class Scripts {
   #sheet;

@@ -1,6 +1,6 @@
 // The Teach sheet: poses of the arm that are recorded, ordered, played and saved as a script.
 import { first, matches, sceneOf, styled, write } from "../dom.js";
-import { html, set } from "../instruments/shape.js";
+import { button, html, set } from "../instruments/shape.js";
 import { messageOf, readArm, readState } from "../server.js";
 import { thumbnail } from "../viser/pictures.js";
 import { Content } from "./content.js";
@@ -9,7 +9,7 @@ import { draggable } from "./order.js";
 import { Player } from "./player.js";
 import { MAX_POSES, MAX_TIMES, fingersOf, isPicture, poseOf, read, scriptOf } from "./poses.js";
 import { Row } from "./row.js";
-import { Scripts, button } from "./scripts.js";
+import { Scripts } from "./scripts.js";
 
 /** @typedef {import("./poses.js").Pose} Pose */
 const ID = "teach"; // id of the requests

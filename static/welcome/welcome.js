@@ -1,6 +1,6 @@
 // The first steps: a card over the scene with three things to try, each with one click.
 import { element, sceneOf, styled, write } from "../dom.js";
-import { html } from "../instruments/shape.js";
+import { button, html } from "../instruments/shape.js";
 import { messageOf, readArm, readState, request } from "../server.js";
 import { ScriptRun } from "../teach/run.js";
 
@@ -45,8 +45,7 @@ export class Welcome {
     this.#run = new ScriptRun(page.say, ID);
     const { status } = page.store;
     if (status?.scripts) this.#program = arm.gripper && arm.tools.grasp ? POUR : WAVE;
-    const close = html("button", { type: "button", "aria-label": "Close for good" }, "×");
-    close.addEventListener("click", () => this.#dismiss());
+    const close = button("×", () => this.#dismiss(), { "aria-label": "Close for good" });
     const list = html("ol", {});
     if (arm.default_tool) list.append(this.#step("drag", "Drag the arrows", "Move the tool by its coloured handle", () => this.#drag()));
     else list.append(this.#step("drag", "Turn a joint", "Drag a link of the arm, or a slider of the panel", () => this.#turn()));
@@ -83,10 +82,9 @@ export class Welcome {
   /** @param {string} name @param {string} title @param {string} about @param {() => void} act */
   #step(name, title, about, act) {
     const mark = html("span", { class: "mark" });
-    const button = html("button", { type: "button" }, mark, html("b", {}, title), html("small", {}, about));
-    button.addEventListener("click", act);
-    this.#steps[name] = { button, mark };
-    return html("li", {}, button);
+    const tries = button([mark, html("b", {}, title), html("small", {}, about)], act);
+    this.#steps[name] = { button: tries, mark };
+    return html("li", {}, tries);
   }
 
   /** @param {string} name */
