@@ -35,7 +35,6 @@ export class Parts {
   welcome = null;
   /** @type {import("../arm/arm.js").Arm | null} */
   #arm = null;
-  #hasPast = false; // whether the timeline is shown when the scene is drawn
   /** @type {Promise<import("../teach/teach.js").Teach> | null} */
   #teachLoads = null; // one sheet, also after two clicks
   /** @type {Promise<import("../welcome/welcome.js").Welcome> | null} */
@@ -57,7 +56,7 @@ export class Parts {
     page.store.follow((status) => this.#drawArm(status));
     onClick("timeline-button", () => {
       element("more", HTMLDialogElement).close();
-      this.showTimeline(!this.timeline?.shown);
+      this.showTimeline(true, !this.timeline?.open);
     });
     const help = element("help", HTMLDialogElement);
     onClick("people-button", () => {
@@ -78,7 +77,6 @@ export class Parts {
   begin() {
     const { kept, store } = this.#page;
     if (kept?.getItem(OPEN) === "yes") this.#showInstruments(true);
-    this.#hasPast = kept?.getItem(PAST) === "yes";
     let isFirst = true;
     store.follow(async ({ role }) => {
       if (!isFirst) return;
@@ -90,8 +88,6 @@ export class Parts {
 
   // The scene is drawn.
   async enterScene() {
-    if (this.#hasPast) this.showTimeline(true);
-    this.#hasPast = false;
     await this.#frame.rest;
     const { Stage } = await import("../scene/stage.js");
     this.stage ??= new Stage({ ...this.#page, edit: (name) => this.#editScript(name) });
@@ -112,11 +108,12 @@ export class Parts {
     teach.open(name, true);
   }
 
-  /** REC and the episodes, when the server records. @param {Page.Status} status */
+  /** REC, the episodes and the line of what was recorded, when the server records. @param {Page.Status} status */
   async #drawEpisodes(status) {
     if (!this.episodes && !status.episodes) return;
     await this.#frame.rest;
     const { Episodes } = await import("../episodes/episodes.js");
+    if (!this.episodes && this.#page.kept?.getItem(PAST) !== "no") this.showTimeline(true, false);
     this.episodes ??= new Episodes(this.#page);
     this.episodes.draw(this.#page.store.status ?? status);
   }
@@ -129,19 +126,18 @@ export class Parts {
     this.#arm.draw(this.#page.store.status ?? status);
   }
 
-  /** Show what was recorded, or fold it away. @param {boolean} shown */
-  async showTimeline(shown) {
-    mark("timeline-button", "aria-expanded", shown);
+  /** Show the line of what was recorded, `open` with its controls, or fold it away. @param {boolean} shown @param {boolean} open */
+  async showTimeline(shown, open) {
     this.#page.kept?.setItem(PAST, shown ? "yes" : "no");
     const { Timeline } = await import("../timeline/timeline.js");
-    this.timeline ??= new Timeline(element("timeline", HTMLElement), this.#page, () => this.showTimeline(false));
-    await this.timeline.show(shown);
+    this.timeline ??= new Timeline(element("timeline", HTMLElement), this.#page, () => this.showTimeline(false, false));
+    await this.timeline.show(shown, open);
   }
 
   /** Open the file of a recording in the timeline. @param {File} file */
   async replay(file) {
-    await this.showTimeline(true);
-    this.timeline?.open(file);
+    await this.showTimeline(true, true);
+    this.timeline?.replay(file);
   }
 
   // Who is connected, for admins.

@@ -1,9 +1,12 @@
 // The elements of the timeline: its track, its buttons and its lists.
-import { html, svg } from "../instruments/shape.js";
+import { write } from "../dom.js";
+import { button, html, svg } from "../instruments/shape.js";
 import { clock } from "../page/words.js";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const EXPORTS = [["csv", "CSV table"], ["rosbag2", "ROS 2 bag"], ["html", "HTML page"], ["mp4", "MP4 film"]];
+/** The words of each kind of mark. @type {Record<string, string>} */
+const KINDS = { stop: "Stop", clear_stop: "Stop cleared", driver: "Driver", program: "Script", step: "Motion", contact: "Contact", limit: "Limit", episode: "Episode" };
 const ICONS = { play: "M5.5 3.2v13.6L16.5 10z", pause: "M5 3.5h3.4v13H5zM11.6 3.5H15v13h-3.4z" };
 
 /** @param {keyof typeof ICONS} name */
@@ -16,11 +19,7 @@ export const option = (value, words) => html("option", { value }, words);
 const range = (name, label) => html("input", { type: "range", class: name, min: "0", max: "1", step: "any", "aria-label": label });
 
 /** @param {string} label @param {() => void} act @param {(Node | string)[]} content */
-function button(label, act, ...content) {
-  const control = html("button", { type: "button", title: label, "aria-label": label }, ...(content.length ? content : [label]));
-  control.addEventListener("click", act);
-  return control;
-}
+const titled = (label, act, ...content) => button(content.length ? content : label, act, { title: label, "aria-label": label });
 
 /**
  * What the buttons do.
@@ -42,34 +41,35 @@ export class Controls {
   events = html("select", { "aria-label": "Events" });
   file = html("input", { type: "file", accept: ".mcap", hidden: "", "aria-label": "File of a recording" });
   moment = html("time", { "aria-live": "off" });
+  pastWords = html("span", {}, "Shown as it was at ");
+  legend = html("p", { class: "legend" }, ...Object.entries(KINDS).map(([kind, words]) => html("span", { "data-kind": kind }, html("i", { class: kind }), words)));
   past = html("div", { id: "past", hidden: "" });
 
   /** @param {HTMLElement} box @param {Acts} acts */
   constructor(box, acts) {
-    this.play = button("Play", acts.play, icon("play"));
-    this.again = button("Run again the selected motion", acts.again, "Run again");
+    this.play = titled("Play", acts.play, icon("play"));
+    this.again = titled("Run again the selected motion", acts.again, "Run again");
     this.speed.value = "1";
-    const back = button("Back to live", acts.live);
+    const back = titled("Back to live", acts.live);
     back.className = "main";
-    this.past.append(html("p", { role: "status" }, "Playing back ", this.moment, ", arm is elsewhere"), back);
-    const fold = button("Fold the timeline away", acts.fold, "×");
+    this.past.append(html("p", { role: "status" }, this.pastWords, this.moment, ", arm is elsewhere"), back);
+    const fold = titled("Fold the timeline away", acts.fold, "×");
     fold.className = "fold";
     const track = html("div", { class: "track" }, this.marks, this.now, this.begin, this.end);
-    box.replaceChildren(
-      this.plot,
-      this.work,
-      html("div", { class: "row" }, this.play, this.clock, track, this.speed, this.events, this.of, this.second,
-        button("Save selection", acts.save, "Save", html("span", {}, " selection")),
+    const row = html("div", { class: "row" }, this.play, this.clock, this.speed, this.events, this.of, this.second,
+        titled("Save selection", acts.save, "Save", html("span", {}, " selection")),
         this.exports,
         this.again,
-        button("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
-        fold, this.file),
-    );
+        titled("Verify the selection: simulate it again and compare every tick", acts.verify, "Verify"),
+        this.legend, fold, this.file);
+    // From below: the track stays where it is when the rest is shown.
+    box.replaceChildren(html("div", { class: "body" }, track, row, this.work, this.plot));
   }
 
   /** Show whether the recording plays. @param {boolean} plays */
   showPlaying(plays) {
     this.play.replaceChildren(icon(plays ? "pause" : "play"));
+    write(this.pastWords, plays ? "Playing back " : "Shown as it was at ");
     for (const name of ["title", "aria-label"]) this.play.setAttribute(name, plays ? "Pause" : "Play");
   }
 }

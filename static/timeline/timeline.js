@@ -1,5 +1,5 @@
 // The timeline: what the server has recorded, or a file, shown in this window alone at any moment.
-import { sceneOf, styled, write } from "../dom.js";
+import { element, sceneOf, styled, write } from "../dom.js";
 import { html } from "../instruments/shape.js";
 import { addressed } from "../page/words.js";
 import { messageOf } from "../server.js";
@@ -45,6 +45,8 @@ export class Timeline {
   /** @type {((name: string) => Promise<void>) | undefined} */
   #use; // what a chosen file is opened for
   #hidden = false; // whether the present is hidden
+  #pinned = false; // whether the controls are shown without a pointer or focus on the line
+  #news = 0; // looks at what was recorded that are due, because the status has changed
 
   /** `fold` folds the timeline away. @param {HTMLElement} box @param {Page.Context} page @param {() => void} fold */
   constructor(box, page, fold) {
@@ -67,6 +69,8 @@ export class Timeline {
     let stopped = Boolean(page.store.status?.stopped);
     /** @param {Page.Status | null} status */
     const follow = (status) => {
+      this.#news = 2;
+      box.classList.toggle("rec", Boolean(status?.episodes?.running));
       if (status?.stopped && !stopped) this.live();
       stopped = Boolean(status?.stopped);
       // Scripts do not move a robot that has only joints.
@@ -76,21 +80,30 @@ export class Timeline {
     page.store.follow(follow);
   }
 
-  get shown() {
-    return !this.#box.hidden;
+  get open() {
+    return this.#box.classList.contains("open");
   }
 
-  /** Show the timeline or fold it away. @param {boolean} shown */
-  async show(shown) {
+  /** @param {boolean} open */
+  #grow(open) {
+    this.#box.classList.toggle("open", open);
+    element("timeline-button", HTMLElement).setAttribute("aria-expanded", String(open));
+  }
+
+  /** Show the line, `open` with its controls, or fold it away. @param {boolean} shown @param {boolean} open */
+  async show(shown, open) {
     this.#box.hidden = !shown;
+    this.#pinned = open;
+    this.#grow(open);
     clearInterval(this.#timer);
-    if (!shown) return this.live();
-    this.#timer = setInterval(() => document.hidden || this.#refresh(), REFRESH);
+    if (!open) this.live();
+    if (!shown) return;
+    this.#timer = setInterval(() => document.hidden || (this.#news && this.#refresh()), REFRESH);
     await this.#refresh();
   }
 
   /** Open a file that was chosen or dropped. @param {File} file */
-  async open(file, use = (/** @type {string} */ name) => this.#choose(name)) {
+  async replay(file, use = (/** @type {string} */ name) => this.#choose(name)) {
     this.#page.toast(`Opening ${file.name} …`);
     try {
       const { name, note } = await api.open(file);
@@ -112,6 +125,7 @@ export class Timeline {
     this.#hidden = false;
     this.#scene?.hideNodes(null);
     this.#part.past.hidden = true;
+    this.#grow(this.#pinned);
     api.hide(this.#page.name).catch(() => {});
     this.#draw();
   }
@@ -146,7 +160,11 @@ export class Timeline {
     file.addEventListener("change", () => {
       const chosen = file.files?.[0];
       file.value = "";
-      if (chosen) this.open(chosen, this.#use);
+      if (chosen) this.replay(chosen, this.#use);
+    });
+    // A finger opens the thin line first; a pointer is over it then, and the line has grown.
+    this.#box.addEventListener("click", () => {
+      if (!this.open && matchMedia("(hover: none)").matches) this.show(true, true);
     });
   }
 
@@ -171,6 +189,7 @@ export class Timeline {
   }
 
   async #refresh() {
+    this.#news -= 1;
     try {
       const of = this.#of;
       const { spans, marks } = await api.timeline(of);
@@ -237,6 +256,7 @@ export class Timeline {
     if (!this.#spans.length) return this.#page.toast(NOTHING);
     this.#t = t;
     this.#part.past.hidden = false;
+    this.#grow(true);
     this.#draw();
     this.#request();
   }
@@ -341,6 +361,20 @@ export class Timeline {
     return [timeInWords(t), ...events].join(", ");
   }
 
+  /** Return the bars of the episodes on an axis of this length [s]. @param {number} length */
+  #episodes(length) {
+    const marks = this.#marks.filter(([, kind]) => kind === "episode");
+    return marks.flatMap(([t, , words]) => {
+      const [, name] = /^(Episode \d+) begins/.exec(words) ?? [];
+      if (!name) return [];
+      const [end] = marks.find(([, , other]) => other === `${name} ends`) ?? [Infinity];
+      const bar = html("b", { title: words });
+      const [from, to] = [t, end].map((moment) => (100 * placeOf(this.#spans, moment)) / length);
+      bar.style.cssText = `left: ${from}%; width: ${to - from}%`;
+      return [bar];
+    });
+  }
+
   #drawMarks() {
     const length = lengthOf(this.#spans) || 1;
     const shown = this.#marks.map(([t, kind, words]) => {
@@ -350,8 +384,9 @@ export class Timeline {
       mark.addEventListener("click", () => this.#seek(t));
       return mark;
     });
-    this.#part.marks.replaceChildren(...shown);
-    const { events } = this.#part;
+    const { events, legend } = this.#part;
+    this.#part.marks.replaceChildren(...this.#episodes(length), ...shown);
+    for (const entry of legend.children) entry.toggleAttribute("hidden", !this.#marks.some(([, kind]) => kind === entry.getAttribute("data-kind")));
     // An open list keeps its place.
     if (document.activeElement === events && events.options.length === this.#marks.length + 1) return;
     events.replaceChildren(option("", "Events"), ...this.#marks.toReversed().map(([t, , words]) => option(t, `${timeInWords(t)} ${words}`)));

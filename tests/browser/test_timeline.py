@@ -174,6 +174,47 @@ def test_past_is_shown_in_one_window_until_stop(
     assert page.errors == []
 
 
+def test_line_grows_under_the_pointer_and_plays_only_while_it_says_so(
+    server: AppServer, open_page: OpenPage, artefacts: Path
+) -> None:
+    page = open_page(server.url, nodes=("/arm",), window=WIDE)
+    line, note = page.page.locator("#timeline"), page.page.locator("#past")
+    line.wait_for()
+    page.page.wait_for_function("() => Number(document.querySelector('#timeline .now')?.max) > 2")
+    play = line.get_by_label("Play", exact=True)
+    assert not play.is_visible()
+    thin, scene = line.bounding_box(), page.page.locator("#scene").bounding_box()
+    assert thin is not None
+    assert (thin["width"], thin["height"]) == (WIDE[0], 13.0)
+    page.page.mouse.move(0.5 * WIDE[0], WIDE[1] - 5.0)
+    play.wait_for()
+    # The scene keeps its size, and so its picture.
+    assert page.page.locator("#scene").bounding_box() == scene
+    shown = line.locator(".legend span:visible").all_inner_texts()
+    assert {"Stop", "Stop cleared", "Driver"} <= set(shown)
+    assert "Contact" not in shown
+    page.keep(artefacts / "timeline-grown.png")
+    page.page.mouse.move(0.5 * WIDE[0], 0.5 * WIDE[1])
+    play.wait_for(state="hidden")
+    line.get_by_label(NOW).focus()
+    play.wait_for()
+    page.page.keyboard.press("Home")
+    page.wait_until(lambda: note.inner_text().startswith("Shown as it was at "), "the note")
+    play.click()
+    page.wait_until(lambda: note.inner_text().startswith("Playing back "), "playing")
+    line.get_by_label("Pause", exact=True).click()
+    page.wait_until(lambda: note.inner_text().startswith("Shown as it was at "), "the rest")
+    # Folded away, it stays so.
+    line.get_by_label("Fold the timeline away").click()
+    line.wait_for(state="hidden")
+    page.page.reload()
+    page.page.locator("#episodes-button").wait_for()
+    page.page.wait_for_timeout(300)
+    assert not line.is_visible()
+    page.page.evaluate("localStorage.clear()")
+    assert page.errors == []
+
+
 @pytest.mark.long
 def test_other_windows_stay_live_and_acting_returns_to_live(
     server: AppServer, open_page: OpenPage

@@ -125,5 +125,7 @@ def _finding(form: Mapping[str, Any]) -> tuple[str, str] | None:
 
 
 def _episode(form: Mapping[str, Any]) -> str:
-    words = (form.get("kind"), form.get("task"), form.get("outcome"))
-    return "Episode: " + ", ".join(str(word) for word in words if word)
+    name, kind, task = f"Episode {form.get('number')}", form.get("kind"), form.get("task")
+    if kind == "begun":
+        return f"{name} begins: {task}" if task else f"{name} begins"
+    return f"{name} ends" if kind == "ended" else f"{name}: {form.get('outcome')}, {kind}"
