@@ -9,8 +9,12 @@ import pytest
 
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.robot import Robot
+from katana450.assembly.robot_session import find_robot
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.server.view.cameras import initial_camera
 from katana450.server.viser_bridge.presets import CAMERA_POSES, FOV, Preset
+from katana450.settings import Settings
+from tests.robot.test_other_arms import PINCHER
 
 ASPECT = 1.2
 """Width to height of the scene in a window of 1280 by 800 beside the panel."""
@@ -37,6 +41,17 @@ def points_on(robot: Robot, q: FloatArray) -> FloatArray:
         R, p = T[link.name][:3, :3], T[link.name][:3, 3]
         points += [shape.mesh.vertices @ R.T + p for shape in link.collisions]
     return np.concatenate(points)
+
+
+def test_smaller_arm_of_five_axes_is_seen_from_nearer(robot: Robot) -> None:
+    assert initial_camera(robot) is None
+    described, _, _ = find_robot(Settings(), PINCHER, None)
+    look = initial_camera(described)
+    assert described.require_arm().kinematics.is_pitched
+    assert look is not None
+    whole = CAMERA_POSES[Preset.FREE]
+    distance = float(np.linalg.norm(look.eye - look.target))
+    assert distance < 0.8 * math.dist(whole.position, whole.target)
 
 
 @pytest.mark.parametrize("preset", CAMERA_POSES)

@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from katana450.arm.control.state.state import State
-from katana450.arm.robot.initial_camera import fitted
+from katana450.arm.robot.initial_camera import InitialCamera, camera, fitted
 from katana450.arm.robot.robot import Robot
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
@@ -86,6 +86,13 @@ def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
     corners = np.array(list(itertools.product(*np.transpose(robot.bounds).tolist())))
     whole = fitted(corners, np.subtract(look.target, look.position))
     return CameraPose(_triple(whole.eye), _triple(whole.target))
+
+
+def initial_camera(robot: Robot) -> InitialCamera | None:
+    """Return the first camera of a page; None for that of the Katana450 and arms like it."""
+    arm = robot.arm
+    is_alike = arm is not None and arm.kinematics.is_pitched and scale_of(robot) == 1.0
+    return None if is_alike else camera(robot)
 
 
 def scale_of(robot: Robot) -> float:

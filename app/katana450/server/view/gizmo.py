@@ -39,7 +39,10 @@ from katana450.server.viser_bridge.guard import WORKSPACE
 from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
 
 SIZE = 0.13
-"""Length [m] of the arrows: they are clear of the gripper and stay within the picture."""
+"""Length [m] of the arrows: they are clear of the gripper and stay within the picture.
+
+Those of a larger robot are longer, because it is seen from farther away.
+"""
 
 RINGS = 1.6
 """Ratio of ring size to arrow size: the arcs end just outside the arrow heads."""
@@ -98,6 +101,7 @@ class Gizmo:
         arm: MountedArm,
         gestures: GestureGate,
         current: Callable[[], State],
+        scale: float = 1.0,
     ) -> None:
         """Add the gizmo to the scene.
 
@@ -106,7 +110,9 @@ class Gizmo:
             arm: The arm of the gizmo.
             gestures: The path of gestures to the arm.
             current: Returns the newest state.
+            scale: The size of the robot as a multiple of that of the Katana450.
         """
+        self._size = SIZE * max(scale, 1.0)
         self._arm = arm
         self._gestures = gestures
         self._current = current
@@ -119,7 +125,7 @@ class Gizmo:
         bounds = ((-WORKSPACE, WORKSPACE),) * 3
         self._move = server.scene.add_transform_controls(
             "/target/move",
-            scale=SIZE,
+            scale=self._size,
             line_width=3.5,
             disable_rotations=True,
             disable_sliders=True,
@@ -148,13 +154,12 @@ class Gizmo:
         """True if the rings are pitch and roll."""
         return self._arm.kinematics.turn is Turn
 
-    @staticmethod
     def _ring(
-        server: viser.ViserServer, name: str, axes: tuple[bool, bool, bool]
+        self, server: viser.ViserServer, name: str, axes: tuple[bool, bool, bool]
     ) -> viser.TransformControlsHandle:
         return server.scene.add_transform_controls(
             name,
-            scale=RINGS * SIZE,
+            scale=RINGS * self._size,
             line_width=5.0,
             active_axes=axes,
             disable_axes=True,

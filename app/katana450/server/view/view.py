@@ -13,7 +13,6 @@ from katana450.arm.control.session.session import Session
 from katana450.arm.control.state.messages import title
 from katana450.arm.control.state.modes import JointTarget, PoseTarget
 from katana450.arm.control.state.state import State, Status
-from katana450.arm.robot.initial_camera import camera
 from katana450.arm.robot.mounted_arm import MountedArm
 from katana450.arm.robot.object_meshes import Meshes
 from katana450.arm.robot.props import load_props
@@ -21,7 +20,7 @@ from katana450.arm.robot.robot import Robot
 from katana450.arm.runtime.pipes.state_publisher import Snapshot, StatePublisher
 from katana450.maths.geometry.arrays import FloatArray
 from katana450.maths.kinematics.forward import forward
-from katana450.server.view.cameras import Cameras
+from katana450.server.view.cameras import Cameras, initial_camera, scale_of
 from katana450.server.view.controls import GestureGate
 from katana450.server.view.display_options import add_views
 from katana450.server.view.gizmo import Gizmo
@@ -77,11 +76,12 @@ class ToolNodes:
         arm: MountedArm,
         gestures: GestureGate,
         current: Callable[[], State],
+        scale: float,
     ) -> None:
         """Add the nodes to the scene; see ``Gizmo``."""
         self._arm = arm
         self._gap = Gap(server)
-        self.gizmo = Gizmo(server, arm, gestures, current)
+        self.gizmo = Gizmo(server, arm, gestures, current, scale)
         self._goal: FloatArray | None = None
         self._tool = ""
         self._T_base_goal = np.eye(4)
@@ -154,11 +154,15 @@ class View(ViewUpdater):
         self._tool: ToolNodes | None = None
         if robot.arm is not None:
             self._tool = ToolNodes(
-                server, robot.arm, gestures, lambda: state_publisher.snapshot.state
+                server,
+                robot.arm,
+                gestures,
+                lambda: state_publisher.snapshot.state,
+                scale_of(robot),
             )
         self._cameras = Cameras(server, robot)
-        if self._tool is None or not self._tool.gizmo.is_five_axis:
-            look = camera(robot)
+        look = initial_camera(robot)
+        if look is not None:
             server.initial_camera.position, server.initial_camera.look_at = look.eye, look.target
         self.show(state_publisher.snapshot)
 
