@@ -39,7 +39,8 @@ def page(arm: MountedArm, state: State, display: PoseDisplay) -> str:
     nearest = nearest_limit(chain, distances)
     limit = limit_text(nearest, axis_names(chain.names)[nearest], float(distances[nearest]))
     return (
-        f"<div class='k450'><table><thead><tr><th>{escape(state.tool)} in {display.frame_name}</th>"
+        "<div class='k450'><table class='pose'><thead><tr>"
+        f"<th>{escape(state.tool)} in {display.frame_name}</th>"
         f"<th>now</th><th>goal</th><th></th></tr></thead><tbody>{rows}</tbody></table>"
         f"<table class='at-once'>{_row('limit', 'nearest limit', limit)}</table></div>"
     )
