@@ -24,7 +24,7 @@ const BIG = ["broad", "large", "wide"];
 // Return [{id, title, sizes, shown, element, draw(state, loop), knob?, plot?}].
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Plotted & { say: Page.Say }} page @returns {Instrument[]} */
 export function instruments(arm, gripper, { say, history, groups, view }) {
-  return [...knobs(arm, gripper, say), ...(arm.touch ? [pads()] : []), ...gauges(arm), ...plots(arm, gripper, history, groups, view)];
+  return [...knobs(arm, gripper, say), ...(arm.touch ? [pads()] : []), ...gauges(arm, gripper), ...plots(arm, gripper, history, groups, view)];
 }
 
 /** @param {Api.Arm} arm @param {Fingers | null} gripper @param {Page.Say} say */
@@ -99,8 +99,8 @@ function gauge(id, title, options, of) {
 /** @param {number} value */
 const one = (value) => signed(value, 1);
 
-/** @param {Api.Arm} arm @returns {Instrument[]} */
-function gauges(arm) {
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @returns {Instrument[]} */
+function gauges(arm, gripper) {
   const read = readings(arm);
   const rows = arm.joints.map((_, i) => ({ label: `Axis ${i + 1}`, limit: arm.speed[i] * read[i].of }));
   const units = [...new Set(read.map(({ mark }) => `${mark.trim()}/s`))];
@@ -121,12 +121,12 @@ function gauges(arm) {
   );
   // The other gauges need a tool, which a mechanism of joints does not have.
   if (arm.joints_only) return [rates, late];
-  const [clearance, ...others] = toolGauges(arm);
+  const [clearance, ...others] = toolGauges(arm, gripper);
   return [clearance, rates, ...others, late];
 }
 
-/** @param {Api.Arm} arm @returns {Instrument[]} */
-function toolGauges(arm) {
+/** @param {Api.Arm} arm @param {Fingers | null} gripper @returns {Instrument[]} */
+function toolGauges(arm, gripper) {
   return [
     gauge(
       "clearance",
@@ -175,12 +175,16 @@ function toolGauges(arm) {
           ),
         ]
       : []),
-    gauge(
-      "touch",
-      "Touch",
-      { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
-      ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
-    ),
+    ...(gripper
+      ? [
+          gauge(
+            "touch",
+            "Touch",
+            { low: 0, high: 2, unit: "of 2 fingers", text: (value) => signed(value, 0) },
+            ({ touching, held }) => [touching.length, held === null ? "empty hand" : `holds ${spoken(held)}`],
+          ),
+        ]
+      : []),
   ];
 }
 

@@ -77,7 +77,21 @@ def test_instruments_are_those_of_the_arm(six: ViserPage) -> None:
         "5 wrist 2",
         "6 wrist 3",
     ]
-    assert not six.page.locator("#instruments .card[data-id=pads]").count()
+    # It has no hand.
+    for name in ("pads", "touch", "gripper"):
+        assert not six.page.locator(f"#instruments .card[data-id={name}]").count()
+    assert not six.errors
+
+
+def test_steps_of_joints_are_in_rows_whatever_their_names(six: ViserPage) -> None:
+    six.page.click("#jog-button")
+    six.page.get_by_text("Joints", exact=True).click()
+    buttons = six.page.locator("#steps button")
+    buttons.nth(11).wait_for(state="visible")
+    boxes = [button.bounding_box() for button in buttons.all()]
+    places = [(round(box["y"]), round(box["height"])) for box in boxes if box is not None]
+    rows = [places[column : column + 2] for column in range(0, 12, 2)]
+    assert rows == [rows[0]] * 3 + [rows[3]] * 3
     assert not six.errors
 
 
