@@ -8,14 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from katana450.arm.control.arm import ArmModel
+from katana450.arm.control.objects.gripper_model import NO_GRIPPER
 from katana450.assembly.robot_session import describe_robot
 from katana450.errors import ConfigurationError, InputError
+from katana450.extensions.general_arms.driven_tool import DrivenTool
 from katana450.extensions.programs.building.actions import FollowPlan
 from katana450.extensions.programs.script.script import parse
 from katana450.extensions.programs.script.script_files import LIBRARY, Scripts
 from katana450.extensions.programs.script.teach import TaughtPose, taught
 from katana450.resources import URDF_PATH
 from katana450.settings import Settings
+from tests.general_arms.published_arms import UR5E
 from tests.programs.conftest import Stage
 
 TAUGHT = """\
@@ -94,7 +98,7 @@ def test_a_saved_script_is_listed(tmp_path: Path) -> None:
 
 
 def test_scripts_of_the_library_are_offered_to_arms_with_their_tools(tmp_path: Path) -> None:
-    """An arm without a tool `flange` is not offered the circle of the Katana, nor its pour."""
+    """The circle of the Katana, and its pour, are for arms of five axes with the same tools."""
     scripts, katana = Scripts(tmp_path), describe_robot(Settings(), URDF_PATH, None).session
     tools = {"tool0": katana.require_arm().chain.M}
     arm = replace(katana.require_arm(), tools=tools, default_tool="tool0")
@@ -102,6 +106,8 @@ def test_scripts_of_the_library_are_offered_to_arms_with_their_tools(tmp_path: P
     assert scripts.offered(arm) == ("Mine", "Turn")
     bare = describe_robot(replace(Settings(), bare=True), URDF_PATH, None).session.require_arm()
     assert scripts.offered(bare) == ("Mine", "Circle", "Turn")
+    six = ArmModel(UR5E, {"flange": UR5E.M}, "flange", NO_GRIPPER, to_tool=DrivenTool)
+    assert scripts.offered(six) == ("Mine", "Turn")
     assert len(scripts.offered(None)) == len(scripts.paths)
 
 

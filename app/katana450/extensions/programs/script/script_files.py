@@ -68,7 +68,7 @@ class Scripts:
         return tuple(
             name
             for name, path in self.paths.items()
-            if arm is None or path.parent != LIBRARY or parse(script_text(path)).suits(arm)
+            if arm is None or path.parent != LIBRARY or _is_for(path, arm)
         )
 
     def text(self, name: str) -> str:
@@ -90,6 +90,12 @@ class Scripts:
             raise InputError(f"A script {name!r} exists already. Choose another name.")
         write_files({path: writer_of(text.encode())})
         return path
+
+
+def _is_for(path: Path, arm: ArmModel) -> bool:
+    """Return whether ``arm`` can do a script of the library: one with a tool is for five axes."""
+    script = parse(script_text(path))
+    return script.suits(arm) and (script.tool is None or arm.kinematics.is_pitched)
 
 
 def library_file(name: str) -> Path:
