@@ -23,6 +23,7 @@ from tests.browser.server import AppServer
 from tests.browser.session import Truth, prepare
 from tests.browser.sight import overlap
 from tests.browser.sizes import PHONE, SIZES, WIDE, in_sizes_and_schemes
+from tests.browser.test_accessibility import AXE, findings
 
 GHOST = "/playback/0/arm"
 LINK = "/arm/base_link/arm_base_link/pan_link"
@@ -345,6 +346,8 @@ def test_timeline_covers_nothing(
     assert min(small) >= (32.0 if size == "wide" else 44.0) - 0.5
     cut = page.page.locator("#timeline select").evaluate_all(CUT)
     assert cut == []
+    if AXE.exists():
+        assert findings(page.page) == []
     assert page.errors == []
 
 
