@@ -18,7 +18,7 @@ from katana450.maths.kinematics.forward import forward
 from katana450.maths.motion.arm_angle import elbow_points
 from katana450.resources import URDF_PATH
 from katana450.server.view.gizmo import RINGS as RING_RATIO
-from katana450.server.view.gizmo import SIZE, Gizmo
+from katana450.server.view.gizmo import MIN_SCALE, SIZE, Gizmo
 from katana450.settings import Settings
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.published_arms import PANDA, PINCHERX_100, UR5E
@@ -40,10 +40,10 @@ class Drag:
     client_id: int = 1
 
 
-def test_handle_of_a_larger_robot_is_larger(server: viser.ViserServer) -> None:
+def test_handle_has_the_size_of_the_robot(server: viser.ViserServer) -> None:
     robot, session, _ = find_robot(Settings(), URDF_PATH, None)
     arm, state = robot.require_arm(), session.begin(session.ready, 0.0, 0.0)
-    for scale, length in ((0.6, SIZE), (1.0, SIZE), (1.5, 1.5 * SIZE)):
+    for scale, length in ((0.6, MIN_SCALE * SIZE), (0.9, 0.9 * SIZE), (1.5, 1.5 * SIZE)):
         gizmo = Gizmo(server, arm, RecordedGestures(), lambda: state, scale)
         assert gizmo._move.scale == pytest.approx(length)
         assert gizmo._rings["roll"].scale == pytest.approx(RING_RATIO * length)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import threading
 
 import numpy as np
@@ -11,7 +12,9 @@ import viser
 from katana450.arm.control.state.state import State
 from katana450.arm.robot.initial_camera import InitialCamera, camera, fitted
 from katana450.arm.robot.robot import Robot
+from katana450.maths.geometry import screws
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.kinematics.chain import Chain
 from katana450.maths.kinematics.forward import forward
 from katana450.server.viser_bridge.presets import CAMERA_POSES, CameraPose, Preset
 
@@ -68,14 +71,29 @@ def camera_pose(preset: Preset, robot: Robot, state: State) -> CameraPose:
     arm = robot.arm
     chain = arm.chain_to(state.tool)
     T = arm.T_base_shoulder @ forward(chain, state.q)
-    p, x, z = T[:3, 3], T[:3, 0], np.array([0.0, 0.0, 1.0])
+    out = outward(chain)
+    p, x, z = T[:3, 3], T[:3, :3] @ out, np.array([0.0, 0.0, 1.0])
     # "Above" lies in the arm's plane and does not depend on the roll of the tool.
     up = z - (z @ x) * x
     size = float(np.linalg.norm(up))
-    up = up / size if size > MIN_UP_SINE else -T[:3, 2]
+    up = up / size if size > MIN_UP_SINE else -T[:3, 2 if abs(out[2]) < ALONG else 1]
     scale = scale_of(robot)
     behind, above, distance = scale * BEHIND, scale * ABOVE, scale * AHEAD
     return CameraPose(_triple(p - behind * x + above * up), _triple(p + distance * x))
+
+
+def outward(chain: Chain) -> FloatArray:
+    """Return the unit vector (3,) in the frame of the tool in which the tool points.
+
+    It is that of the last axis, away from the axis before it; x if that is not along the tool.
+    """
+    before, last = chain.S[:3, -2], chain.S[:3, -1]
+    out = chain.M[:3, 3] - screws.point_on(chain.S[:, -2])
+    out -= (out @ before) * before
+    along = float(last @ out)
+    if abs(along) < ALONG * float(np.linalg.norm(out)):
+        return np.array((1.0, 0.0, 0.0))
+    return np.asarray(chain.M[:3, :3].T @ (math.copysign(1.0, along) * last))
 
 
 def fixed_pose(preset: Preset, robot: Robot) -> CameraPose:
@@ -101,6 +119,9 @@ def scale_of(robot: Robot) -> float:
     scale = float(np.linalg.norm(high - low)) / SIZE
     return scale if abs(scale - 1.0) > SIMILAR else 1.0
 
+
+ALONG = 0.5
+"""Cosine of the angle of an axis to a direction from which on it is along it."""
 
 MIN_UP_SINE = 0.05
 """Sine of the angle between tool axis and vertical below which the tool's own axis gives "up"."""

@@ -41,8 +41,11 @@ from katana450.server.viser_bridge.posing import Point, Quaternion, place, turn
 SIZE = 0.13
 """Length [m] of the arrows: they are clear of the gripper and stay within the picture.
 
-Those of a larger robot are longer, because it is seen from farther away.
+Those of a larger or smaller robot are so too, because it is seen from farther away or nearer.
 """
+
+MIN_SCALE = 0.8
+"""Least size of the handle as a multiple of the Katana450's: a finger must find it."""
 
 RINGS = 1.6
 """Ratio of ring size to arrow size: the arcs end just outside the arrow heads."""
@@ -112,7 +115,7 @@ class Gizmo:
             current: Returns the newest state.
             scale: The size of the robot as a multiple of that of the Katana450.
         """
-        self._size = SIZE * max(scale, 1.0)
+        self._size = SIZE * max(scale, MIN_SCALE)
         self._arm = arm
         self._gestures = gestures
         self._current = current
