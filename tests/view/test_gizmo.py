@@ -17,8 +17,8 @@ from katana450.maths.geometry import so3
 from katana450.maths.kinematics.forward import forward
 from katana450.maths.motion.arm_angle import elbow_points
 from katana450.resources import URDF_PATH
-from katana450.server.view.gizmo import RINGS as RING_RATIO
 from katana450.server.view.gizmo import MIN_SCALE, SIZE, Gizmo
+from katana450.server.view.gizmo import RINGS as RING_RATIO
 from katana450.settings import Settings
 from tests.general_arms.chain_urdf import chain_urdf
 from tests.general_arms.published_arms import PANDA, PINCHERX_100, UR5E
