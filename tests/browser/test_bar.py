@@ -91,6 +91,22 @@ def test_stop_is_always_visible_and_the_largest_button(
     page.page.set_viewport_size(before)
 
 
+def test_nothing_overlaps_at_twice_the_size(own_page: ViserPage, artefacts: Path) -> None:
+    """Show the page as zoomed windows of 1280, 1440 and 1920 px do."""
+    page, before = own_page.page, own_page.page.viewport_size
+    assert before is not None
+    parts = "header :is(button, select, input, p):visible"
+    for width, height in ((640, 400), (720, 450), (960, 540)):
+        page.set_viewport_size({"width": width, "height": height})
+        own_page.keep(artefacts / f"bar-zoomed-{width}.png")
+        assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+        boxes = [box for part in page.locator(parts).all() if (box := part.bounding_box())]
+        assert len(boxes) > 8
+        for one, other in itertools.combinations(boxes, 2):
+            assert not overlap(one, **other), (width, one, other)
+    page.set_viewport_size(before)
+
+
 WATCH_SHIFTS = """() => {
   window.shifts = [];
   new PerformanceObserver(list => {
