@@ -199,8 +199,8 @@ export class Timeline {
       this.#marks = marks.map(([t, kind, words]) => [t, kind, addressed(words, name)]);
       this.#failed = false;
     } catch (error) {
-      // Once, not each time.
-      if (!this.#failed) this.#page.toast(messageOf(error));
+      // Once, not each time, and to a person who looks at it.
+      if (!this.#failed && this.open) this.#page.toast(messageOf(error));
       this.#failed = true;
     }
     this.#drawMarks();

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import copy
 import os
 import random
 import re
@@ -209,7 +210,8 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     durations: list[float] = []
 
     def put(record: TickRecord) -> None:
-        ring.put(record)
+        # The process that records has a copy of the plan with each message.
+        ring.put(copy.deepcopy(record))
         if (following := record.state.following) is not None:
             durations.append(following.plan.duration_at(record.state.speed))
 
@@ -222,6 +224,7 @@ def test_marks_tell_stops_drivers_and_plans(tmp_path: Path) -> None:
     assert kinds.count("stop") == 1
     assert kinds.index("driver") < kinds.index("stop") < kinds.index("clear_stop")
     assert kinds.index("clear_stop") < kinds.index("step")
+    assert kinds.count("step") == 1
     words = {mark.kind: mark.text for mark in marks}
     assert words["stop"] == "Ada pressed STOP."
     # The seconds of a motion are those that it takes at its speed.
