@@ -20,6 +20,7 @@ from katana450.maths.collision.shape import box, cylinder
 from katana450.maths.collision.world import CollisionWorld, Part, obstacle
 from katana450.maths.geometry import se3
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.curve import Curve
 
 TICK = 0.01
 SLIGHTLY = 2e-5  # m: what the search for nearest points leaves open, many ticks together
@@ -164,3 +165,32 @@ def test_driven_at_random_at_full_speed_the_arm_never_comes_too_near(
 def test_unchecked_path_is_shorter_than_any_part(world: CollisionWorld) -> None:
     thinnest = min(2.0 * float(half.min()) for half in world.box_half)
     assert thinnest > MAX_UNCHECKED_PATH
+
+
+@pytest.mark.parametrize(
+    ("sag", "clear"), [(0.0, True), (0.9e-3, True), (0.999e-3, True), (1.001e-3, False)]
+)
+def test_a_curve_is_clear_between_its_ends_too(sag: float, clear: bool) -> None:
+    # A block slides along a wall, 6 mm from it at both ends, and ``sag`` [m] nearer in the middle.
+    axes = np.eye(3)
+    linkage = Linkage(
+        [
+            RigidGroup(0, np.eye(4), axes[0], 0, slides=True),
+            RigidGroup(1, np.eye(4), axes[1], 1, slides=True),
+        ]
+    )
+    parts = [
+        Part("block", 2, (at(0.0, 0.016, 0.0),), (box((0.02, 0.02, 0.02)),)),
+        obstacle("wall", at(0.0, -0.01, 0.0), box((0.2, 0.02, 0.2))),
+    ]
+    world = CollisionWorld(linkage, parts, [(0, 1)])
+    start, end = np.zeros(2), np.array((0.02, 0.0))
+    curve = Curve(
+        lambda part: np.array((0.02 * part, -4.0 * sag * part * (1.0 - part))),
+        lambda low, high: np.array((0.0, 8.0 * sag * (high - low) ** 2)),
+    )
+    assert (advance(world, start, end, MIN_STOP_TIME).x == end).all()
+    step = advance(world, start, end, MIN_STOP_TIME, curve=curve)
+    assert step.stopped != clear
+    assert (step.x == (end if clear else start)).all()
+    assert clear == (step.contact is None)

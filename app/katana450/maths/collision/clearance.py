@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from katana450.maths.collision.contact import Contact
 from katana450.maths.collision.world import PATH_LENGTH_FACTOR, CollisionWorld, PlacedWorld
 from katana450.maths.geometry.arrays import FloatArray
+from katana450.maths.geometry.curve import Curve
 
 MIN_CLEARANCE = 0.005
 """Distance [m] that the arm keeps from itself and from everything else."""
@@ -30,6 +32,9 @@ MIN_TRAVEL = 1e-5
 
 MAX_UNCHECKED_PATH = 1e-3
 """Paths shorter than this [m] are not checked in between: no part is as thin."""
+
+MAX_PLACES = 100
+"""Number of places on a curve that are checked before it counts as not clear."""
 
 STEP_ATTEMPTS = 6
 """Number of fractions of a step that are tried before the arm waits."""
@@ -72,6 +77,7 @@ def advance(
     towards: FloatArray,
     dt: float,
     keep: FloatArray | None = None,
+    curve: Curve | None = None,
 ) -> Advance:
     """Move from ``x`` (k,) [rad or m] straight to ``towards``, as far as clearance allows.
 
@@ -81,25 +87,34 @@ def advance(
     other between the ends of a step either. A distance changes by no more than the bodies travel,
     so a case that the ends leave open is checked in the middle, and again in the halves. ``keep``
     (p,) [m] is the distance that each pair keeps, in place of MIN_CLEARANCE or that of close pairs.
+    A ``curve`` from ``x`` to ``towards`` is allowed if it and the straight path are; no part of it
+    is allowed by itself.
     """
-    if (towards == x).all():
+    change = np.abs(towards - x) + (0.0 if curve is None else 0.5 * curve.bend(0.0, 1.0))
+    if not change.any():
         return Advance(x)
     minimum = world.kept(MIN_CLEARANCE) if keep is None else keep
     start = world.at(x)
-    travel = world.travel(start, x, towards)
+    travel = world.travel(start, x, towards) if curve is None else _travel(world, start, x, change)
     part = min(dt / MIN_STOP_TIME, 1.0)
     # Pairs so far apart that the whole path does not matter need no closer check.
     free = minimum + travel / part
     free[travel == 0.0] = -np.inf
     path = _Path(world, x, towards)
-    for pair in start.nearer_than(free)[0].tolist():
-        before = start.distance(pair)
-        if before < free[pair]:
-            path.active.append(
-                _ActivePair(pair, float(travel[pair]), before, part, float(minimum[pair]))
-            )
-    if not path.active:
+    near = start.nearer_than(free)[0].tolist()
+    distances = {pair: d for pair in near if (d := start.distance(pair)) < free[pair]}
+    if not distances:
         return Advance(towards)
+    bent = None
+    if curve is not None:
+        bent = _BentPath(world, curve, (x, start), (towards, path.at(1.0)), distances, minimum)
+        if not bent.open_pairs(0.0, 1.0, list(distances)):
+            return Advance(towards)
+        travel = world.travel(start, x, towards)
+    path.active = [
+        _ActivePair(pair, float(travel[pair]), before, part, float(minimum[pair]))
+        for pair, before in distances.items()
+    ]
     fraction, held = 1.0, None
     for _ in range(STEP_ATTEMPTS):
         end = path.at(fraction)
@@ -115,6 +130,9 @@ def advance(
         ):
             held = passed
             fraction *= 0.5
+        elif held is None and bent is not None:
+            contact = bent.contact(list(distances))
+            return Advance(towards) if contact is None else Advance(x, contact, stopped=True)
         else:
             contact = None if held is None else end.contact(held.pair)
             return Advance(path.x(fraction), contact)
@@ -139,6 +157,34 @@ def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -
     )
     pairs, _ = placed.nearer_than(needed)
     return all(placed.distance(pair) >= needed[pair] for pair in pairs.tolist())
+
+
+def _travel(
+    world: CollisionWorld, placed: PlacedWorld, x: FloatArray, change: FloatArray
+) -> FloatArray:
+    """Return `CollisionWorld.travel` for a ``change`` (k,) of any size, which may be infinite."""
+    turns = world.linkage.turned(change)
+    if turns >= 1.0:
+        return np.full(len(world.first), np.inf)
+    return world.travel(placed, x, x + change) * max(1.0, 1.0 / (1.0 - turns) / PATH_LENGTH_FACTOR)
+
+
+def _least(before: float, after: float, length: float, pull: float) -> float:
+    """Return a lower bound [m] on the distance of two bodies between two places.
+
+    Args:
+        before: the distance at the first [m].
+        after: the distance at the other [m].
+        length: bound on the relative motion of the bodies between them [m].
+        pull: bound on their relative acceleration, times the square of the time between them [m].
+    """
+    least = 0.5 * (before + after - length)
+    if least <= 0.0:
+        return least
+    # The lowest point of the parabola, unless it is at an end.
+    sag, slope = 0.5 * (length * length / least + pull), abs(after - before)
+    dip = 0.25 * (sag - slope) ** 2 / sag if slope < sag else 0.0
+    return max(least, min(before, after) - dip)
 
 
 @dataclass(frozen=True, order=True)
@@ -218,3 +264,94 @@ class _Path:
             or self.passes(active, low, d_low, middle, d_middle)
             or self.passes(active, middle, d_middle, high, d_high)
         )
+
+
+class _BentPath:
+    """A curve, and the pairs to check on it.
+
+    A pair that begins with its minimum keeps it, up to DISTANCE_ROUNDING. A nearer one comes no
+    nearer.
+
+    Let s from 0 to 1 lead from one place to another. A variable's rate differs from its mean by at
+    most half of its bend. So a point of one body moves relative to one of another at the rate L =
+    ``travel`` at most, and their distance f has f'' <= C = L^2 / f + A. Here A bounds their
+    acceleration. Turns at the rates w_i about axes at the distances r_i give a point the rate L =
+    sum w_i r_i, and the acceleration (2 sum w_i) L + sum r_i w_i' at most. The distance d of the
+    bodies is the smallest f. So d - C s^2 / 2 is concave, and d is above the parabola with the
+    second derivative C through both ends. If that is too near, the halves are looked at.
+    """
+
+    def __init__(
+        self,
+        world: CollisionWorld,
+        curve: Curve,
+        start: tuple[FloatArray, PlacedWorld],
+        end: tuple[FloatArray, PlacedWorld],
+        distances: Mapping[int, float],
+        minimum: FloatArray,
+    ) -> None:
+        """Create the path.
+
+        Args:
+            world: the bodies.
+            curve: the curve.
+            start: the variables (k,) at its start [rad or m], and the world there.
+            end: those at its end.
+            distances: the distance [m] at its start of each pair that may come too near.
+            minimum: the distance (p,) [m] that each pair keeps.
+        """
+        self._world = world
+        self._curve = curve
+        self._minimum = minimum
+        self._places = {0.0: start, 1.0: end}
+        self._clearances = {pair: min(d, float(minimum[pair])) for pair, d in distances.items()}
+
+    def _at(self, part: float) -> tuple[FloatArray, PlacedWorld]:
+        if part not in self._places:
+            x = self._curve.place(part)
+            self._places[part] = x, self._world.at(x)
+        return self._places[part]
+
+    def open_pairs(self, low: float, high: float, pairs: Sequence[int]) -> list[int]:
+        """Return those of ``pairs`` that may come too near between two fractions."""
+        (x, first), (end, last) = self._at(low), self._at(high)
+        bend = self._curve.bend(low, high)
+        change = np.abs(end - x) + 0.5 * bend
+        travel = _travel(self._world, first, x, change)
+        # On the way a radius r_i grows by ``travel`` at most, and the bend is twice the change.
+        pull = 4.0 * self._world.linkage.turned(change) * travel
+        pull += self._world.travel(first, x, x + bend)
+        near = []
+        for pair in pairs:
+            clearance, before = self._clearances[pair], first.distance(pair)
+            length = float(travel[pair])
+            if before >= clearance + length:
+                continue
+            after = last.distance(pair)
+            shortest = MIN_TRAVEL if clearance == self._minimum[pair] else MAX_UNCHECKED_PATH
+            least = after if length <= shortest else _least(before, after, length, pull[pair])
+            if least < clearance - DISTANCE_ROUNDING:
+                near.append(pair)
+        return near
+
+    def contact(self, pairs: Sequence[int]) -> Contact | None:
+        """Return a contact of ``pairs``; None if the path is clear of them.
+
+        A path that needs more than MAX_PLACES places to show this is not clear.
+        """
+        # Bodies that overlap cannot pass each other.
+        pieces = [(0.0, 1.0, [pair for pair in pairs if self._clearances[pair] > 0.0])]
+        while pieces:
+            low, high, pairs = pieces.pop()
+            near = self.open_pairs(low, high, pairs)
+            end = self._at(high)[1]
+            for pair in pairs:
+                clearance = self._clearances[pair]
+                if end.distance(pair) < clearance - rounding_of(clearance):
+                    return end.contact(pair)
+            if near and len(self._places) >= MAX_PLACES:
+                return end.contact(near[0])
+            if near:
+                middle = 0.5 * (low + high)
+                pieces += ((middle, high, near), (low, middle, near))
+        return None

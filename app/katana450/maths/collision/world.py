@@ -181,7 +181,7 @@ class CollisionWorld:
         joints = self.linkage
         turns = np.abs(joints.factor * (towards - x)[joints.variable])
         # (b, m): motion of a body by the joints that do not also move the other group.
-        moved = ((placed.reach() * turns * self._carries) @ self._stays).ravel()
+        moved = ((placed.reach * turns * self._carries) @ self._stays).ravel()
         return np.asarray(PATH_LENGTH_FACTOR * (moved[self._second_seen] + moved[self._first_seen]))
 
     def nearest(self, x: FloatArray) -> Contact | None:
@@ -244,6 +244,7 @@ class PlacedWorld:
     def __init__(self, world: CollisionWorld, T_base_mover: FloatArray) -> None:
         self._world = world
         self._T = T_base_mover
+        self._distances: dict[int, float] = {}
 
     @cached_property
     def _columns(self) -> FloatArray:
@@ -264,8 +265,9 @@ class PlacedWorld:
         apart *= apart
         return np.asarray(np.sqrt(apart[0] + apart[1] + apart[2]) - world.radii)
 
+    @cached_property
     def reach(self) -> FloatArray:
-        """Return the farthest distance of each body from each joint's axis, (b, m) [m].
+        """The farthest distance of each body from each joint's axis, (b, m) [m].
 
         For joints that slide it is 1: the motion of a body for each metre of the joint.
         """
@@ -339,7 +341,11 @@ class PlacedWorld:
 
     def distance(self, pair: int) -> float:
         """Return the distance between the bodies of a pair [m]; a negative value is their depth."""
-        return engine.distance(self._placement, *self._world.bodies_of[pair])
+        distance = self._distances.get(pair)
+        if distance is None:
+            bodies = self._world.bodies_of[pair]
+            distance = self._distances[pair] = engine.distance(self._placement, *bodies)
+        return distance
 
     def contact(self, pair: int) -> Contact:
         """Return the nearest points of the bodies of a pair."""
