@@ -137,6 +137,18 @@ def test_thumb_and_finger_meet_and_the_following_joint_counts(make: Make) -> Non
     assert "finger2" in "".join(state.findings[0].parts)
 
 
+def test_joints_that_brake_on_a_curve_keep_the_clearance_between_its_samples(make: Make) -> None:
+    # Two fingers that spread and bend pass each other while each joint brakes by itself.
+    machine = make(hand())
+    session, world = machine.session, machine.world
+    command = machine.move(
+        finger2_spread=0.35, finger2_bend1=1.6, finger2_bend2=1.5, finger1_bend2=1.0
+    )
+    states = during(session, begun(session), 0.5, command)
+    assert any(state.blocked for state in states)
+    assert min(excess(world, state) for state in states) >= -DISTANCE_ROUNDING
+
+
 targets = st.lists(
     st.tuples(st.lists(st.floats(-1.7, 1.7), min_size=16, max_size=16), st.floats(0.05, 0.5)),
     min_size=1,

@@ -97,6 +97,32 @@ def test_stop_is_the_fastest_within_limits(limiter: Limiter) -> None:
         assert np.abs(motion.q - stopping_point).max() < 1e-6
 
 
+def test_brake_is_as_near_to_its_chords_as_its_bend_says(limiter: Limiter) -> None:
+    rng = np.random.default_rng(5)
+    largest = 0.0
+    for _ in range(30):
+        motion, goal = JointMotion.rest(inside(rng)), inside(rng)
+        for _ in range(int(rng.integers(5, 120))):
+            goal = inside(rng) if rng.random() < 0.1 else goal
+            motion = limiter.towards(motion, goal, DT)
+        lower, upper = limiter.stopping_range(motion)
+        pieces = limiter.stopping_path(motion, 0.1, lambda change: float(np.abs(change).sum()))
+        place = motion.q
+        for piece in pieces:
+            a, b, bend = piece.place(0.0), piece.place(1.0), piece.bend(0.0, 1.0)
+            np.testing.assert_allclose(a, place, atol=1e-12)
+            for part in np.linspace(0.0, 1.0, 21).tolist():
+                q = piece.place(part)
+                aside = np.abs(q - a - part * (b - a))
+                assert (aside <= bend / 8.0 + 1e-12).all()
+                assert (q >= lower - 1e-12).all()
+                assert (q <= upper + 1e-12).all()
+                largest = max(largest, float(aside.max()))
+            place = b
+        np.testing.assert_allclose(place, limiter.stopping_point(motion), atol=1e-12)
+    assert largest > 1e-4
+
+
 def test_fraction_of_the_speed_is_kept(limiter: Limiter) -> None:
     motion, goal = JointMotion.rest(np.zeros(5)), LIMITS.lower
     fastest = np.zeros(5)

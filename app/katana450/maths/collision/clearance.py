@@ -141,19 +141,19 @@ def advance(
     return Advance(x, None if held is None else start.contact(held.pair), stopped=True)
 
 
-def is_surely_clear(world: CollisionWorld, x: FloatArray, towards: FloatArray) -> bool:
-    """Return True if a bound shows that no path from ``x`` to ``towards`` comes too near.
+def is_surely_clear(world: CollisionWorld, x: FloatArray, reach: FloatArray) -> bool:
+    """Return True if a bound shows that no path from ``x`` (k,) [rad or m] comes too near.
 
-    On the path every joint stays between its two ends. False means only that a full check is
-    needed: the joints may be too far apart for the bound, or a part too near.
+    reach: (k,) the farthest that each variable is from ``x`` on the path. False means only that a
+    full check is needed: the joints may go too far for the bound, or a part may be too near.
     """
-    turns = world.linkage.turned(towards - x)
+    turns = world.linkage.turned(reach)
     if turns >= MAX_GLANCE_ANGLE:
         return False
     placed = world.at(x)
     needed = (
         world.kept(MIN_CLEARANCE)
-        + world.travel(placed, x, towards) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
+        + world.travel(placed, x, x + reach) * (1.0 / (1.0 - turns)) / PATH_LENGTH_FACTOR
     )
     pairs, _ = placed.nearer_than(needed)
     return all(placed.distance(pair) >= needed[pair] for pair in pairs.tolist())

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from katana450.maths.geometry.arrays import FloatArray, frozen
+from katana450.maths.geometry.curve import Curve
 from katana450.maths.kinematics.chain import Chain
 from katana450.maths.motion.arm_angle import ElbowPath, at_pose, elbow_path, self_motion
 from katana450.maths.motion.limiter import STILL, JointMotion, Limiter, Limits
@@ -97,20 +98,28 @@ class ElbowBrake:
     limits: Limits
     T: FloatArray
 
-    def stopping_point(self, now: JointMotion) -> FloatArray:
-        """Return the joint angles (7,) [rad] at which the elbow comes to rest if it brakes now."""
-        return self.stopping_path(now, math.inf, lambda _: 0.0)[-1]
+    def stopping_range(self, now: JointMotion) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest and the largest place (7,) [rad] of each joint until it rests."""
+        (path,) = self.stopping_path(now, math.inf, lambda _: 0.0)
+        ends, aside = np.array((now.q, path.place(1.0))), path.bend(0.0, 1.0) / 8.0
+        return ends.min(axis=0) - aside, ends.max(axis=0) + aside
 
     def stopping_path(
         self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
-    ) -> list[FloatArray]:
-        """Return places (7,) [rad] on the braking path; see `Limiter.stopping_path`."""
+    ) -> list[Curve]:
+        """Return the braking path to rest in pieces; see `Limiter.stopping_path`.
+
+        Its bend is an estimate: twice that at its begin.
+        """
         path = elbow_path(self.chain, now.q, 1.0)
         along, line = _line(path, self.limits, now, STILL)
         end = float(along.stopping_point(line)[0])
-        pieces = max(1, math.ceil(2.0 * length(end * path.v) / longest))
-        ways = (end * k / pieces for k in range(1, pieces + 1))
-        return [now.q, *(_place(self.chain, now.q, path, way, self.T) for way in ways)]
+        bend = 2.0 * end * end * np.abs(path.bend)
+        curve = Curve(
+            lambda part: _place(self.chain, now.q, path, end * part, self.T),
+            lambda low, high: (high - low) ** 2 * bend,
+        )
+        return curve.pieces(max(1, math.ceil(2.0 * length(end * path.v) / longest)))
 
 
 def _line(

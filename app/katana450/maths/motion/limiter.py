@@ -31,6 +31,7 @@ from ruckig import (
 
 from katana450.errors import InputError
 from katana450.maths.geometry.arrays import FloatArray, finite_array, frozen
+from katana450.maths.geometry.curve import Curve
 
 LINE_TOLERANCE = 1e-6
 """Fraction of the limits: a motion that deviates less from the line to its goal is on the line."""
@@ -207,22 +208,42 @@ class Limiter:
 
     def stopping_path(
         self, now: JointMotion, longest: float, length: Callable[[FloatArray], float]
-    ) -> list[FloatArray]:
-        """Return places (n,) [rad] on the braking path, the present place first.
+    ) -> list[Curve]:
+        """Return the braking path from the present place to rest, in pieces; none at rest.
 
-        From one place to the next the joints move at most ``longest`` [rad]. ``length`` returns how
-        much a change (n,) of all joints counts.
+        In each piece the joints move by at most ``longest`` [rad]. ``length`` returns how much a
+        change (n,) of all joints counts. The pieces are valid only until the next call of this
+        limiter.
         """
         if now.at_rest:
-            return [now.q]
+            return []
         self._brake(now)
-        trajectory = self._trajectory
-        end, _, _ = trajectory.at_time(trajectory.duration)
+        state_at, duration = self._trajectory.at_time, self._trajectory.duration
+        jerk = self.limits.jerk
+        maximum = np.maximum(self.limits.acceleration, np.abs(now.qdd))
+
+        def bend(low: float, high: float) -> FloatArray:
+            # From both ends the acceleration rises by no more than the jerk allows.
+            h = (high - low) * duration
+            first, last = (np.abs(state_at(part * duration)[2]) for part in (low, high))
+            return np.asarray(h * h * np.minimum(maximum, 0.5 * (first + last + h * jerk)))
+
+        curve = Curve(lambda part: np.array(state_at(part * duration)[0]), bend)
         # Each joint either continues in its direction or returns to it: twice the distance is
         # enough.
-        pieces = max(1, math.ceil(2.0 * length(np.array(end) - now.q) / longest))
-        times = np.linspace(0.0, trajectory.duration, pieces + 1)[1:].tolist()
-        return [now.q, *(np.array(trajectory.at_time(time)[0]) for time in times)]
+        count = math.ceil(2.0 * length(curve.place(1.0) - now.q) / longest)
+        return curve.pieces(max(1, count))
+
+    def stopping_range(self, now: JointMotion) -> tuple[FloatArray, FloatArray]:
+        """Return the smallest and the largest place (n,) [rad] of each joint until it rests.
+
+        A joint that slows down too hard to end that at rest turns back.
+        """
+        if now.at_rest:
+            return now.q, now.q
+        self._brake(now)
+        extrema = self._trajectory.position_extrema
+        return np.array([x.min for x in extrema]), np.array([x.max for x in extrema])
 
     def braking(self, now: JointMotion) -> tuple[Callable[[float], JointMotion], float]:
         """Return the braking motion by time from now [s], and its duration [s].

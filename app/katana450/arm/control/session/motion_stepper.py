@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -58,17 +57,26 @@ def met_before_rest(
     is that at ``x``.
     """
     joints, others = x[: next_motion.q.size], x[next_motion.q.size :]
-    if is_surely_clear(world, x, np.append(limiter.stopping_point(next_motion), others)):
-        return None
+    lower, upper = limiter.stopping_range(next_motion)
+    reach = np.maximum(np.abs(lower - joints), np.abs(upper - joints))
     still = np.zeros(others.size)
-    path = limiter.stopping_path(
+    if is_surely_clear(world, x, np.append(reach, still)):
+        return None
+    pieces = limiter.stopping_path(
         next_motion, MAX_PATH_LENGTH, lambda change: world.linkage.turned(np.append(change, still))
     )
-    for a, b in pairwise([joints, *path]):
-        step = advance(world, np.append(a, others), np.append(b, others), MIN_STOP_TIME)
+    place = np.append(next_motion.q, others)
+    step = advance(world, x, place, MIN_STOP_TIME)
+    for piece in pieces:
         if step.contact is not None or step.stopped:
-            return world.nearest(x) if step.contact is None else measured(world, step.contact, x)
-    return None
+            break
+        curve = piece.beside(others)
+        end = curve.place(1.0)
+        step = advance(world, place, end, MIN_STOP_TIME, curve=curve)
+        place = end
+    if step.contact is None and not step.stopped:
+        return None
+    return world.nearest(x) if step.contact is None else measured(world, step.contact, x)
 
 
 def measured(world: CollisionWorld, contact: Contact, x: FloatArray) -> Contact:
