@@ -103,17 +103,18 @@ def advance(
     path = _Path(world, x, towards)
     near = start.nearer_than(free)[0].tolist()
     distances = {pair: d for pair in near if (d := start.distance(pair)) < free[pair]}
-    if not distances:
+    if not (near := list(distances)):
         return Advance(towards)
     bent = None
     if curve is not None:
         bent = _BentPath(world, curve, (x, start), (towards, path.at(1.0)), distances, minimum)
-        if not bent.open_pairs(0.0, 1.0, list(distances)):
+        # The straight path is no nearer than the bound on the curve, so it needs no other pairs.
+        if not (near := bent.open_pairs(0.0, 1.0, near)):
             return Advance(towards)
         travel = world.travel(start, x, towards)
     path.active = [
-        _ActivePair(pair, float(travel[pair]), before, part, float(minimum[pair]))
-        for pair, before in distances.items()
+        _ActivePair(pair, float(travel[pair]), distances[pair], part, float(minimum[pair]))
+        for pair in near
     ]
     fraction, held = 1.0, None
     for _ in range(STEP_ATTEMPTS):
@@ -131,7 +132,7 @@ def advance(
             held = passed
             fraction *= 0.5
         elif held is None and bent is not None:
-            contact = bent.contact(list(distances))
+            contact = bent.contact(near)
             return Advance(towards) if contact is None else Advance(x, contact, stopped=True)
         else:
             contact = None if held is None else end.contact(held.pair)
