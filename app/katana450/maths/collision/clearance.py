@@ -305,7 +305,11 @@ class _BentPath:
         self._curve = curve
         self._minimum = minimum
         self._places = {0.0: start, 1.0: end}
-        self._clearances = {pair: min(d, float(minimum[pair])) for pair, d in distances.items()}
+        # A distance within the rounding counts as the minimum, or each piece would take as much.
+        self._clearances = {
+            pair: d if d < minimum[pair] - DISTANCE_ROUNDING else float(minimum[pair])
+            for pair, d in distances.items()
+        }
 
     def _at(self, part: float) -> tuple[FloatArray, PlacedWorld]:
         if part not in self._places:
